@@ -26,6 +26,7 @@ class Arc(Struct):
     least: float
     behavior: str
     is_bound: bool
+    after: str
 
 
 class Model(Struct):
@@ -82,6 +83,7 @@ class Model(Struct):
                 least * factor + longer,
                 each.behavior if phase else "",
                 is_bound,
+                "" if is_bound else each.behavior if phase else each.after,
             )
             if phase and not is_bound and (each.behavior, each.target) in self.come:
                 continue
@@ -96,7 +98,7 @@ class Model(Struct):
         arcs = [
             (each.source, each.target, each.behavior if each.kind == "phase" else "", isinstance(each, Bound))
             for each in self.ties
-            if isinstance(each, Bound) or each.source or each.lag
+            if isinstance(each, Bound) or each.source or each.lag or each.after
         ] + [(-1, each, "", False) for each in self.foreseen]
         idle: set[tuple[str, int]] = set()
         while True:
@@ -116,7 +118,7 @@ class Model(Struct):
         lags: list[tuple[float | int, int, float, bool]] = []
         for arc in arcs:
             seconds = arc.least if extreme else arc.seconds
-            begun = self.passed.get((arc.behavior, arc.source)) if arc.behavior and not arc.is_bound else None
+            begun = self.passed.get((arc.after, arc.source)) if arc.after else None
             lags.append((arc.source if begun is None else begun, arc.target, seconds, begun is not None))
         times = [self.facts.get(each, max(BEGAN, self.base.get(each, BEGAN))) for each in range(self.size)]
         for each, at in self.foreseen.items():
@@ -180,6 +182,11 @@ def case(chance: random.Random, *, is_elastic: bool) -> Case:
             places.append(Place("delay" if kind == "delay" else "order", source, target, lag, lag))
         if kind != "order":
             bounds.append(Bound("delay", target, source, -(lag if kind == "delay" else lag + 1.5)))
+    for name, each in stations.items():
+        if chance.random() < 0.5 and (source := chance.choice(each)) < size - 2:
+            target = chance.randint(source + 1, size - 2)
+            lag = chance.choice((0.0, 0.0, 0.5))
+            places.append(Place("series", source, target, lag, lag, after=name))
     places += [Place("order", each, size - 1) for each in range(1, size - 1)]
     places.append(Place("idle", size - 1, 0))
     places += [Place("idle", each[-1], each[0], 1.0, 1.0) for each in stations.values() if chance.random() < 0.3]

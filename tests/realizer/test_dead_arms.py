@@ -66,3 +66,31 @@ async def test_an_arm_that_comes_after_all_is_told_with_the_constraint_and_by_ho
     assert len(late) == 2
     assert "overdue" in late[0]
     assert late[1].endswith(f"stroke came {skew:.2f} s later than it should: r:stroke = s:end")
+
+
+@pytest.mark.parametrize("seconds", [0.8, 1.5, None])
+async def test_the_next_words_follow_the_words_before_and_not_the_arm_that_is_tied_to_their_end(
+    seconds: float | None,
+) -> None:
+    """The transition fires with the arm, but the voice is free after its last word: nothing ties the rest to it."""
+    words = (Speech(id="s", text="this one here, please"), Speech(id="t", text="and that one"))
+    beat = timed(RIGHT, stroke="s:end")
+    stall = Stall(part="right_arm", before="stroke", seconds=seconds)
+    async with robot(Variability(stall=(stall,))) as seen:
+        async with asyncio.timeout(60.0):
+            await seen.ask(block((words[0], beat, words[1]))).outcome
+
+    times = {name: each.at.seconds for name, each in seen.times().items()}
+    assert times["t:start"] == pytest.approx(times["s:end"], abs=0.05)
+    assert seconds is None or times["r:stroke"] > times["t:start"] + 0.5
+
+
+async def test_who_is_tied_to_that_arm_waits_for_it() -> None:
+    words = Speech(id="s", text="this one here, please")
+    tied = timed(Speech(id="t", text="and that one"), start="r:stroke")
+    stall = Stall(part="right_arm", before="stroke", seconds=1.5)
+    async with robot(Variability(stall=(stall,))) as seen:
+        await seen.perform(block((words, timed(RIGHT, stroke="s:end"), tied)))
+
+    times = {name: each.at.seconds for name, each in seen.times().items()}
+    assert times["t:start"] >= times["r:stroke"] > times["s:end"] + 1.0

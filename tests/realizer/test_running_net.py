@@ -12,6 +12,7 @@ from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, 
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.net.petri_net import Place
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
@@ -22,10 +23,24 @@ from tests.realizer.test_forecast import planned
 from tests.realizer.test_properties import blocks
 
 
+def gates_of(plan: Plan) -> dict[tuple[str, int], Point]:
+    """For each behavior and transition, the point at which the behavior passes it."""
+    return {
+        (member.behavior, number): member.point for number, members in enumerate(plan.members) for member in members
+    }
+
+
 def fired_by(plan: Plan, began: float, reached: Mapping[Point, float], now: float) -> dict[int, float]:
     """When each transition has fired, by the definition: all its behaviors, and all ripe tokens before it."""
     end = len(plan.net.transitions) - 1
     fired = {0: began}
+    gates = gates_of(plan)
+
+    def put_at(place: Place) -> float:
+        if place.after:
+            return reached.get(gates[place.after, place.source], inf)
+        return fired.get(place.source, inf)
+
     leading, arcs = {end}, [(each.source, each.target) for each in plan.net.places if each.kind != "idle"]
     while more := {source for source, target in arcs if target in leading} - leading:
         leading |= more
@@ -41,7 +56,7 @@ def fired_by(plan: Plan, began: float, reached: Mapping[Point, float], now: floa
                 times = [reached.get(member.point) for member in plan.members[transition]]
                 for place in plan.net.places:
                     if place.target == transition and place.kind in ("order", "delay", "series"):
-                        ripe = fired.get(place.source, inf) + place.lag
+                        ripe = put_at(place) + place.lag
                         times.append(ripe if ripe <= now + 1e-6 else None)
             if None not in times:
                 fired[transition] = max(each for each in times if each is not None)
@@ -52,9 +67,7 @@ def fired_by(plan: Plan, began: float, reached: Mapping[Point, float], now: floa
 def marking_by(plan: Plan, began: float, reached: Mapping[Point, float], now: float) -> bytes:
     """Tokens by the definition: in a phase between its two points, elsewhere between its two transitions."""
     fired = fired_by(plan, began, reached, now)
-    gates = {
-        (member.behavior, number): member.point for number, members in enumerate(plan.members) for member in members
-    }
+    gates = gates_of(plan)
     tokens = []
     for place in plan.net.places:
         if place.kind == "phase":
@@ -63,7 +76,8 @@ def marking_by(plan: Plan, began: float, reached: Mapping[Point, float], now: fl
         elif place.kind == "idle":
             tokens.append(place.target not in fired or place.source in fired)
         else:
-            tokens.append(place.source in fired and place.target not in fired)
+            has_come = place.source in fired if not place.after else gates[place.after, place.source] in reached
+            tokens.append(has_come and place.target not in fired)
     return bytes(tokens)
 
 

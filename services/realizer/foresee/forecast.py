@@ -35,6 +35,10 @@ class Forecast(LongestPaths):
         self._factor = factor
         self._phase_to: dict[tuple[str, int], int] = {}
         self._phase_from: dict[tuple[str, int], int] = {}
+        self._after: dict[tuple[str, int], list[int]] = {}
+        """Arcs from where a behavior passes a transition, apart from its phases."""
+        self._moved: dict[tuple[int, int], list[int]] = {}
+        """Those of them that count from the behavior's own time, by the transitions at their ends."""
         self._of_behavior: dict[str, list[int]] = {}
         self._node_of: dict[str, int] = {}
         self._stopped: dict[int, Seconds] = {}
@@ -45,9 +49,11 @@ class Forecast(LongestPaths):
             self._rank[transition] = rank
         for place in net.places:
             # Other places from the block's start say nothing: no instant is earlier than that.
-            if place.kind != "idle" and (place.source or place.lag > 0.0):
+            if place.kind != "idle" and (place.source or place.lag > 0.0 or place.after):
                 behavior = place.behavior if place.kind == "phase" else ""
                 arc = self._add(place.source, place.target, place.lag, min(place.shortest, place.lag), behavior)
+                if place.after:
+                    self._after.setdefault((place.after, place.source), []).append(arc)
                 if behavior:
                     self._phase_to[behavior, place.target] = self._phase_from[behavior, place.source] = arc
         self._longest = {
@@ -125,11 +131,22 @@ class Forecast(LongestPaths):
     def passed(self, behavior: str, transition: int, at: Seconds) -> None:
         """Note that the behavior has passed its point there; the others of the instant perhaps not yet."""
         self.come(behavior, transition, at)
+        for each in self._after.pop((behavior, transition), ()):
+            self._moved.setdefault((transition, self._arcs[each].target), []).append(each)
+            self._start_from(self._new_node(), each, at)
         if (number := self._phase_from.get((behavior, transition))) is None:
             return
-        arc = self._arcs[number]
-        if arc.source == (node := self._whereabouts(behavior)):
+        if self._arcs[number].source == (node := self._whereabouts(behavior)):
             return
+        self._start_from(node, number, at)
+        for other in self._of_behavior[behavior]:
+            # A phase that has begun can no longer keep its own beginning back.
+            if self._arcs[other].target == transition:
+                self._switch_off(other)
+
+    def _start_from(self, node: int, number: int, at: Seconds) -> None:
+        """Let an arc count from `at`, the time of a node of its own."""
+        arc = self._arcs[number]
         is_cause = self._cause[arc.target] == number
         as_expected = is_cause and abs(at + arc.seconds - self.times[arc.target]) <= FINEST
         if is_cause:
@@ -141,10 +158,6 @@ class Forecast(LongestPaths):
         if not as_expected:
             self._loosen(number)
             self._touch(node)
-        for other in self._of_behavior[behavior]:
-            # A phase that has begun can no longer keep its own beginning back.
-            if self._arcs[other].target == transition:
-                self._switch_off(other)
 
     def _see_reasons_again(self, node: int) -> None:
         """Let `update` see anew what has to give way, if anything does: a fact that moves nothing may free it."""
@@ -194,7 +207,7 @@ class Forecast(LongestPaths):
         """Let the delay from one instant to another take so much longer than planned: its clock was stopped."""
         delays = [n for n in self._out[source] if self._arcs[n].target == target and not self._arcs[n].is_bound]
         bounds = [n for n in self._out[target] if self._arcs[n].target == source and self._arcs[n].is_bound]
-        for number in (*delays, *bounds):
+        for number in (*delays, *self._moved.get((source, target), ()), *bounds):
             arc = self._arcs[number]
             longer = -seconds if arc.is_bound else seconds
             more = longer - self._stopped.get(number, 0.0)

@@ -43,7 +43,8 @@ class Place(Struct, frozen=True, gc=False):
 
     shortest: the least that the lag can be; only the phase of a behavior has less than `lag`.
     behavior: the one that has this phase, or that waits here since it cannot wait at a later point.
-    lines: of the XML that asks for it.
+    lines: of the XML that asks for it. after: behavior of which the token comes, when it passes the source, as that
+    of a phase does; empty: of the transition, when all have passed.
     """
 
     kind: PlaceKind
@@ -53,6 +54,7 @@ class Place(Struct, frozen=True, gc=False):
     shortest: Seconds = 0.0
     behavior: str = ""
     lines: tuple[int, ...] = ()
+    after: str = ""
 
 
 class Bound(Struct, frozen=True, gc=False):

@@ -37,7 +37,9 @@ def as_pnml(net: PetriNet, name: str = "") -> str:
         _name(node, f"{place.kind} {place.behavior}".strip())
         if net.initial[number]:
             _child(_child(node, "initialMarking"), "text").text = str(net.initial[number])
-        etree.SubElement(_extension(node), _ours("place"), {**_tie(place), "shortest": repr(place.shortest)})
+        etree.SubElement(
+            _extension(node), _ours("place"), {**_tie(place), "shortest": repr(place.shortest), "after": place.after}
+        )
         _child(page, "arc", id=f"i{number}", source=f"t{place.source}", target=f"p{number}")
         _child(page, "arc", id=f"o{number}", source=f"p{number}", target=f"t{place.target}")
     if net.bounds:
@@ -103,7 +105,8 @@ def _place(node: etree._Element, sources: dict[str, int], targets: dict[str, int
     if tokens != int(kind == "idle"):
         raise ValueError(f"place {id} begins with {tokens} tokens")
     shortest = lag if ours is None else float(ours.get("shortest", lag))
-    return Place(kind, sources[id], targets[id], lag, shortest, behavior, lines)
+    after = "" if ours is None else ours.get("after", "")
+    return Place(kind, sources[id], targets[id], lag, shortest, behavior, lines, after)
 
 
 def _bound(node: etree._Element, number: dict[str, int]) -> Bound:

@@ -85,6 +85,10 @@ class RunningNet:
         """The phases of each behavior, by the transitions at their ends."""
         before: list[list[int]] = [[] for _ in range(size)]
         behind: list[list[int]] = [[] for _ in range(size)]
+        self._after: dict[tuple[str, int], list[int]] = {}
+        """Places that a behavior puts a token into as it passes a transition, apart from its phases."""
+        self._put_at: dict[int, Seconds] = {}
+        """For each place with a clock, when its token was put."""
         self._absent = [len(each) for each in members]
         """For each transition, the number of behaviors that have not passed it."""
         self._lacking = [0] * size
@@ -96,7 +100,10 @@ class RunningNet:
                 self._into[place.behavior, place.target] = self._out_of[place.behavior, place.source] = number
                 continue
             before[place.target].append(number)
-            behind[place.source].append(number)
+            if place.after:
+                self._after.setdefault((place.after, place.source), []).append(number)
+            else:
+                behind[place.source].append(number)
             if place.kind not in ("handover", "idle"):
                 self._lacking[place.target] += 1
                 self._missing[place.target] += 1
@@ -209,6 +216,8 @@ class RunningNet:
                 self._set(place, EMPTY)
             if (place := self._out_of.get(here)) is not None:
                 self._set(place, TOKEN)
+            for each in self._after.get(here, ()):
+                self._put(each, at)
             self._latest[transition] = max(self._latest[transition], at)
             self._absent[transition] -= 1
             if not self._absent[transition]:
@@ -226,7 +235,7 @@ class RunningNet:
         for number, at in self._clocks.stop(self._is_held, now).items():
             place = self.net.places[number]
             self._ripe[place.target] = max(self._ripe[place.target], at)
-            self.prolonged[number] = at - self.instants[place.source] - place.lag
+            self.prolonged[number] = at - self._put_at[number] - place.lag
 
     def stop_and_go(self, behaviors: Collection[str] | None, at: Seconds) -> None:
         """`tick`, and `hold`: what was held at a time in the past."""
@@ -274,7 +283,7 @@ class RunningNet:
             self._miss_less(self.end, at)
 
     def _put(self, number: int, at: Seconds) -> None:
-        """Put a token into a place, at the time of the transition before it."""
+        """Put a token into a place, at the time of the transition before it, or of a behavior that passes that."""
         place = self.net.places[number]
         target = place.target
         if target in self.instants and place.kind != "idle":
@@ -285,14 +294,15 @@ class RunningNet:
         self._set(number, TOKEN if place.lag > 0.0 else RIPE)
         if place.kind in ("handover", "idle") or target == self.end:
             return
-        if place.source or place.lag > 0.0:
+        if place.source or place.lag > 0.0 or place.after:
             self._ripe[target] = max(self._ripe[target], at + place.lag)
         if place.lag > 0.0:
+            self._put_at[number] = at
             self._clocks.set(number, at + place.lag, at, is_stopped=self._is_held(number))
         self._lack_less(target)
         if place.lag <= 0.0:
             # A point of another block may be older than this block: its instant is in the past.
-            self._miss_less(target, at if place.source else -inf)
+            self._miss_less(target, at if place.source or place.after else -inf)
 
     def _ripen(self, number: int, at: Seconds) -> None:
         self._set(number, RIPE)

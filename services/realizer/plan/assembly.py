@@ -297,9 +297,9 @@ class Assembler:
         lines: tuple[int, ...] = (),
         kind: PlaceKind = "series",
     ) -> None:
-        source, target = self.at[before], self.at[point]
+        source, target, after = self.at[before], self.at[point], before.behavior if kind == "series" else ""
         if source != target:
-            self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines))
+            self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines, after))
 
     def _never_too_soon(self) -> Steps[None]:
         """Make sure of orders on points that cannot wait: the behavior waits where it last can before such a point.

@@ -9,7 +9,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
 
-_Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], Seconds]
+_Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], tuple[Seconds, str]]
 TieT = TypeVar("TieT", Place, Bound)
 
 
@@ -28,27 +28,31 @@ def numbered(
     number = [0] * len(ranked)
     for new, old in enumerate(ranked):
         number[old] = new
-    ties = yield from _renumbered(places, number, lambda place: place.shortest)
-    limits = yield from _renumbered(bounds, number, lambda bound: inf if bound.stretch is None else bound.stretch)
+    ties = yield from _renumbered(places, number, lambda place: (place.shortest, place.after))
+    limits = yield from _renumbered(
+        bounds, number, lambda bound: (inf if bound.stretch is None else bound.stretch, "")
+    )
     placed: list[Place] = []
     for tied in portions(_sorted(ties)):
         placed += [
-            Place(kind, source, target, lag, shortest, behavior, lines)
-            for source, target, kind, lag, behavior, lines, shortest in tied
+            Place(kind, source, target, lag, shortest, behavior, lines, after)
+            for source, target, kind, lag, behavior, lines, (shortest, after) in tied
         ]
         yield len(tied) // 8
     bounded: list[Bound] = []
     for tied in portions(_sorted(limits)):
         bounded += [
             Bound(kind, source, target, lag, None if stretch == inf else stretch, behavior, lines)
-            for source, target, kind, lag, behavior, lines, stretch in tied
+            for source, target, kind, lag, behavior, lines, (stretch, _) in tied
         ]
         yield len(tied) // 8
     net = PetriNet(tuple([transitions[each] for each in ranked]), tuple(placed), tuple(bounded))
     return net, ranked, is_ordered
 
 
-def _renumbered(ties: Sequence[TieT], number: Sequence[int], last: Callable[[TieT], Seconds]) -> Steps[list[_Tie]]:
+def _renumbered(
+    ties: Sequence[TieT], number: Sequence[int], last: Callable[[TieT], tuple[Seconds, str]]
+) -> Steps[list[_Tie]]:
     """Each place or bound as a tuple that can be sorted, with the new numbers of its ends."""
     found: list[_Tie] = []
     for portion in portions(ties):
