@@ -16,6 +16,18 @@ class Reachable(Struct, frozen=True, array_like=True):
     endpoints: tuple[str, ...]
 
 
+class ClockOffset(Struct, frozen=True, kw_only=True):
+    """The clock of another machine, as measured by round trips: the own clock is at `its instant + offset`.
+
+    error: greatest error of the offset. trip: the quickest of the last round trips.
+    """
+
+    clock: str
+    offset: Seconds
+    error: Seconds
+    trip: Seconds
+
+
 class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Counts since the process opened the bus. The last four are of the participant, the others of its process."""
 
@@ -23,6 +35,8 @@ class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Names of all participants on the bus, this one included."""
     reachable: tuple[Reachable, ...] = ()
     """Where others may connect to the processes of participants. Clients are not among them."""
+    clocks: tuple[ClockOffset, ...] = ()
+    """Clocks of other machines."""
     passed: int = 0
     """Messages, tokens and replies that have come in."""
     dropped: int = 0

@@ -210,6 +210,10 @@ class Bus(ABC):
     def local(self, stamp: Stamp) -> Seconds:
         """Convert a stamp to local loop time, through the estimated offset of its clock."""
 
+    @abstractmethod
+    def error(self, clock: str) -> Seconds:
+        """Greatest error of `local` for stamps of this clock; inf if nothing is known of it yet."""
+
     def new_life(self) -> str:
         """Make the life of a requester on this bus: two requesters may use the same ids then."""
         return life_of(self.run, next(self._life_numbers))
