@@ -59,6 +59,29 @@ class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Bugs of Engage that came up here: each was published as a fault, and stands in the log."""
 
 
+class ProcessFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A process: its machine, what it runs on, and how it came to the bus."""
+
+    host: str = ""
+    """Name of its machine."""
+    python: str = ""
+    """Version of Python."""
+    loop: str = ""
+    """Package that its event loop is from: asyncio or uvloop."""
+    wall: float = 0.0
+    """Its machine's wall clock when it was asked, in seconds since 1970."""
+    zenoh: str = ""
+    """Version of Zenoh; empty on a bus in memory."""
+    mode: str = ""
+    """peer or client."""
+    connect: tuple[str, ...] = ()
+    """Endpoints that it connects to."""
+    holder: str = ""
+    """Common name of its certificate; empty: its links are open."""
+    until: int | None = None
+    """End of that certificate, in seconds since 1970."""
+
+
 class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True):
     """Present state of one participant."""
 
@@ -73,3 +96,4 @@ class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True
     stands: Stamp | None = None
     """Instant from which it serves; absent: it does not serve yet."""
     bus: BusHealth = BusHealth()
+    process: ProcessFacts = ProcessFacts()

@@ -7,6 +7,7 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 import asyncio
 import time
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import zenoh
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
-from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_encrypted, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
@@ -81,7 +82,11 @@ async def open_hub(
     else:
         session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
         places = tuple(listen) or (LOOPBACK,)
-    hub = ZenohHub(robot, session, places, Rights(keys.holder) if keys is not None else None)
+    link = ProcessFacts(
+        zenoh=version("eclipse-zenoh"), mode="peer" if places else "client", connect=tuple(connect),
+        holder=keys.holder.common_name if keys else "", until=keys.holder.until if keys else None,
+    )  # fmt: skip
+    hub = ZenohHub(robot, session, places, Rights(keys.holder) if keys is not None else None, link)
     if calls:
         await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
     return hub
@@ -91,10 +96,19 @@ class ZenohHub(Hub):
     """The hub of a process on a Zenoh session."""
 
     def __init__(
-        self, robot: str, session: zenoh.Session, places: Sequence[str] = (), rights: Rights | None = None
+        self,
+        robot: str,
+        session: zenoh.Session,
+        places: Sequence[str] = (),
+        rights: Rights | None = None,
+        link: ProcessFacts | None = None,
     ) -> None:
-        """places: endpoints at which others may connect to this process. rights: those of its keys, if it has any."""
+        """places: endpoints at which others may connect to this process. rights: those of its keys, if it has any.
+
+        link: how it came to the bus.
+        """
         self.robot = robot
+        self._link = link or ProcessFacts()
         self.rights = rights
         self.run = str(session.zid())
         self.session = session
@@ -122,6 +136,12 @@ class ZenohHub(Hub):
             peers=tuple(sorted(self.peers.names)), reachable=self.peers.reachable, clocks=self.clocks.offsets,
             refused=self.readers.refused, passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth,
             lag=traffic.lag, waiting=self.bridge.waiting,
+        )  # fmt: skip
+
+    def facts(self) -> ProcessFacts:
+        own = super().facts()
+        return msgspec.structs.replace(
+            self._link, host=own.host, python=own.python, loop=own.loop, wall=own.wall
         )  # fmt: skip
 
     def join(self, name: str, role: str = "manager") -> "ZenohBus":

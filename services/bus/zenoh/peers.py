@@ -205,6 +205,23 @@ class Peers:
 
         self.ask(keys.own(run, "clock"), b"", reply, lambda _: None, CLOCK_TIMEOUT)
 
+    async def round_trip(self, run: str, timeout: Seconds) -> Seconds | None:
+        """Time that a question to a process takes, and its answer; None: there was no answer in time."""
+        answered: asyncio.Future[Seconds | None] = self._loop.create_future()
+        asked = self.clocks.now()
+
+        def reply(got: zenoh.Reply) -> None:
+            if got.ok is not None and not answered.done():
+                answered.set_result(self.clocks.now() - asked)
+
+        def ended(_: Any) -> None:
+            if not answered.done():
+                answered.set_result(None)
+
+        self.ask(keys.own(run, "clock"), b"", reply, ended, timeout)
+        await asyncio.wait([answered], timeout=timeout)
+        return answered.result() if answered.done() else None
+
     def _tell_time(self, query: zenoh.Query) -> None:
         query.reply(query.key_expr, pack(Stamp(self.clocks.own, self.clocks.now())))
         finish(query)
