@@ -91,7 +91,7 @@ async def _look_around(hub: ZenohHub, facts: Facts, endpoints: tuple[str, ...]) 
     with suppress(TimeoutError):
         async with asyncio.timeout(COME):
             await hub.peers.wait_for_quiet(QUIET)
-    known, body, sight = await asyncio.gather(_participants(hub, bus), _body(bus), _sight(bus))
+    known, body, sight = await asyncio.gather(_participants(hub, bus), _body(hub, bus), _sight(bus))
     found: tuple[str, ...] = ()
     spoken: tuple[str, ...] = ()
     if hub.rights is None:
@@ -147,7 +147,13 @@ async def _status(bus: Bus, name: str) -> Status | None:
     return answer if isinstance(answer, Status) else None
 
 
-async def _body(bus: Bus) -> Body:
+async def _body(hub: ZenohHub, bus: Bus) -> Body | None:
+    """Ask for the body; None if our keys do not let us ask."""
+    try:
+        if hub.rights is not None:
+            hub.rights.check(bus.name, "asks", keys.DESCRIBE)
+    except InputRefused:
+        return None
     try:
         answer = await bus.query(keys.DESCRIBE, DescribeBody(), ANSWER)
     except EngageError as error:

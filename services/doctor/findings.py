@@ -7,7 +7,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.services.doctor.facts import Facts, Known, Package
-from engage_hri.services.doctor.matrix import HERE, clock_of, matrix
+from engage_hri.services.doctor.matrix import clock_of, matrix
 
 Severity = Literal["wrong", "doubtful", "note"]
 SOON = 30
@@ -142,10 +142,9 @@ def _sight_of_one_another(facts: Facts) -> Iterator[Finding]:
         if cell.sees == "no":
             hidden.setdefault(cell.other, []).append(cell.viewer)
     for name, viewers in hidden.items():
-        needed = name in facts.services and any(each in (HERE, *facts.services) for each in viewers)
         why, do = _why_hidden(facts, by_name[name])
         yield Finding(
-            severity="wrong" if needed else "doubtful", where=name,
+            severity="wrong" if by_name[name].answers else "doubtful", where=name,
             what=f"it is there, but not seen by {_listed(viewers)}{why}", do=do,
         )  # fmt: skip
 
@@ -159,14 +158,14 @@ def _why_hidden(facts: Facts, one: Known) -> tuple[str, str]:
         if reachable.participant == one.name
         for place in reachable.endpoints
     }
+    where = _listed(sorted({place.removesuffix(":0") for place in places}))  # 0: the system has chosen a port
     router = "let all connect to one router (`engage router`; docs/deploy.md)"
     if places and all(_is_loopback(place) for place in places):
         return (
-            f": it listens on {_listed(sorted(places))} only",
+            f": it listens on {where} only",
             f"{router}, or give it --listen with its own address",
         )
     if places:
-        where = _listed(sorted(places))
         return (
             f": it listens on {where}, and the path there is cut",
             f"try from there whether {where} can be reached (network, firewall); or {router}, through which all go",
@@ -229,9 +228,10 @@ def _losses(facts: Facts) -> Iterator[Finding]:
                     severity=now if grows else before, where=one.name,
                     what=f"{what}: {number} since it came{', and more just now' if grows else ''}", do=do,
                 )  # fmt: skip
-        if (lag := one.status.bus.lag) > STOOD:
+        if (lag := (one.later or one.status).bus.lag) > STOOD:
             yield Finding(
-                severity="doubtful", where=one.name, what=f"messages waited up to {lag:.2f} s for this process",
+                severity="doubtful" if lag > one.status.bus.lag else "note", where=one.name,
+                what=f"messages once waited {lag:.2f} s for this process",
                 do="give it more of a processor; a body or client of your own must not keep the loop for long",
             )  # fmt: skip
 

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.units import A_DAY, Seconds
-from engage_hri.services.doctor.facts import Door, Facts, Known
+from engage_hri.services.doctor.facts import Door, Facts
 from engage_hri.services.doctor.findings import Finding, Severity
 from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
@@ -83,7 +83,8 @@ def _participants(facts: Facts) -> Table:
     clocks = {each.clock: each for each in facts.clocks}
     for one in facts.known:
         if one.status is None:
-            table.add_row(one.name, *_silent(one))
+            if one.answers:
+                table.add_row(one.name, "does not answer" if one.seen else "not seen from here")
             continue
         status, process, bus = one.status, one.status.process, (one.later or one.status).bus
         clock = clocks.get(status.at.clock)
@@ -93,12 +94,6 @@ def _participants(facts: Facts) -> Table:
             _time(status.at.seconds - status.joined.seconds), str(bus.gaps), str(bus.lost), str(bus.dropped),
         )  # fmt: skip
     return table
-
-
-def _silent(one: Known) -> tuple[str, ...]:
-    if not one.seen:
-        return ("not seen from here",)
-    return ("does not answer",) if one.answers else ("-",)
 
 
 def _time(seconds: Seconds) -> str:
@@ -131,7 +126,7 @@ def _things(facts: Facts) -> Iterator[tuple[str, str]]:
         yield "packages", ", ".join(f"{each.name} {each.version or 'MISSING'}" for each in facts.packages)
     if facts.body is not None:
         voice = "with a voice" if "speech" in facts.body.types else "without a voice"
-        yield "body", facts.body.problem or f"{facts.body.name}, {voice}; performs {', '.join(facts.body.types)}"
+        yield "body", facts.body.problem or f"{facts.body.name}, {voice}; {len(facts.body.types)} types of behaviors"
     if facts.bus and facts.known:
         yield "sight", _sight(facts)
     if facts.found:
@@ -155,7 +150,8 @@ def _sight(facts: Facts) -> str:
         case "unknown":
             return "not for these keys"
         case sight:
-            return f"{sight.people} people and {sight.objects} objects, told by {sight.source} {_time(sight.age)} ago"
+            who = f"{sight.people} {'person' if sight.people == 1 else 'people'}"
+            return f"{who} and {sight.objects} objects, told by {sight.source} {_time(sight.age)} ago"
 
 
 def _findings(found: Sequence[Finding]) -> RenderableType:
@@ -168,4 +164,7 @@ def _findings(found: Sequence[Finding]) -> RenderableType:
         table.add_row(Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
         table.add_row("", Text(f"→ {finding.do}", style="dim"))
     wrong = sum(finding.severity == "wrong" for finding in found)
-    return Group(table, Text()) if wrong else Group(table, Text(), Text("Nothing is wrong.", style="bold green"))
+    if not wrong:
+        return Group(table, Text(), Text("Nothing is wrong.", style="bold green"))
+    told = "1 thing is wrong." if wrong == 1 else f"{wrong} things are wrong."
+    return Group(table, Text(), Text(told, style=STYLES["wrong"]))

@@ -73,6 +73,8 @@ class Machine:
         self._first.kill()
         await self._first.wait()
         for process in self.processes:
+            with suppress(ProcessLookupError):
+                process.send_signal(signal.SIGCONT)  # what stands for a frozen process freezes with it
             await process.wait()
         self.processes.clear()
 
