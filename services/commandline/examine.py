@@ -10,8 +10,8 @@ import re
 import socket
 import ssl
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any, Literal
@@ -54,8 +54,31 @@ HOLDER = "viewer"
 _NEEDED = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*([^;]*)(;.*)?")
 
 
-async def examine(bus: BusConfig) -> Facts:
-    """Gather the facts. Raises nothing: what cannot be had is a fact, too."""
+@asynccontextmanager
+async def examining(bus: BusConfig) -> AsyncIterator[Facts]:
+    """Gather the facts, for the body of `async with`; then leave the bus. What cannot be had is a fact, too."""
+    facts, own = await _outside(bus)
+    endpoints = tuple(door.endpoint for door in facts.doors)
+    if facts.problem is not None or all(door.problem for door in facts.doors):
+        yield facts
+        return
+    try:
+        async with asyncio.timeout(OPEN):
+            hub = await open_hub(bus.robot, connect=endpoints, mode=bus.mode, rendezvous=None, keys=own)
+    except TimeoutError:
+        reason = "somebody opens there, and lets us in to no bus"
+        advice = "is it a router of Engage, and does its log tell of a refused link?"
+        yield msgspec.structs.replace(facts, problem=Fault(reason=reason, where=", ".join(endpoints), advice=advice))
+        return
+    except EngageError as error:
+        yield msgspec.structs.replace(facts, problem=error.fault)
+        return
+    async with hub:
+        yield await _look_around(hub, facts, endpoints)
+
+
+async def _outside(bus: BusConfig) -> tuple[Facts, Keys | None]:
+    """Gather what can be learned without the bus."""
     own, problem = _keys(bus)
     endpoints = bus.connect or ((ROUTER_WITH_KEYS,) if bus.keys else (RENDEZVOUS,))
     doors = tuple(await asyncio.gather(*(_knock(endpoint, own) for endpoint in endpoints)))
@@ -64,19 +87,7 @@ async def examine(bus: BusConfig) -> Facts:
         services=keys.SERVICES, packages=tuple(_packages()), doors=doors, bus=False, problem=problem,
         certificates=tuple(_certificates(bus)),
     )  # fmt: skip
-    if problem is not None or all(door.problem for door in doors):
-        return facts
-    try:
-        async with asyncio.timeout(OPEN):
-            hub = await open_hub(bus.robot, connect=endpoints, mode=bus.mode, rendezvous=None, keys=own)
-    except TimeoutError:
-        reason = "somebody opens there, and lets us in to no bus"
-        advice = "is it a router of Engage, and does its log tell of a refused link?"
-        return msgspec.structs.replace(facts, problem=Fault(reason=reason, where=", ".join(endpoints), advice=advice))
-    except EngageError as error:
-        return msgspec.structs.replace(facts, problem=error.fault)
-    async with hub:
-        return await _look_around(hub, facts, endpoints)
+    return facts, own
 
 
 def _itself() -> ProcessFacts:
