@@ -266,9 +266,10 @@ def test_nothing_runs(engage: Engage) -> None:
 @pytest.mark.parametrize("arguments", [("--mode", "client"), ()], ids=["client", "peer"])
 async def test_somebody_else_listens_there(arguments: tuple[str, ...]) -> None:
     """A program that takes links, and never says a word."""
-    server = await asyncio.start_server(lambda reader, writer: None, "127.0.0.1", 0)
-    async with server:
-        port = server.sockets[0].getsockname()[1]
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen()
+        port = server.getsockname()[1]
         process = await start("doctor", "--json", "--connect", f"tcp/127.0.0.1:{port}", *arguments)
         out, err = await asyncio.wait_for(process.communicate(), 40)
     assert process.returncode == 1, err
