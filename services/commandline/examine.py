@@ -91,7 +91,7 @@ async def _outside(bus: BusConfig) -> tuple[Facts, Keys | None]:
 
 
 def _itself() -> ProcessFacts:
-    """What this process runs on, without a bus."""
+    """Tell what this process runs on, without a bus."""
     zenoh = _version("eclipse-zenoh")
     return ProcessFacts(host=platform.node(), python=platform.python_version(), wall=time.time(), zenoh=zenoh)
 

