@@ -13,8 +13,10 @@ from engage_hri.services.doctor.findings import Finding, Severity
 from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
-NARROW = 100
-"""Columns below which the matrix has numbers in place of names."""
+WIDE = 100
+"""Columns from which on the table of participants has all it can have."""
+NARROW = 80
+"""Columns below which anything may be broken into lines."""
 
 
 def as_json(facts: Facts, found: Sequence[Finding]) -> str:
@@ -26,7 +28,7 @@ def report(facts: Facts, found: Sequence[Finding], width: int = 80) -> Renderabl
     """Draw the report, as wide as the terminal."""
     parts: list[RenderableType] = [_head(facts)]
     if facts.known:
-        parts += [Text(), _who_sees_whom(facts, width), Text(), _participants(facts)]
+        parts += [Text(), _who_sees_whom(facts, width), Text(), _participants(facts, width)]
     parts += [Text(), _around(facts), Text(), _findings(found)]
     return Group(*parts)
 
@@ -40,7 +42,7 @@ def _head(facts: Facts) -> Text:
 
 
 def _table(*columns: str) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), title_justify="left", title_style="bold")
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for column in columns:
         table.add_column(column, header_style="dim", overflow="fold")
     return table
@@ -48,20 +50,27 @@ def _table(*columns: str) -> Table:
 
 def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
     """Draw the matrix: a row for each who sees, a column for each who is seen, with the round trips in ms."""
-    names = [one.name for one in facts.known]
+    every = [one.name for one in facts.known]
     rows: dict[str, list[Cell]] = {}
     for cell in matrix(facts):
         rows.setdefault(cell.viewer, []).append(cell)
     longest = max(map(len, (HERE, *rows)))
+    fits = longest + 6 + 4 * len(every) <= width
+    names = every if fits else [name for name in every if name in rows]
     is_wide = longest + 6 + sum(max(6, len(name)) + 2 for name in names) <= width
     with_trips = longest + 6 + 8 * len(names) <= width
     table = _table("sees", *(name if is_wide else str(number) for number, name in enumerate(names, 1)))
-    table.title = "Who sees whom" + (", with round trips in ms" if with_trips else "")
+    title = Text("Who sees whom" + (", with round trips in ms" if with_trips else ""), style="bold")
     for viewer, cells in rows.items():
         number = "" if is_wide or viewer == HERE else f"{names.index(viewer) + 1} "
-        table.add_row(number + viewer, *(_cell(cell, with_trips) for cell in cells))
-    unlisted = [f"{number} {name}" for number, name in enumerate(names, 1) if name not in rows and not is_wide]
-    return Group(table, Text(f"seen, too: {', '.join(unlisted)}")) if unlisted else table
+        table.add_row(number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
+    columns = names if is_wide else ()
+    unlisted = [
+        f"{names.index(name) + 1} {name}" if name in names else name
+        for name in every
+        if name not in (*rows, *columns)
+    ]
+    return Group(title, table, *([Text(f"seen, too: {', '.join(unlisted)}")] if unlisted else []))
 
 
 def _cell(cell: Cell, with_trips: bool) -> Text:
@@ -77,9 +86,12 @@ def _cell(cell: Cell, with_trips: bool) -> Text:
     return Text(f"{1000 * cell.trip:.1f}")
 
 
-def _participants(facts: Facts) -> Table:
-    table = _table("participant", "machine", "Engage", "Python", "clock", "up", "gaps", "lost", "dropped")
-    table.title = "Participants"
+def _participants(facts: Facts, width: int) -> RenderableType:
+    is_wide = width >= WIDE
+    more = ("Python", "dropped") if is_wide else ()
+    table = _table("participant", "machine", "clock", "up", "gaps", "lost", "Engage", *more)
+    for column in (table.columns[0], table.columns[2]):
+        column.no_wrap = width >= NARROW
     clocks = {each.clock: each for each in facts.clocks}
     for one in facts.known:
         if one.status is None:
@@ -89,11 +101,10 @@ def _participants(facts: Facts) -> Table:
         status, process, bus = one.status, one.status.process, (one.later or one.status).bus
         clock = clocks.get(status.at.clock)
         apart = "same" if clock is None else f"{-clock.offset:+.3f} s ± {1000 * clock.error:.1f} ms"
-        table.add_row(
-            one.name, process.host or "?", status.version, process.python or "?", apart,
-            _time(status.at.seconds - status.joined.seconds), str(bus.gaps), str(bus.lost), str(bus.dropped),
-        )  # fmt: skip
-    return table
+        up = _time(status.at.seconds - status.joined.seconds)
+        cells = (one.name, process.host or "?", apart, up, str(bus.gaps), str(bus.lost), status.version)
+        table.add_row(*cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
+    return Group(Text("Participants", style="bold"), table)
 
 
 def _time(seconds: Seconds) -> str:

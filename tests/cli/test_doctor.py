@@ -242,6 +242,16 @@ def test_the_matrix_is_drawn() -> None:
     assert ["3", "recognition", "y", "y", "·", "y", "N"] in tiny
 
 
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_a_crowd_of_watchers_is_listed_below_the_matrix(width: int) -> None:
+    watchers = tuple(Known(name=f"watch-{number}", answers=False) for number in range(60))
+    lines = drawn(well(known=(*well().known, *watchers)), width)
+    assert max(map(len, lines)) <= width
+    (row,) = [line.split() for line in lines if "recognition" in line.split()[:2] and "·" in line]
+    assert len(row) - row.index("recognition") == 1 + len(NAMES)
+    assert all(f"watch-{number}" in " ".join(lines) for number in range(60))
+
+
 def test_json_has_all() -> None:
     told = json.loads(as_json(hidden(), findings(hidden())))
     assert set(told) == {"facts", "findings", "matrix"}
