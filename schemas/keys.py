@@ -199,6 +199,8 @@ def alive(participant: str) -> str:
 
 # Keys of the bus itself. No wildcard includes a chunk that begins with `@`, so no subscriber gets these by accident.
 ANY_TOKEN = f"{PREFIX}/@bus/*/**"
+ANY_PROTOCOL = "engage/*/@bus/*/**"
+"""Tokens of processes of every version of the protocol."""
 ANY_PULSE = f"{PREFIX}/@bus/*/pulse"
 ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 

@@ -50,6 +50,8 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     cause: Cause = "human"
     optional: bool = False
     delay: Seconds | None = None
+    delay_error: Seconds | None = 0.0
+    """Greatest error of `delay`, if clocks of several machines are in it; None: these clocks are not measured yet."""
     duration: Seconds | None = None
     limit: Seconds | None = None
     """Time that the responder has, when `started`."""
@@ -143,6 +145,8 @@ class KindStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
     failed_delay_min: Seconds | None = None
     failed_delay_mean: Seconds | None = None
     failed_delay_max: Seconds | None = None
+    delay_error: Seconds = 0.0
+    """Greatest known error of these delays: `ConnectionEvent.delay_error`."""
 
 
 class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):

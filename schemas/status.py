@@ -16,6 +16,18 @@ class Reachable(Struct, frozen=True, array_like=True):
     endpoints: tuple[str, ...]
 
 
+class ClockOffset(Struct, frozen=True, kw_only=True):
+    """The clock of another machine, as measured by round trips: the own clock is at `its instant + offset`.
+
+    error: greatest error of the offset. trip: the quickest of the last round trips.
+    """
+
+    clock: str
+    offset: Seconds
+    error: Seconds
+    trip: Seconds
+
+
 class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Counts since the process opened the bus. The last four are of the participant, the others of its process."""
 
@@ -23,6 +35,8 @@ class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Names of all participants on the bus, this one included."""
     reachable: tuple[Reachable, ...] = ()
     """Where others may connect to the processes of participants. Clients are not among them."""
+    clocks: tuple[ClockOffset, ...] = ()
+    """Clocks of other machines."""
     passed: int = 0
     """Messages, tokens and replies that have come in."""
     dropped: int = 0
@@ -45,6 +59,29 @@ class BusHealth(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Bugs of Engage that came up here: each was published as a fault, and stands in the log."""
 
 
+class ProcessFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A process: its machine, what it runs on, and how it came to the bus."""
+
+    host: str = ""
+    """Name of its machine."""
+    python: str = ""
+    """Version of Python."""
+    loop: str = ""
+    """Package that its event loop is from: asyncio or uvloop."""
+    wall: float = 0.0
+    """Its machine's wall clock when it was asked, in seconds since 1970."""
+    zenoh: str = ""
+    """Version of Zenoh; empty on a bus in memory."""
+    mode: str = ""
+    """peer or client."""
+    connect: tuple[str, ...] = ()
+    """Endpoints that it connects to."""
+    holder: str = ""
+    """Common name of its certificate; empty: its links are open."""
+    until: int | None = None
+    """End of that certificate, in seconds since 1970."""
+
+
 class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True):
     """Present state of one participant."""
 
@@ -59,3 +96,4 @@ class Status(Struct, frozen=True, kw_only=True, tag="status", omit_defaults=True
     stands: Stamp | None = None
     """Instant from which it serves; absent: it does not serve yet."""
     bus: BusHealth = BusHealth()
+    process: ProcessFacts = ProcessFacts()

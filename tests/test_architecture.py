@@ -62,8 +62,8 @@ SHARED = {"bus", "requests", "runtime", "client", "tangram"}
 """Packages of `services` that are no service, and that services may import."""
 LAYERS = {
     "schemas": "documents > *",
-    "services": "commandline > collaboration console control generation hostile realizer recognition simulation study"
-    " > client > requests > runtime > bus > tangram",
+    "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
+    " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
     "services/control": "service > torso > voice > actions waiting > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"

@@ -6,6 +6,8 @@ the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a 
 
 import asyncio
 import logging
+import platform
+import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -18,7 +20,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, kind_of, life_of
-from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 
@@ -210,6 +212,10 @@ class Bus(ABC):
     def local(self, stamp: Stamp) -> Seconds:
         """Convert a stamp to local loop time, through the estimated offset of its clock."""
 
+    @abstractmethod
+    def error(self, clock: str) -> Seconds:
+        """Greatest error of `local` for stamps of this clock; inf if nothing is known of it yet."""
+
     def new_life(self) -> str:
         """Make the life of a requester on this bus: two requesters may use the same ids then."""
         return life_of(self.run, next(self._life_numbers))
@@ -345,6 +351,13 @@ class Hub(ABC):
 
         Raises InputRefused for names that stay taken.
         """
+
+    def facts(self) -> ProcessFacts:
+        """Tell what this process runs on."""
+        loop = type(asyncio.get_running_loop()).__module__.partition(".")[0]
+        return ProcessFacts(
+            host=platform.node(), python=platform.python_version(), loop=loop, wall=time.time()
+        )  # fmt: skip
 
     @abstractmethod
     async def close(self) -> None: ...

@@ -207,6 +207,9 @@ class MemoryBus(Bus):
     def local(self, stamp: Stamp) -> Seconds:
         return stamp.seconds
 
+    def error(self, clock: str) -> Seconds:
+        return 0.0
+
     def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.send(self.name, key, message)

@@ -33,6 +33,7 @@ COMMANDS = {
     "hostile": "Attack the whole robot, in memory and virtual time only. "
     "Exit 1 if anything came of it that should not have.",
     "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
+    "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
     "keys": "Make certificates for all that take part (init, add, renew, revoke), show when they expire (show), "
     "and print the rules of who may do what (acl).",
     "session": "",

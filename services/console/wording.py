@@ -17,6 +17,9 @@ KINDS: dict[EventKind, str] = {
 }
 """Event kinds as people write them, in the order of the tables."""
 
+SEEN: Seconds = 0.005
+"""Error of a delay from which on it changes the two digits that are shown."""
+
 
 def seconds(value: Seconds | None, sign: bool = False) -> str:
     """Write seconds as `1.24 s`, with `+` or `-` if asked; `-` for None."""
@@ -63,10 +66,17 @@ def decision(event: ConnectionEvent) -> str:
     if event.state == "started":
         text = "waiting"
     elif event.state in ("succeeded", "failed", "completed") and event.delay is not None:
-        text = f"{event.state} {seconds(event.delay)}"
+        text = f"{event.state} {seconds(event.delay)}{_give_or_take(event.delay_error)}"
     else:
         text = event.state
     return f"{text} (optional)" if event.optional and event.state == "failed" else text
+
+
+def _give_or_take(error: Seconds | None) -> str:
+    """Write the error of a delay, if clocks of several machines make it large enough to be seen."""
+    if error is None:
+        return " (clocks not measured yet)"
+    return f" ± {seconds(error)}" if error >= SEEN else ""
 
 
 def warning(message: WarningFeedback) -> str:

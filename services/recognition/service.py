@@ -1,6 +1,7 @@
 """The recognition service: feeds the recognizer from the bus and publishes what comes out. It decides nothing."""
 
 from collections.abc import Iterable
+from math import inf
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -23,6 +24,7 @@ from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Forgotten, Mishap
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
+from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.reporters import Reporters
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -31,6 +33,8 @@ from engage_hri.services.runtime.service import Ready
 
 OLDEST: Seconds = 60.0
 """Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
+OF_ACTORS = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity
+"""Observations of one actor. All others with an instant tell of the robot."""
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
 
@@ -66,6 +70,7 @@ class _Recognition:
         self._bus = bus
         self._bad_ids: set[str] = set()
         self._reporters = Reporters()
+        self._clock_errors = ClockErrors(bus.robot)
         session = session_of(bus.run)
         self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-", strict=False)
         self._open_events = OpenEventTracker(bus.robot, session)
@@ -139,8 +144,14 @@ class _Recognition:
                 stamp = None
             case _:
                 stamp = observation.at
-        now = self._bus.now()
-        return arrived if stamp is None else max(min(self._bus.local(stamp), now), now - OLDEST)
+        if stamp is None:
+            return arrived
+        now, told = self._bus.now(), self._bus.local(stamp)
+        at = max(min(told, now), now - OLDEST)
+        if not isinstance(observation, HeadOwner | World):
+            actor = observation.actor if isinstance(observation, OF_ACTORS) else self._bus.robot
+            self._clock_errors.heard(actor, at, inf if at > told else self._bus.error(stamp.clock))
+        return at
 
     def _publish(self, results: Iterable[Result]) -> Fault | None:
         """Publish the results. Returns the fault if a bug has shown."""
@@ -149,6 +160,7 @@ class _Recognition:
         for result in results:
             match result:
                 case ConnectionEvent():
+                    result = self._clock_errors.marked(result)
                     changes.append(result)
                     self._bus.publish(keys.connection_event(result.person(self._bus.robot), result.kind), result)
                 case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():

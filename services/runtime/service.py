@@ -44,6 +44,7 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
         return Status(
             participant=name, run=bus.run, version=installed_version(),
             at=bus.stamp(), joined=joined, stands=since, bus=bus.health,
+            process=hub.facts(),
         )  # fmt: skip
 
     bus.answer(keys.status(name), status, empty=AskStatus())

@@ -1,9 +1,10 @@
 from math import inf
+from random import Random
 
 import pytest
 
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus.zenoh.clocks import KEPT, REFRESH, Clocks
+from engage_hri.services.bus.zenoh.clocks import DRIFT, KEPT, REFRESH, Clocks
 
 
 def test_the_own_clock_needs_no_estimate():
@@ -20,38 +21,91 @@ def test_a_clock_never_heard_of_reads_as_now():
 def test_until_measured_the_quickest_message_bounds_the_offset():
     clocks = Clocks("own", lambda: 0.0)
 
-    due = [clocks.heard("other", sent, arrived) for sent, arrived in ((100.0, 5.3), (101.0, 6.1), (102.0, 7.2))]
+    for sent, arrived in ((100.0, 5.3), (101.0, 6.1), (102.0, 7.2)):
+        clocks.heard("other", sent, arrived)
 
     assert clocks.local(Stamp("other", 110.0)) == pytest.approx(15.1)
     assert clocks.error("other") == inf
-    assert due == [True, False, False]
+    assert clocks.offsets == ()
 
 
-def test_the_quickest_round_trip_wins_and_its_half_is_the_error():
-    clocks = Clocks("own", lambda: 0.0)
+def test_the_offset_is_where_round_trips_overlap():
+    clocks = Clocks("own", lambda: 3.6)
     clocks.heard("other", 1000.0, 0.5)
 
-    clocks.measured("other", asked=1.0, remote=1001.2, answered=1.4)
-    clocks.measured("other", asked=2.0, remote=2001.01 - 1000, answered=2.02)
-    clocks.measured("other", asked=3.0, remote=1002.9, answered=3.6)
+    clocks.measured("other", asked=1.0, remote=1001.2, answered=1.4)  # -1000.2 .. -999.8
+    assert clocks.local(Stamp("other", 1001.2)) == pytest.approx(1.2)
+    clocks.measured("other", asked=3.0, remote=1002.9, answered=3.6)  # -999.9 .. -999.3
+    assert clocks.local(Stamp("other", 1001.0)) == pytest.approx(1.15, abs=3 * DRIFT)
+    assert clocks.error("other") == pytest.approx(0.05, abs=3 * DRIFT)
+    (told,) = clocks.offsets
+    assert (told.clock, told.error) == ("other", clocks.error("other"))
+    assert (told.offset, told.trip) == pytest.approx((-999.85, 0.4), abs=3 * DRIFT)
 
-    assert clocks.local(Stamp("other", 1001.01)) == pytest.approx(2.01)
-    assert clocks.error("other") == pytest.approx(0.01)
+
+def test_an_error_grows_until_the_clock_is_measured_again():
+    now = 10.1
+    clocks = Clocks("own", lambda: now)
+    clocks.measured("other", 10.0, 0.05, 10.1)
+    errors = []
+    for now in (10.1, 110.1, 1010.1):  # noqa: B007 - the clock reads it
+        errors.append(clocks.error("other"))
+
+    assert errors == pytest.approx([0.05, 0.05 + 100 * DRIFT, 0.05 + 1000 * DRIFT])
 
 
-def test_a_measurement_is_due_again_when_the_clocks_may_have_drifted():
-    clocks = Clocks("own", lambda: 0.0)
-    clocks.heard("other", 0.0, 10.0)
-    clocks.measured("other", 10.0, 0.1, 10.1)
+def test_a_machine_that_has_slept_is_measured_anew():
+    clocks = Clocks("own", lambda: 60.0)
+    for at in (10.0, 20.0):
+        clocks.measured("other", at, at + 0.001, at + 0.002)
+    clocks.measured("other", 60.0, 30.001, 60.002)  # its clock stood still for 30 s
 
-    assert not clocks.heard("other", 20.0, 30.0)
-    assert clocks.heard("other", 20.0, 10.1 + REFRESH + 1)
-    assert not clocks.heard("other", 20.0, 10.1 + REFRESH + 2)
+    assert clocks.local(Stamp("other", 31.0)) == pytest.approx(61.0, abs=0.001)
+    assert clocks.error("other") == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize("clock", ["own", ""])
 def test_the_own_clock_and_none_are_never_measured(clock: str):
-    assert not Clocks("own", lambda: 0.0).heard(clock, 0.0, 1e9)
+    clocks = Clocks("own", lambda: 0.0)
+    clocks.heard(clock, 0.0, 1e9)
+    clocks.measured(clock, 0.0, 5.0, 1.0)
+    assert clocks.offsets == ()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_no_instant_is_further_off_than_is_told(seed: int):
+    """Two clocks that go as they like within 50 ppm, and paths as slow, shaky and lopsided as chance makes them."""
+    chance = Random(seed)
+    offset = chance.uniform(-1e6, 1e6)
+    rates = [1 + chance.uniform(-50e-6, 50e-6) for _ in range(2)]
+    there, back = (chance.choice((0.0, 0.0002, 0.002, 0.05)) for _ in range(2))
+    jitter = chance.choice((0.0, 0.0005, 0.03))
+
+    def own(true: float) -> float:
+        return true * rates[0]
+
+    def other(true: float) -> float:
+        return offset + true * rates[1]
+
+    true = 0.0
+    clocks = Clocks("own", lambda: own(true))
+    worst = 0.0
+    for _ in range(30):
+        trips = []
+        for _ in range(5):
+            asked, remote = true, true + there + chance.random() * jitter
+            true = remote + back + chance.random() * jitter
+            trips.append(true - asked)
+            clocks.measured("other", own(asked), other(remote), own(true))
+        until = true + REFRESH
+        while true < until:
+            happened = true - chance.random()  # what is told of happened up to a second ago
+            off = abs(clocks.local(Stamp("other", other(happened))) - own(happened))
+            assert off <= clocks.error("other") + DRIFT
+            assert clocks.error("other") <= min(trips) / 2 + DRIFT * (REFRESH + 1)
+            worst = max(worst, off)
+            true += chance.random() * 3
+    assert worst > 0.0
 
 
 def test_clocks_that_come_and_go_are_forgotten():

@@ -21,8 +21,8 @@ TOOLS = ("unshare", "nsenter", "mount")
 Process = asyncio.subprocess.Process
 
 
-def missing() -> str:
-    """Why there can be no laboratory on this machine; empty if there can."""
+def missing(*spaces: str) -> str:
+    """Why there can be no laboratory on this machine; empty if there can. spaces: further namespaces it needs."""
     if not sys.platform.startswith("linux"):
         return "the laboratory needs Linux"
     if os.geteuid() != 0:
@@ -31,6 +31,8 @@ def missing() -> str:
         return f"the laboratory needs {', '.join(lacking)}"
     if not Path("/dev/net/tun").exists():
         return "the laboratory needs /dev/net/tun"
+    if lacking := [space for space in spaces if not Path(f"/proc/self/ns/{space}").exists()]:
+        return f"the laboratory needs namespaces for {', '.join(lacking)}"
     return ""
 
 
@@ -43,6 +45,8 @@ class Machine:
     def __init__(self, number: int, lab: "Lab") -> None:
         self.number = number
         self.ip = ip_of(number)
+        self.ahead = 0
+        """Seconds by which its monotonic clock is ahead of the host's, from its next boot on."""
         self.processes: list[Process] = []
         self._lab = lab
         self._first: Process | None = None
@@ -52,9 +56,10 @@ class Machine:
     async def boot(self) -> None:
         """Start the machine, with nothing running on it."""
         boot_id = self._lab.folder / f"boot-{self.number}"
-        boot_id.write_text(f"{uuid.UUID(int=self._lab.boots.pop())}\n")
+        boot_id.write_text(f"{uuid.UUID(int=self._lab.boots.pop() << 96)}\n")
         self._first = await asyncio.create_subprocess_exec(
             "unshare", "--net", "--mount", "--uts", "--pid", "--fork", "--kill-child", "--mount-proc",
+            *(("--time", "--monotonic", str(self.ahead)) if self.ahead else ()),
             sys.executable, "-m", "tests.lab.inside", str(self._lab.door), str(self.number), str(boot_id),
             stdin=asyncio.subprocess.DEVNULL,
         )  # fmt: skip
@@ -68,12 +73,15 @@ class Machine:
         self._first.kill()
         await self._first.wait()
         for process in self.processes:
+            with suppress(ProcessLookupError):
+                process.send_signal(signal.SIGCONT)  # what stands for a frozen process freezes with it
             await process.wait()
         self.processes.clear()
 
     async def spawn(self, *command: str, env: Mapping[str, str] | None = None, **files: Any) -> Process:
         """Run a command on the machine, in a session of its own. files: as `create_subprocess_exec` takes them."""
         inside = ("nsenter", "--target", str(self._init), "--net", "--mount", "--uts", "--pid")
+        inside += ("--time",) if self.ahead else ()
         process = await asyncio.create_subprocess_exec(
             *inside, *command, env=dict(os.environ) | dict(env or {}), start_new_session=True, **files
         )
@@ -155,8 +163,13 @@ class Lab:
 
 
 @asynccontextmanager
-async def laboratory(folder: Path, machines: Iterable[int] = (1, 2, 3), seed: int = 0) -> AsyncIterator[Lab]:
-    """Machines of these numbers (1 to 254) on one network, started; all ends with the `async with`."""
+async def laboratory(
+    folder: Path, machines: Iterable[int] = (1, 2, 3), seed: int = 0, ahead: Mapping[int, int] = {}
+) -> AsyncIterator[Lab]:
+    """Machines of these numbers (1 to 254) on one network, started; all ends with the `async with`.
+
+    ahead: seconds by which the clocks of machines are ahead of the host's.
+    """
     pipe = asyncio.subprocess.PIPE
     door = folder / "door"
     switch = await asyncio.create_subprocess_exec(
@@ -166,6 +179,8 @@ async def laboratory(folder: Path, machines: Iterable[int] = (1, 2, 3), seed: in
     try:
         assert switch.stdout is not None
         await asyncio.wait_for(switch.stdout.readline(), PATIENCE)
+        for number, seconds in ahead.items():
+            lab.machines[number].ahead = seconds
         await asyncio.gather(*(machine.boot() for machine in lab.machines.values()))
         yield lab
     finally:

@@ -86,7 +86,7 @@ def test_a_connection_event_that_has_only_begun() -> None:
     assert line(message) == (
         '{"type":"connection_event","id":"e-1","kind":"directed_gaze","initiator":"robot","responder":"human",'
         '"state":"started","at":3.0,"started":3.0,"objects":["cup"],"cause":"reference","optional":false,'
-        '"delay":null,"duration":null,"limit":null,"response":null,"confidence":1.0,"block":"","behavior":"","turn":""}'
+        '"delay":null,"delay_error":0.0,"duration":null,"limit":null,"response":null,"confidence":1.0,"block":"","behavior":"","turn":""}'
     )
 
 
@@ -112,6 +112,7 @@ def test_statistics_of_all() -> None:
                     "kind": "directed_gaze", "count": 2, "succeeded": 2, "failed": 0, "failure_rate": 0.0,
                     "delay_min": None, "delay_mean": 0.3, "delay_max": None,
                     "failed_delay_min": None, "failed_delay_mean": None, "failed_delay_max": None,
+                        "delay_error": 0.0,
                 }
             ],
         },

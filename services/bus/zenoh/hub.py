@@ -6,7 +6,8 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 
 import asyncio
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import zenoh
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
-from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_encrypted, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
@@ -50,6 +51,9 @@ VACANCY: Seconds = 4.0
 QUIET: Seconds = 0.25
 """Time without a change after which all peers are known, also those found through others."""
 
+FIRST_TIME_SPACE = 0xEFFFFFFA
+"""Number of the time namespace that Linux begins with."""
+
 
 async def open_hub(
     robot: str,
@@ -78,7 +82,11 @@ async def open_hub(
     else:
         session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
         places = tuple(listen) or (LOOPBACK,)
-    hub = ZenohHub(robot, session, places, Rights(keys.holder) if keys is not None else None)
+    link = ProcessFacts(
+        zenoh=version("eclipse-zenoh"), mode="peer" if places else "client", connect=tuple(connect),
+        holder=keys.holder.common_name if keys else "", until=keys.holder.until if keys else None,
+    )  # fmt: skip
+    hub = ZenohHub(robot, session, places, Rights(keys.holder) if keys is not None else None, link)
     if calls:
         await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
     return hub
@@ -88,17 +96,26 @@ class ZenohHub(Hub):
     """The hub of a process on a Zenoh session."""
 
     def __init__(
-        self, robot: str, session: zenoh.Session, places: Sequence[str] = (), rights: Rights | None = None
+        self,
+        robot: str,
+        session: zenoh.Session,
+        places: Sequence[str] = (),
+        rights: Rights | None = None,
+        link: ProcessFacts | None = None,
     ) -> None:
-        """places: endpoints at which others may connect to this process. rights: those of its keys, if it has any."""
+        """places: endpoints at which others may connect to this process. rights: those of its keys, if it has any.
+
+        link: how it came to the bus.
+        """
         self.robot = robot
+        self._link = link or ProcessFacts()
         self.rights = rights
         self.run = str(session.zid())
         self.session = session
         self.bridge = LoopBridge(self.failed)
         self.life_numbers = count(1)
         self._loop = asyncio.get_running_loop()
-        self.clocks = Clocks(_clock_name(self._loop, self.run), self._loop.time)
+        self.clocks = Clocks(*_clock(self._loop, self.run))
         self._sent = SentLog(self.run)
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._source = zenoh.SourceInfo(session.id, 0)
@@ -116,9 +133,15 @@ class ZenohHub(Hub):
         """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
         return BusHealth(
-            peers=tuple(sorted(self.peers.names)), reachable=self.peers.reachable, refused=self.readers.refused,
-            passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth, lag=traffic.lag,
-            waiting=self.bridge.waiting,
+            peers=tuple(sorted(self.peers.names)), reachable=self.peers.reachable, clocks=self.clocks.offsets,
+            refused=self.readers.refused, passed=traffic.passed, dropped=traffic.dropped, depth=traffic.depth,
+            lag=traffic.lag, waiting=self.bridge.waiting,
+        )  # fmt: skip
+
+    def facts(self) -> ProcessFacts:
+        own = super().facts()
+        return msgspec.structs.replace(
+            self._link, host=own.host, python=own.python, loop=own.loop, wall=own.wall
         )  # fmt: skip
 
     def join(self, name: str, role: str = "manager") -> "ZenohBus":
@@ -224,6 +247,9 @@ class ZenohBus(Bus):
 
     def local(self, stamp: Stamp) -> Seconds:
         return self._hub.clocks.local(stamp)
+
+    def error(self, clock: str) -> Seconds:
+        return self._hub.clocks.error(clock)
 
     def _send(self, key: str, message: Message) -> None:
         if not self._gone:
@@ -357,9 +383,15 @@ def _fault(payload: bytes, encoding: str) -> Fault:
     return fault if isinstance(fault, Fault) else Fault(reason=f"answered with {type(fault).__name__}")
 
 
-def _clock_name(loop: asyncio.AbstractEventLoop, run: str) -> str:
-    """Name of the clock that loop time is: the machine's, one for all processes since boot, or the loop's own."""
-    boot = Path("/proc/sys/kernel/random/boot_id")
+def _clock(loop: asyncio.AbstractEventLoop, run: str) -> tuple[str, Callable[[], Seconds]]:
+    """Name of the clock that loop time is, and how to read it: the machine's, one since boot, or the loop's own.
+
+    uvloop tells time in whole milliseconds, as of when its turn began: too coarse to measure by. A machine has more
+    than one such clock if its containers have time namespaces.
+    """
+    boot, space = Path("/proc/sys/kernel/random/boot_id"), Path("/proc/self/ns/time")
     if abs(loop.time() - time.monotonic()) < 0.1 and boot.exists():
-        return f"boot-{boot.read_text()[:8]}"
-    return f"loop-{run[:8]}"
+        number = space.stat().st_ino if space.exists() else FIRST_TIME_SPACE
+        more = "" if number == FIRST_TIME_SPACE else f"-{number}"
+        return f"boot-{boot.read_text()[:8]}{more}", time.monotonic
+    return f"loop-{run[:8]}", loop.time

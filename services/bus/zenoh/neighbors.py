@@ -132,13 +132,23 @@ async def robots(connect: Sequence[str]) -> tuple[str, ...]:
         while not names and asyncio.get_running_loop().time() < until:  # the link itself takes a moment
             await asyncio.sleep(POLL)
             replies = session.liveliness().get(f"*/{keys.ANY_TOKEN}", timeout=LOOK)
-            names.update([name async for name in _robots(replies, until)])
+            names.update([key.partition("/")[0] async for key in _keys(replies, until)])
         return tuple(sorted(names))
     finally:
         session.close()  # type: ignore[no-untyped-call]
 
 
-async def _robots(replies: Any, until: Seconds) -> AsyncIterator[str]:
+async def protocols(session: zenoh.Session, timeout: Seconds) -> tuple[str, ...]:
+    """Versions of the protocol that processes of the session's robot speak, in order."""
+    found: set[str] = set()
+    until = asyncio.get_running_loop().time() + timeout
+    replies = session.liveliness().get(keys.ANY_PROTOCOL, timeout=timeout)
+    async for key in _keys(replies, until):
+        found.add("/".join(key.split("/")[:2]))
+    return tuple(sorted(found))
+
+
+async def _keys(replies: Any, until: Seconds) -> AsyncIterator[str]:
     while asyncio.get_running_loop().time() < until:
         try:
             reply = replies.try_recv()
@@ -147,4 +157,4 @@ async def _robots(replies: Any, until: Seconds) -> AsyncIterator[str]:
         if reply is None:
             await asyncio.sleep(POLL)
         elif reply.ok is not None:
-            yield str(reply.ok.key_expr).partition("/")[0]
+            yield str(reply.ok.key_expr)

@@ -11,8 +11,8 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.status import Reachable
-from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.clocks import Clocks
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
 from engage_hri.services.bus.zenoh.history import BAD, finish, pack
 from engage_hri.services.bus.zenoh.order import SentLog
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
@@ -22,7 +22,7 @@ FLUSH: Seconds = 2.0
 CLOCK_TRIPS = 5
 CLOCK_TIMEOUT: Seconds = 1.0
 
-_instants = msgspec.msgpack.Decoder(float)
+_instants = msgspec.msgpack.Decoder(Stamp)
 
 
 class Peers:
@@ -47,6 +47,9 @@ class Peers:
         self._bridge = bridge
         self._sent = sent
         self._watchers: list[asyncio.Future[None]] = []
+        self._clock_of: dict[str, str] = {}
+        """Clocks of the processes that have told theirs."""
+        self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         self._declared: tuple[Any, ...] = (
             session.declare_queryable(keys.own(sent.run, "clock"), bridge.on_loop(self._tell_time)),
         )
@@ -81,6 +84,7 @@ class Peers:
             pass
 
     def close(self) -> None:
+        self._measuring.cancel()
         for declared in reversed(self._declared):
             declared.undeclare()
 
@@ -94,9 +98,11 @@ class Peers:
         if subject == ["process"]:
             if there:
                 self.processes.add(run)
+                self.measure_clock(run)
                 self._on_process(run)
             else:
                 self.processes.discard(run)
+                self._clock_of.pop(run, None)
         elif subject[:1] == ["at"]:
             places, place = self._places.setdefault(run, set()), "/".join(subject[1:])
             (places.add if there else places.discard)(place)
@@ -172,22 +178,52 @@ class Peers:
             **QOS,
         )
 
-    def measure_clock(self, run: str, clock: str, trips: int = CLOCK_TRIPS) -> None:
-        """Read another machine's clock in a few round trips; the quickest tells the most."""
-        asked = self._loop.time()
+    def _measure_clocks(self) -> None:
+        """Read all clocks again: they drift apart. Of the processes of one machine the first is asked."""
+        self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
+        asked = {self.clocks.own}
+        for run in sorted(self.processes):
+            clock = self._clock_of.get(run)
+            if clock is None or clock not in asked:
+                asked.add(clock or "")
+                self.measure_clock(run)
+
+    def measure_clock(self, run: str, trips: int = CLOCK_TRIPS) -> None:
+        """Read the clock of a process in a few round trips; one is enough to learn that it is of this machine."""
+        asked = self.clocks.now()
 
         def reply(got: zenoh.Reply) -> None:
-            answered = self._loop.time()
-            if got.ok is not None:
-                with suppress(*BAD):
-                    self.clocks.measured(clock, asked, _instants.decode(got.ok.payload.to_bytes()), answered)
-                if trips > 1:
-                    self.measure_clock(run, clock, trips - 1)
+            answered = self.clocks.now()
+            if got.ok is None:
+                return
+            with suppress(*BAD):
+                told = _instants.decode(got.ok.payload.to_bytes())
+                self._clock_of[run] = told.clock
+                self.clocks.measured(told.clock, asked, told.seconds, answered)
+                if trips > 1 and told.clock != self.clocks.own:
+                    self.measure_clock(run, trips - 1)
 
         self.ask(keys.own(run, "clock"), b"", reply, lambda _: None, CLOCK_TIMEOUT)
 
+    async def round_trip(self, run: str, timeout: Seconds) -> Seconds | None:
+        """Time that a question to a process takes, and its answer; None: there was no answer in time."""
+        answered: asyncio.Future[Seconds | None] = self._loop.create_future()
+        asked = self.clocks.now()
+
+        def reply(got: zenoh.Reply) -> None:
+            if got.ok is not None and not answered.done():
+                answered.set_result(self.clocks.now() - asked)
+
+        def ended(_: Any) -> None:
+            if not answered.done():
+                answered.set_result(None)
+
+        self.ask(keys.own(run, "clock"), b"", reply, ended, timeout)
+        await asyncio.wait([answered], timeout=timeout)
+        return answered.result() if answered.done() else None
+
     def _tell_time(self, query: zenoh.Query) -> None:
-        query.reply(query.key_expr, pack(self._loop.time()))
+        query.reply(query.key_expr, pack(Stamp(self.clocks.own, self.clocks.now())))
         finish(query)
 
     async def flush(self) -> None:

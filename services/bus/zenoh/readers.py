@@ -137,8 +137,7 @@ class Readers:
         written = Written(key, encoding, payload, envelope)
         if not self._is_trusted(written, run):
             return
-        if self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time()):
-            self._peers.measure_clock(run, envelope.clock)
+        self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time())
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
             # Only the first of overlapping patterns delivers, so that nothing comes twice.
             if reader.subscription.carrier(key) != pattern:

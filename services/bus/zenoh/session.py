@@ -29,7 +29,8 @@ STALL_US = 200_000
 RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
 """Place in Zenoh's source, at the end of its errors: of no use to a user."""
 ROUTER_MS = 2000
-"""Time that one try to reach a router may take, in which the loop stands still: nothing runs on it yet."""
+"""Time that one try to reach a router may take, in which the loop stands still: nothing runs on it yet. Any link has
+this time to open."""
 TRY_AGAIN: Seconds = 0.25
 TELL_AFTER: Seconds = 3.0
 """Time without a router after which it is told that there is none."""
@@ -146,6 +147,7 @@ def _config(
         "connect/exit_on_failure": mode == "client",
         "connect/timeout_ms": ROUTER_MS if mode == "client" else -1,
         "connect/retry": RETRY_MS,
+        "transport/unicast/open_timeout": ROUTER_MS,  # else close() waits 10 s, for one behind a cut
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": True,
         "scouting/delay": 1,

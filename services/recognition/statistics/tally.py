@@ -49,6 +49,8 @@ class Count(Struct):
     judged: int = 0
     delays: Spread = field(default_factory=Spread)
     failed_delays: Spread = field(default_factory=Spread)
+    error: Seconds = 0.0
+    """Greatest known error of the delays."""
 
     def decide(self, event: ConnectionEvent) -> None:
         """Count a success or a failure; nothing else changes the rates."""
@@ -57,10 +59,12 @@ class Count(Struct):
             self.judged += not event.optional
             if event.delay is not None:
                 self.delays.add(event.delay)
+                self.error = max(self.error, event.delay_error or 0.0)
         elif event.state == "failed" and not event.optional:
             self.failed += 1
             self.judged += 1
             self.failed_delays.add(event.delay or 0.0)
+            self.error = max(self.error, event.delay_error or 0.0)
 
     def statistics(self, kind: EventKind) -> KindStatistics:
         delays, failed_delays, decided = self.delays, self.failed_delays, self.succeeded + self.failed
@@ -69,7 +73,7 @@ class Count(Struct):
             delay_min=delays.least, delay_mean=delays.mean, delay_max=delays.greatest,
             failure_rate=self.failed / decided if decided else None,
             failed_delay_min=failed_delays.least, failed_delay_mean=failed_delays.mean,
-            failed_delay_max=failed_delays.greatest,
+            failed_delay_max=failed_delays.greatest, delay_error=self.error,
         )  # fmt: skip
 
 

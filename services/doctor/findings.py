@@ -1,0 +1,345 @@
+"""Findings: what is wrong, or may be, on a robot's bus and on this machine, and what to do. Pure: facts in."""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Literal
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import A_DAY, Seconds
+from engage_hri.services.doctor.facts import Facts, Known, Package
+from engage_hri.services.doctor.matrix import clock_of, matrix
+
+Severity = Literal["wrong", "doubtful", "note"]
+SOON = 30
+"""Days before its end from which on a certificate is told."""
+FAR: Seconds = 0.1
+"""Round trip from which on a path is told to be slow: the body holds 0.5 s after the realizer's last word."""
+STOOD: Seconds = 0.25
+"""Time that messages waited for a process from which on it is told."""
+WALL: Seconds = 2.0
+"""Difference of wall clocks from which on it is told."""
+PRECISE: Seconds = 0.005
+"""Error of a clock from which on delays can be wrong by more than 10 ms."""
+
+
+class Finding(Struct, frozen=True, kw_only=True):
+    """A finding.
+
+    severity: wrong: something does not work; doubtful: it works, but not as well as it should; note: good to know.
+    where: participant, endpoint, package or file. do: what to do about it.
+    """
+
+    severity: Severity
+    where: str
+    what: str
+    do: str
+
+
+def findings(facts: Facts) -> tuple[Finding, ...]:
+    """All findings, the worst first, else in the order in which one would mend them."""
+    order: tuple[Severity, ...] = ("wrong", "doubtful", "note")
+    found = [finding for rule in RULES for finding in rule(facts)]
+    return tuple(sorted(found, key=lambda finding: order.index(finding.severity)))
+
+
+def satisfies(package: Package) -> bool:
+    """Tell whether the version of a package is one that is wanted; a version that is no number counts as one."""
+    if not package.version:
+        return False
+    have = _numbers(package.version)
+    for part in filter(None, package.wanted.replace(" ", "").split(",")):
+        sign = part[:2] if part[:2] in ("==", ">=", "<=", "!=", "~=") else part[:1]
+        wanted = _numbers(part.removeprefix(sign))
+        length = max(len(have), len(wanted))
+        one, other = (each + (0,) * (length - len(each)) for each in (have, wanted))
+        fits = {"==": one == other, "!=": one != other, "<=": one <= other, "<": one < other, ">": one > other}
+        if not fits.get(sign, one >= other):
+            return False
+    return True
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    digits = ("".join(letter for letter in part if letter.isdigit()) for part in version.split("."))
+    return tuple(int(each) for each in digits if each)
+
+
+def _packages(facts: Facts) -> Iterator[Finding]:
+    for package in facts.packages:
+        if not satisfies(package):
+            what = f"version {package.version} is here" if package.version else "it is not installed"
+            yield Finding(
+                severity="wrong", where=package.name, what=f"{what}; Engage needs {package.name}{package.wanted}",
+                do=f"python -m pip install '{package.name}{package.wanted}', in the environment of `engage`",
+            )  # fmt: skip
+
+
+def _problem(facts: Facts) -> Iterator[Finding]:
+    if (fault := facts.problem) is not None:
+        yield Finding(
+            severity="wrong", where=fault.where or "bus", what=fault.reason,
+            do=fault.advice or "see docs/security.md for keys, docs/deploy.md for endpoints",
+        )  # fmt: skip
+
+
+def _doors(facts: Facts) -> Iterator[Finding]:
+    shut = [door for door in facts.doors if door.problem]
+    for door in facts.doors:
+        if door.problem:
+            router = f"start `engage router --listen {door.endpoint}`"
+            if door.is_local and not door.is_closed:
+                do = f"`engage up --robot {facts.robot}` starts a robot here; one elsewhere takes --connect"
+            elif door.is_local:
+                do = f"{router} --keys ..., or name the router with --connect"
+            else:
+                do = f"there {router}; if it runs, look for another address, or for a firewall that shuts the port"
+            yield Finding(
+                severity="doubtful" if len(shut) < len(facts.doors) else "wrong",
+                where=door.endpoint, what=f"nobody opens: {door.problem}", do=do,
+            )  # fmt: skip
+        elif not door.is_local and not door.is_closed:
+            yield Finding(
+                severity="doubtful", where=door.endpoint,
+                what="open to all: whoever reaches this address can drive the robot",
+                do="make keys, `engage keys init` (docs/security.md), unless the network is yours alone",
+            )  # fmt: skip
+    if facts.bus and facts.doors and not shut and not facts.known and not facts.found and facts.own.mode == "peer":
+        yield Finding(
+            severity="note", where=facts.doors[0].endpoint, what="somebody listens there, and no participant shows",
+            do="if no process of Engage has this port, set another one with --connect and --listen",
+        )  # fmt: skip
+
+
+def _services(facts: Facts) -> Iterator[Finding]:
+    there = {one.name for one in facts.known}
+    if not facts.bus:
+        return
+    if not there & set(facts.services):
+        others = f"; there are: {', '.join(facts.found)}" if facts.found else ""
+        yield Finding(
+            severity="wrong", where=facts.robot, what=f"no service of this robot is on the bus{others}",
+            do=f"`engage up --robot {facts.robot}` starts one; or name another with --robot, --connect",
+        )  # fmt: skip
+    else:
+        for name in facts.services:
+            if name not in there:
+                yield Finding(
+                    severity="wrong", where=name, what="nobody sees this service",
+                    do=f"start `engage run {name}` with the same --robot and --connect; its log tells why it ended",
+                )  # fmt: skip
+    for version in facts.protocols:
+        if version != facts.protocol:
+            yield Finding(
+                severity="wrong", where=facts.robot,
+                what=f"somebody speaks {version}, which nobody hears who speaks {facts.protocol}",
+                do="bring all machines to one version of Engage",
+            )  # fmt: skip
+
+
+def _sight_of_one_another(facts: Facts) -> Iterator[Finding]:
+    by_name = {one.name: one for one in facts.known}
+    hidden: dict[str, list[str]] = {}
+    for cell in matrix(facts):
+        if cell.sees == "no":
+            hidden.setdefault(cell.other, []).append(cell.viewer)
+    for name, viewers in hidden.items():
+        why, do = _why_hidden(facts, by_name[name])
+        yield Finding(
+            severity="wrong" if by_name[name].answers else "doubtful", where=name,
+            what=f"it is there, but not seen by {_listed(viewers)}{why}", do=do,
+        )  # fmt: skip
+
+
+def _why_hidden(facts: Facts, one: Known) -> tuple[str, str]:
+    places = {
+        place
+        for other in facts.known
+        if other.status is not None
+        for reachable in other.status.bus.reachable
+        if reachable.participant == one.name
+        for place in reachable.endpoints
+    }
+    where = _listed(sorted({place.removesuffix(":0") for place in places}))  # 0: the system has chosen a port
+    router = "let all connect to one router (`engage router`; docs/deploy.md)"
+    if places and all(_is_loopback(place) for place in places):
+        return (
+            f": it listens on {where} only",
+            f"{router}, or give it --listen with its own address",
+        )
+    if places:
+        return (
+            f": it listens on {where}, and the path there is cut",
+            f"try from there whether {where} can be reached (network, firewall); or {router}, through which all go",
+        )
+    return (
+        "",
+        f"look whether both name the same router in --connect, and whether that router is linked to others; {router}",
+    )
+
+
+def _is_loopback(place: str) -> bool:
+    host = place.partition("/")[2].rpartition(":")[0]
+    return host in ("localhost", "[::1]") or host.startswith("127.")
+
+
+def _answers(facts: Facts) -> Iterator[Finding]:
+    for one in facts.known:
+        status = one.status
+        if one.lives > 1:
+            yield Finding(
+                severity="wrong", where=one.name, what=f"{one.lives} processes have this name",
+                do="stop all but one; robots on one bus need names of their own (--robot)",
+            )  # fmt: skip
+        if one.seen and one.answers and status is None:
+            yield Finding(
+                severity="wrong", where=one.name, what="it is there, and does not answer",
+                do="it hangs, is stopped, or its link is being cut: look at its log and load, and start it again",
+            )  # fmt: skip
+        elif status is not None and status.stands is None:
+            yield Finding(
+                severity="doubtful", where=one.name, what="it does not serve yet", do="wait, and look at its log"
+            )
+
+
+def _versions(facts: Facts) -> Iterator[Finding]:
+    answering = [one.status for one in facts.known if one.status is not None]
+    for status in answering:
+        process = status.process
+        for what, theirs, ours in (
+            ("Engage", status.version, facts.version),
+            ("Zenoh", process.zenoh, facts.own.zenoh),
+        ):
+            if theirs and ours and theirs != ours:
+                yield Finding(
+                    severity="doubtful", where=status.participant,
+                    what=f"{what} {theirs} on {process.host or 'its machine'}, {ours} here",
+                    do="install the same version on all machines",
+                )  # fmt: skip
+
+
+def _losses(facts: Facts) -> Iterator[Finding]:
+    for one in facts.known:
+        if one.status is None:
+            continue
+        for field, what, do, now, before in _COUNTS:
+            number = getattr((one.later or one.status).bus, field)
+            grows = number > getattr(one.status.bus, field)
+            if number:
+                yield Finding(
+                    severity=now if grows else before, where=one.name,
+                    what=f"{what}: {number} since it came{', and more just now' if grows else ''}", do=do,
+                )  # fmt: skip
+        if (lag := (one.later or one.status).bus.lag) > STOOD:
+            yield Finding(
+                severity="doubtful" if lag > one.status.bus.lag else "note", where=one.name,
+                what=f"messages once waited {lag:.2f} s for this process",
+                do="give it more of a processor; a body or client of your own must not keep the loop for long",
+            )  # fmt: skip
+
+
+_COUNTS: tuple[tuple[str, str, str, Severity, Severity], ...] = (
+    ("failures", "errors that are bugs", "its log has the tracebacks: please report them", "wrong", "wrong"),
+    ("lost", "messages lost for good", "look at the network between its machine and the others", "wrong", "doubtful"),
+    (
+        "refused", "messages that could not be read",
+        "look on `engage watch --only faults` and in its log from whom they come: another version, or a stranger",
+        "doubtful", "doubtful",
+    ),
+    (
+        "overflowed", "messages dropped as nobody read them in time", "it is too slow for what it subscribes to",
+        "doubtful", "doubtful",
+    ),
+    ("dropped", "messages dropped before its loop got to them", "give it more of a processor", "doubtful", "note"),
+    ("gaps", "gaps, all of which were filled", "nothing, if paths were cut or it was busy", "doubtful", "note"),
+)  # fmt: skip
+"""Fields of `BusHealth`: what they count, what to do, and how bad that is while it grows and else."""
+
+
+def _paths(facts: Facts) -> Iterator[Finding]:
+    slow: dict[str, list[str]] = {}
+    for cell in matrix(facts):
+        if cell.trip is not None and cell.trip > FAR:
+            slow.setdefault(cell.other, []).append(f"{cell.viewer} ({1000 * cell.trip:.0f} ms)")
+    for name, viewers in slow.items():
+        yield Finding(
+            severity="doubtful", where=name, what=f"round trips are long from {_listed(viewers)}",
+            do="look at the network (Wi-Fi, load); the realizer belongs near the body",
+        )  # fmt: skip
+
+
+def _clocks(facts: Facts) -> Iterator[Finding]:
+    statuses = [one.status for one in facts.known if one.status is not None]
+    recognition = next((status for status in statuses if status.participant == "recognition"), None)
+    for other in statuses:
+        if recognition is None or other.at.clock == recognition.at.clock:
+            continue
+        clock = clock_of(recognition, other)
+        if clock is None:
+            if other.participant in recognition.bus.peers:
+                yield Finding(
+                    severity="doubtful", where=other.participant, what="recognition has not measured its clock",
+                    do="run this again in some seconds; until then delays of connection events have no known error",
+                )  # fmt: skip
+        elif clock.error > PRECISE:
+            yield Finding(
+                severity="note", where=other.participant,
+                what=f"recognition knows its clock to {1000 * clock.error:.0f} ms, and its delays no better",
+                do="nothing, if that is precise enough (`delay_error` tells it); else a quicker network",
+            )  # fmt: skip
+    told = set()
+    for one in facts.known:
+        host = one.name if one.status is None else one.status.process.host
+        if host not in told and abs(one.wall) > WALL:
+            told.add(host)
+            apart = f"{abs(one.wall):.0f} s {'ahead of' if one.wall > 0 else 'behind'}"
+            yield Finding(
+                severity="doubtful", where=host, what=f"its wall clock is {apart} this machine's",
+                do="set it by NTP: logs are hard to compare, and certificates count by it (delays do not)",
+            )  # fmt: skip
+
+
+def _certificates(facts: Facts) -> Iterator[Finding]:
+    ends = {each.name: each.until for each in facts.certificates}
+    ends |= {door.endpoint: door.until for door in facts.doors if door.until is not None}
+    if facts.own.until is not None:
+        ends.setdefault(facts.own.holder, facts.own.until)
+    for one in facts.known:
+        if one.status is not None and (until := one.status.process.until) is not None:
+            ends[one.status.process.holder] = until
+    for where, until in ends.items():
+        days = (until - facts.at) / A_DAY
+        if days < SOON:
+            what = "the certificate has expired" if days <= 0 else f"the certificate expires in {int(days)} days"
+            yield Finding(
+                severity="wrong" if days <= 0 else "doubtful", where=where, what=what,
+                do="`engage keys renew` where the authority is; copy the folder anew, and start its holder again",
+            )  # fmt: skip
+
+
+def _abilities(facts: Facts) -> Iterator[Finding]:
+    if facts.body is not None:
+        if facts.body.problem:
+            yield Finding(
+                severity="wrong", where="control", what=f"nothing is known of the body: {facts.body.problem}",
+                do="look at the log of control",
+            )  # fmt: skip
+        elif "speech" not in facts.body.types:
+            yield Finding(
+                severity="doubtful", where=facts.body.name, what="the body has no voice",
+                do="speech fails, unless your body performs it (docs/control.md)",
+            )  # fmt: skip
+    if facts.bus and facts.sight is None and any(one.name in facts.services for one in facts.known):
+        yield Finding(
+            severity="doubtful", where="perception", what="nobody tells what there is to be seen",
+            do="start what sees people, or `engage run simulation`: without a world fragments wait, and are refused",
+        )  # fmt: skip
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names)
+
+
+Rule = Callable[[Facts], Iterator[Finding]]
+RULES: tuple[Rule, ...] = (
+    _packages, _problem, _doors, _services, _sight_of_one_another, _answers, _versions, _certificates, _losses,
+    _paths, _clocks, _abilities,
+)  # fmt: skip

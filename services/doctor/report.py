@@ -1,0 +1,181 @@
+"""The report for people, and for programs. Pure: facts and findings in, text out."""
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from engage_hri.schemas.units import A_DAY, Seconds
+from engage_hri.services.doctor.facts import Door, Facts
+from engage_hri.services.doctor.findings import Finding, Severity
+from engage_hri.services.doctor.matrix import HERE, Cell, matrix
+
+STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
+WIDE = 100
+"""Columns from which on the table of participants has all it can have."""
+NARROW = 80
+"""Columns below which anything may be broken into lines."""
+
+
+def as_json(facts: Facts, found: Sequence[Finding]) -> str:
+    """Write all as one JSON object: `findings`, `matrix` and `facts`."""
+    return msgspec.json.encode({"findings": found, "matrix": matrix(facts), "facts": facts}).decode()
+
+
+def report(facts: Facts, found: Sequence[Finding], width: int = 80) -> RenderableType:
+    """Draw the report, as wide as the terminal."""
+    parts: list[RenderableType] = [_head(facts)]
+    if facts.known:
+        parts += [Text(), _who_sees_whom(facts, width), Text(), _participants(facts, width)]
+    parts += [Text(), _around(facts), Text(), _findings(found)]
+    return Group(*parts)
+
+
+def _head(facts: Facts) -> Text:
+    own = facts.own
+    return Text(
+        f"robot {facts.robot!r}, from {own.host or 'here'}: Engage {facts.version}, {facts.protocol}, "
+        f"Zenoh {own.zenoh}, Python {own.python}"
+    )
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for column in columns:
+        table.add_column(column, header_style="dim", overflow="fold")
+    return table
+
+
+def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
+    """Draw the matrix: a row for each who sees, a column for each who is seen, with the round trips in ms."""
+    every = [one.name for one in facts.known]
+    rows: dict[str, list[Cell]] = {}
+    for cell in matrix(facts):
+        rows.setdefault(cell.viewer, []).append(cell)
+    longest = max(map(len, (HERE, *rows)))
+    fits = longest + 6 + 4 * len(every) <= width
+    names = every if fits else [name for name in every if name in rows]
+    is_wide = longest + 6 + sum(max(6, len(name)) + 2 for name in names) <= width
+    with_trips = longest + 6 + 8 * len(names) <= width
+    table = _table("sees", *(name if is_wide else str(number) for number, name in enumerate(names, 1)))
+    title = Text("Who sees whom" + (", with round trips in ms" if with_trips else ""), style="bold")
+    for viewer, cells in rows.items():
+        number = "" if is_wide or viewer == HERE else f"{names.index(viewer) + 1} "
+        table.add_row(number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
+    columns = names if is_wide else ()
+    unlisted = [
+        f"{names.index(name) + 1} {name}" if name in names else name
+        for name in every
+        if name not in (*rows, *columns)
+    ]
+    return Group(title, table, *([Text(f"seen, too: {', '.join(unlisted)}")] if unlisted else []))
+
+
+def _cell(cell: Cell, with_trips: bool) -> Text:
+    match cell.sees:
+        case "itself":
+            return Text("·", style="dim")
+        case "no":
+            return Text("NO" if with_trips else "N", style=STYLES["wrong"])
+        case "unknown":
+            return Text("?", style=STYLES["doubtful"])
+    if cell.trip is None or not with_trips:
+        return Text("yes" if with_trips else "y")
+    return Text(f"{1000 * cell.trip:.1f}")
+
+
+def _participants(facts: Facts, width: int) -> RenderableType:
+    is_wide = width >= WIDE
+    more = ("Python", "dropped") if is_wide else ()
+    table = _table("participant", "machine", "clock", "up", "gaps", "lost", "Engage", *more)
+    for column in (table.columns[0], table.columns[2]):
+        column.no_wrap = width >= NARROW
+    clocks = {each.clock: each for each in facts.clocks}
+    for one in facts.known:
+        if one.status is None:
+            if one.answers:
+                table.add_row(one.name, "does not answer" if one.seen else "not seen from here")
+            continue
+        status, process, bus = one.status, one.status.process, (one.later or one.status).bus
+        clock = clocks.get(status.at.clock)
+        apart = "same" if clock is None else f"{-clock.offset:+.3f} s ± {1000 * clock.error:.1f} ms"
+        up = _time(status.at.seconds - status.joined.seconds)
+        cells = (one.name, process.host or "?", apart, up, str(bus.gaps), str(bus.lost), status.version)
+        table.add_row(*cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
+    return Group(Text("Participants", style="bold"), table)
+
+
+def _time(seconds: Seconds) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.0f} h" if seconds < 2 * A_DAY else f"{seconds / A_DAY:.0f} d"
+
+
+def _around(facts: Facts) -> Table:
+    """Draw what is there beside the participants."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    for what, text in _things(facts):
+        table.add_row(what, text)
+    return table
+
+
+def _things(facts: Facts) -> Iterator[tuple[str, str]]:
+    for door in facts.doors:
+        yield "endpoint", f"{door.endpoint}: {door.problem or _open(door, facts)}"
+    if facts.own.mode:
+        yield "links", f"{facts.own.mode}, {f'keys of {facts.own.holder}' if facts.own.holder else 'without keys'}"
+    for certificate in sorted(facts.certificates, key=lambda each: (each.until, each.name))[:1]:
+        more = f"; {len(facts.certificates)} in all" if len(facts.certificates) > 1 else ""
+        yield "certificates", f"next to expire: {certificate.name}, {_days(certificate.until, facts)}{more}"
+    if facts.packages:
+        yield "packages", ", ".join(f"{each.name} {each.version or 'MISSING'}" for each in facts.packages)
+    if facts.body is not None:
+        voice = "with a voice" if "speech" in facts.body.types else "without a voice"
+        yield "body", facts.body.problem or f"{facts.body.name}, {voice}; {len(facts.body.types)} types of behaviors"
+    if facts.bus and facts.known:
+        yield "sight", _sight(facts)
+    if facts.found:
+        yield "other robots", ", ".join(facts.found)
+
+
+def _open(door: Door, facts: Facts) -> str:
+    until = "" if door.until is None else f", certificate for {_days(door.until, facts)}"
+    return f"somebody listens{', encrypted' if door.is_closed else ''}{until}"
+
+
+def _days(until: int, facts: Facts) -> str:
+    days = (until - facts.at) / A_DAY
+    return f"{days:.0f} days" if days > 0 else "EXPIRED"
+
+
+def _sight(facts: Facts) -> str:
+    match facts.sight:
+        case None:
+            return "nobody tells of a world"
+        case "unknown":
+            return "not for these keys"
+        case sight:
+            who = f"{sight.people} {'person' if sight.people == 1 else 'people'}"
+            return f"{who} and {sight.objects} objects, told by {sight.source} {_time(sight.age)} ago"
+
+
+def _findings(found: Sequence[Finding]) -> RenderableType:
+    if not found:
+        return Text("Nothing is wrong.", style="bold green")
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for finding in found:
+        table.add_row(Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
+        table.add_row("", Text(f"→ {finding.do}", style="dim"))
+    wrong = sum(finding.severity == "wrong" for finding in found)
+    if not wrong:
+        return Group(table, Text(), Text("Nothing is wrong.", style="bold green"))
+    told = "1 thing is wrong." if wrong == 1 else f"{wrong} things are wrong."
+    return Group(table, Text(), Text(told, style=STYLES["wrong"]))
