@@ -35,7 +35,7 @@ class Forecast(LongestPaths):
         self._factor = factor
         self._phase_to: dict[tuple[str, int], int] = {}
         self._phase_from: dict[tuple[str, int], int] = {}
-        self._after: dict[tuple[str, int], list[int]] = {}
+        self._after: dict[tuple[str, int], tuple[int, ...]] = {}
         """Arcs from where a behavior passes a transition, apart from its phases."""
         self._moved: dict[tuple[int, int], list[int]] = {}
         """Those of them that count from the behavior's own time, by the transitions at their ends."""
@@ -53,7 +53,8 @@ class Forecast(LongestPaths):
                 behavior = place.behavior if place.kind == "phase" else ""
                 arc = self._add(place.source, place.target, place.lag, min(place.shortest, place.lag), behavior)
                 if place.after:
-                    self._after.setdefault((place.after, place.source), []).append(arc)
+                    key = (place.after, place.source)
+                    self._after[key] = (*self._after.get(key, ()), arc)
                 if behavior:
                     self._phase_to[behavior, place.target] = self._phase_from[behavior, place.source] = arc
         self._longest = {

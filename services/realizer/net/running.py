@@ -85,7 +85,7 @@ class RunningNet:
         """The phases of each behavior, by the transitions at their ends."""
         before: list[list[int]] = [[] for _ in range(size)]
         behind: list[list[int]] = [[] for _ in range(size)]
-        self._after: dict[tuple[str, int], list[int]] = {}
+        self._after: dict[tuple[str, int], tuple[int, ...]] = {}
         """Places that a behavior puts a token into as it passes a transition, apart from its phases."""
         self._put_at: dict[int, Seconds] = {}
         """For each place with a clock, when its token was put."""
@@ -101,7 +101,8 @@ class RunningNet:
                 continue
             before[place.target].append(number)
             if place.after:
-                self._after.setdefault((place.after, place.source), []).append(number)
+                key = (place.after, place.source)
+                self._after[key] = (*self._after.get(key, ()), number)
             else:
                 behind[place.source].append(number)
             if place.kind not in ("handover", "idle"):
