@@ -70,7 +70,7 @@ async def test_when_it_came_to_where_it_waited_is_told_though_only_the_report_of
     }
 
 
-async def test_what_was_reached_as_the_block_is_cancelled_is_told_before_the_body_has_stopped() -> None:
+async def test_what_is_reached_while_the_body_is_being_stopped_is_told() -> None:
     async with puppet(config=RealizerConfig(abort=5.0)) as body:
         body.aborts = False
         pending = body.ask(bml(POINT))
@@ -81,10 +81,13 @@ async def test_what_was_reached_as_the_block_is_cancelled_is_told_before_the_bod
         await body.until(lambda: body.aborted)
         await asyncio.sleep(1.0)
         told = in_order(body, "p")
+        body.reach("p", "stroke_start")
         body.end("p", "aborted")
         await pending.outcome
 
-    assert told == ["start", "ready"]
+    assert told == ["start", "ready"]  # not only once the body has stopped
+    assert in_order(body, "p") == ["start", "ready", "stroke_start"]
+    assert body.feedback[-1].progress == "end"
 
 
 @pytest.mark.parametrize("dialect", ["org.mindmakers.bml", BML_1_0])

@@ -236,3 +236,12 @@ async def test_within_a_block_nobody_loses_a_stroke_to_another(seed: int) -> Non
 def middle(behavior: BlockBehavior) -> str:
     """The point that it is there for."""
     return "end" if isinstance(behavior, GazeShift | HeadDirectionShift) else "stroke"
+
+
+def test_the_way_home_of_one_that_nobody_has_placed_is_cut_and_it_waits_for_nobody() -> None:
+    """Its stroke is over when the other begins at its fixed time: there is nothing to wait for."""
+    first, second = (Gesture(id=id, lexeme="BEAT", mode="RIGHT_HAND") for id in "pq")
+    made = plan(block((first, timed(second, start="1.75"))))
+
+    assert (at(made, "p:start"), at(made, "p:stroke_end"), at(made, "q:start")) == (0.0, 1.5, 1.75)
+    assert made.dropped == ()
