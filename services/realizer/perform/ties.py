@@ -163,9 +163,6 @@ class Ties:
             if (other := performances.get(block_of(taker))) is not None:
                 start = Point(taker.behavior.partition(":")[2], taker.sync)
                 points[taker] = other.decisions.foresight.times(now).get(start, now) - decisions.began
-        for point in self.foreign:
-            if (at := decisions.facts.reached.get(point, decisions.foresight.foreseen.get(point))) is not None:
-                points.setdefault(point, at - decisions.began)
         begun = decisions.facts.begun
         points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in plan.chains}
         return Known(
