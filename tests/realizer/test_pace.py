@@ -10,6 +10,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage, together
@@ -182,6 +183,17 @@ def test_nobody_is_told_to_be_slower_than_its_body_can() -> None:
     paces = [dict(each.pace)["end"] for each in told if isinstance(each, Extend) and each.behavior == "shift"]
     assert 4.0 < paces[0] < 5.5
     assert max(paces) == pytest.approx(1.0 + 1.5 * 3.0)
+
+
+def test_only_who_waits_for_nobody_may_be_slower_so_as_not_to_stop() -> None:
+    said = [FakeBody(elastic=ELASTIC).estimate(each) for each in (BEAT, STORY)]
+    alone = plan_block(block((BEAT, STORY)), said)
+    shared = plan_block(block((BEAT, STORY), together("beat:stroke_start", "s:start")), said)
+
+    assert slack(alone, Point("beat", "stroke_start")) == BRIEF == 0.05
+    assert slack(shared, Point("beat", "stroke_start")) == 0.0
+    assert slack(shared, Point("beat", "stroke_end")) == BRIEF
+    assert slack(alone, Point("beat", "stroke")) == 0.0  # it does not stop there in any case
 
 
 class OneJoint(FakeBody):
