@@ -2,7 +2,7 @@
 
 import asyncio
 
-from engage_hri.schemas.behaviors import Gesture, Wait
+from engage_hri.schemas.behaviors import Gaze, Gesture, Speech, Wait
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, stage
@@ -29,3 +29,23 @@ async def test_what_a_later_block_has_yet_to_begin_is_nobodys_loss() -> None:
     assert times["two:r:start"] == 0.0
     assert times["one:l:start"] == 5.0
     assert [each.kind for each in seen.warnings() if each.block == "one"] == []
+
+
+async def test_a_look_that_only_leaves_after_one_keeps_the_head_until_it_is_on_target() -> None:
+    """The words of the first block are over long before they were to be, and its look comes while the other's is on
+    its way. That one lasts until words that wait for the first block; but it is on target before these."""
+    look, other = Gaze(id="g", target="a"), Gaze(id="h", target="b")
+    first = block((Speech(id="a", text="one"), look, Wait(id="w", duration=3.0)), after("a:end", "g:start"), id="one")
+    second = block((other, timed(Speech(id="t", text="two"), start="one:w:end")), id="two")
+    body = FakeBody({"a": Script(durations=(1.25,))}, {"a": (4.0,)})
+    async with stage(body) as seen:
+        asked = [seen.ask(first)]
+        await seen.seen("a:start", "one")
+        await asyncio.sleep(1.0)
+        asked.append(seen.ask(second))
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert (times["two:h:start"], times["one:a:end"]) == (1.0, 1.25)
+    assert times["one:g:start"] == times["two:h:stroke"] == 1.5
+    assert [each.kind for each in seen.warnings() if each.kind != "LATE"] == []
