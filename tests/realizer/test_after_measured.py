@@ -1,4 +1,4 @@
-"""`after` waits until the other point was measured: also for who cannot wait at its own point, and waits before it."""
+"""What `after` asks for: to wait until the other point was measured, before the point if one cannot wait there."""
 
 import pytest
 

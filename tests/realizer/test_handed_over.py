@@ -253,7 +253,8 @@ def test_of_two_who_take_an_arm_each_the_first_ends_what_both_arms_did(sooner: H
     both = Gesture(id="p", lexeme="BEAT", mode="BOTH_HANDS")
     hands: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
     takers = [
-        timed(Gesture(id=hand[0], lexeme="BEAT", mode=hand), start="1.75" if hand == sooner else "2") for hand in hands
+        timed(Gesture(id=hand[0], lexeme="BEAT", mode=hand), start="1.75" if hand == sooner else "2")
+        for hand in hands
     ]
     made = plan(block((both, *takers)))
 

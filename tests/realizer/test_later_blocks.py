@@ -1,8 +1,11 @@
 """What a block has to do with one that began after it: no more than what of that is in its way."""
 
 import asyncio
+import re
 
 from engage_hri.schemas.behaviors import Gaze, Gesture, Speech, Wait
+from tests.judge import playing
+from tests.judge.story import Deed, Story
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, stage
@@ -49,3 +52,41 @@ async def test_a_look_that_only_leaves_after_one_keeps_the_head_until_it_is_on_t
     assert (times["two:h:start"], times["one:a:end"]) == (1.0, 1.25)
     assert times["one:g:start"] == times["two:h:stroke"] == 1.5
     assert [each.kind for each in seen.warnings() if each.kind != "LATE"] == []
+
+
+WAITING = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b2" composition="APPEND">
+  <pointing id="p-0" target="lamp" mode="RIGHT_HAND"/>
+  <gaze id="g1" target="cup"/>
+  <face id="f2" start="p-0:end"><lexeme lexeme="LOWER_BROWS"/></face>
+  <headDirectionShift id="h4" target="lamp" end="3.3"/>
+  <constraint><synchronize><sync ref="g1:ready"/><sync ref="f2:attackPeak-1.0"/></synchronize></constraint>
+</bml>"""
+TIED = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b3">
+  <wait id="w0" start="3.0"/>
+  <face id="f1" amount="0.8" attackPeak="b2:f2:attackPeak+0.3" required="true"><lexeme lexeme="OPEN_MOUTH"/></face>
+  <constraint><synchronize ref="w0:start+1.0"><sync ref="f1:attackPeak"/></synchronize></constraint>
+</bml>"""
+MORE = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b4">
+  <gaze id="g0" target="lamp" ready="f2:attackPeak-0.5"/>
+  <pointing id="p1" target="cup" mode="LEFT_HAND" relax="1.8"/>
+  <faceFacs id="f2" au="12" amount="0.7"/>
+  <constraint><after ref="g0:ready-0.2"><sync ref="p1:stroke-0.5"/><sync ref="f2:attackPeak"/></after></constraint>
+</bml>"""
+FIRST = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b0">
+  <postureShift id="p-0"><pose part="WHOLEBODY" lexeme="TURN_RIGHT"/></postureShift>
+  <speech id="s1" start="p-0:end+0.3"><text>This one here.</text></speech>
+  <faceLexeme id="f3" lexeme="RAISE_BROWS" start="s1:start"/>
+</bml>"""
+
+
+def test_a_tie_that_there_was_no_time_for_is_not_taken_up_when_the_other_waits_for_this_block() -> None:
+    """The smile of b3 has a time, which comes before the point of b2 that it is tied to. So b2, whose turn comes, may
+    wait for the face. Then b3 is planned again, since a slow face is in its way."""
+    said = ((0.0, FIRST), (1.6, WAITING), (1.9, TIED), (3.4, MORE))
+    deeds = tuple(Deed(at, "perform", re.findall(r'id="(b\d)"', xml)[0], xml) for at, xml in said)
+    record = playing.play(Story(deeds, {"slow": [{"part": "face", "factor": 4.0}]}))
+
+    assert record.errors == []
+    assert {id: [each.status for each in ends] for id, ends in record.ends.items()} == {
+        f"b{number}": ["done"] for number in (0, 2, 3, 4)
+    }

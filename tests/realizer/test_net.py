@@ -181,7 +181,9 @@ FOREIGN = """<pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">
   </page></net></pnml>"""
 
 
-@pytest.mark.parametrize("marked", ["<text>1</text>", "<text><!-- at rest -->1</text>", "<!-- 2 --><text>\n1 </text>"])
+@pytest.mark.parametrize(
+    "marked", ["<text>1</text>", "<text><!-- at rest -->1</text>", "<!-- 2 --><text>\n1 </text>"]
+)
 def test_a_net_of_another_tool_is_read_without_seconds(marked: str) -> None:
     net = read_pnml(FOREIGN.replace("<text>1</text>", marked))
 

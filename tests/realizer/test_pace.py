@@ -8,7 +8,7 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.effects import Extend
+from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point
@@ -204,10 +204,8 @@ def test_only_who_can_be_faster_is_told_to_hurry() -> None:
     fixed = (together("s:end", "p:start"), together("p:stroke_end", "2.75"), together("s:start", "bml:start"))
     made = plan_block(block((STORY, arm), *fixed), said)
     decisions = Decisions(made, 0.0, RealizerConfig())
-    effects = {each.behavior: each for each in decisions.advance(0.0)}
 
-    assert (made.dropped, list(effects)) == ((), ["s"])
-    assert effects["s"].pace == ()
+    assert (made.dropped, decisions.advance(0.0)) == ((), [Begin("s", "end")])  # at its own pace
     assert decisions.foresight.forecast is not None
     assert [decisions.foresight.forecast.is_hurried(id) for id in "sp"] == [False, True]
 
