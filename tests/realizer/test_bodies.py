@@ -51,6 +51,45 @@ async def test_points_in_disorder_twice_and_after_the_end_are_told_once_and_in_o
     assert body.feedback[-1].progress == "end"  # nothing after the end
 
 
+async def test_when_it_came_to_where_it_waited_is_told_though_only_the_report_of_going_on_has_it() -> None:
+    """The report that it waits was lost, and so was the one of the point before: of that one nobody knows more."""
+    async with puppet() as body:
+        pending = body.ask(bml(POINT))
+        await body.told("p")
+        body.accept("p")
+        body.reach("p", "start")
+        await asyncio.sleep(2.0)
+        body.leave("p", "stroke_start", 0.75)
+        body.end("p")
+        await pending.outcome
+
+    told = {sync: body.progress(f"p:{sync}") for sync in ("ready", "stroke_start")}
+    assert {sync: (each.time, each.arrived) for sync, each in told.items()} == {
+        "ready": (2.0, None),
+        "stroke_start": (2.0, 0.75),
+    }
+
+
+async def test_what_is_reached_while_the_body_is_being_stopped_is_told() -> None:
+    async with puppet(config=RealizerConfig(abort=5.0)) as body:
+        body.aborts = False
+        pending = body.ask(bml(POINT))
+        await body.told("p")
+        body.accept("p")
+        body.reach("p", "start", "ready")
+        body.requests.cancel("r-b")
+        await body.until(lambda: body.aborted)
+        await asyncio.sleep(1.0)
+        told = in_order(body, "p")
+        body.reach("p", "stroke_start")
+        body.end("p", "aborted")
+        await pending.outcome
+
+    assert told == ["start", "ready"]  # not only once the body has stopped
+    assert in_order(body, "p") == ["start", "ready", "stroke_start"]
+    assert body.feedback[-1].progress == "end"
+
+
 @pytest.mark.parametrize("dialect", ["org.mindmakers.bml", BML_1_0])
 async def test_points_of_what_was_not_begun_or_does_not_exist_are_nobodys(dialect: str) -> None:
     async with puppet() as body:

@@ -143,6 +143,7 @@ NET = PetriNet(tuple(Transition(name, ()) for name in ("bml:start", "a:start", "
     [
         (Place("phase", 1, 2, 1.0, 0.5, "a"), 0.5, "a takes 0.5 s from a:start to a:ready"),
         (Bound("phase", 2, 1, -1.0, 0.25, "a"), -1.25, "a takes at most 1.25 s from a:start to a:ready"),
+        (Bound("phase", 2, 1, 0.0, 0.0, "a"), 0.0, "a takes at most 0 s from a:start to a:ready"),
         (Place("delay", 0, 1, 2.0, 2.0), 2.0, "a:start is 2 s after bml:start"),
         (Bound("delay", 1, 0, -2.0), -2.0, "a:start is 2 s after bml:start"),
         (Place("order", 1, 3, 0.0), 0.0, "a:end = b:start is not before a:start"),

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Head, Wait
+from engage_hri.schemas.behaviors import Head, Speech, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.nets import Fired
 from engage_hri.schemas.units import Stamp
@@ -85,6 +85,18 @@ def test_who_is_given_too_little_time_between_points_of_another_block_is_lost_wh
 
     assert made.dropped == ("n",)
     assert made.predicted(Point("m", "start")) == x
+
+
+@pytest.mark.parametrize(("x", "expected"), [(0.5, 1.0), (5.0, 1.0)])
+def test_what_shared_a_tie_to_a_point_that_comes_too_late_stays_tied(x: float, expected: float) -> None:
+    """The nod has a time of its own, which the point of the other block misses; the words belong to the nod."""
+    words = Speech(id="s", text="so")
+    known = Known(blocks=OTHERS, points={Point("other:x", "end"): x})
+    tied = block((timed(NOD, start="1"), words), together("n:start", "other:x:end", "s:start"))
+    made = plan_block(tied, [estimate(NOD), estimate(words)], known=known)
+
+    assert (starts(made), made.predicted(Point("s", "start"))) == (expected, expected)
+    assert (made.dropped, bool(made.broken)) == ((), True)
 
 
 # -- the message about a net -----------------------------------------------------------------------------------------

@@ -158,3 +158,36 @@ def test_foresight_goes_through_a_chain_of_any_length() -> None:
         live_blocks.foresee("b0", {Point("s", "end"): 1.0})
 
     assert [link.told for link in links[1:]] == [[float(number)] for number in range(1, 2000)]
+
+
+def test_blocks_that_never_agree_on_a_time_are_told_twenty_times_and_go_on_with_what_is_measured() -> None:
+    """Each expects its end a second after the other's. The next news from outside starts them anew."""
+
+    class Rival:
+        def __init__(self, block: str) -> None:
+            self.block = block
+            self.told: list[float] = []
+
+        def foresee(self, point: Point, at: float) -> None:
+            self.told.append(at)
+            live_blocks.foresee(self.block, {Point("s", "end"): at + 1.0})
+
+        def hear(self, point: Point, at: float) -> None:
+            raise AssertionError
+
+        def miss(self, behaviors: object) -> None:
+            """The end of the test."""
+
+    live_blocks = LiveBlocks()
+    one, two = Rival("one"), Rival("two")
+    with ExitStack() as live:
+        for rival in (one, two):
+            live.enter_context(live_blocks.opened(block((WORDS,), id=rival.block)))
+        live.enter_context(live_blocks.followed(one, [Point("two:s", "end")]))
+        live.enter_context(live_blocks.followed(two, [Point("one:s", "end")]))
+        live_blocks.foresee("one", {Point("s", "end"): 0.0})
+        first = list(two.told)
+        live_blocks.foresee("one", {Point("s", "end"): 100.0})
+
+    assert first == [2.0 * number for number in range(20)]
+    assert two.told[20:] == [100.0 + 2.0 * number for number in range(20)]

@@ -15,6 +15,7 @@ from engage_hri.schemas.behaviors import (
     Gaze,
     GazeShift,
     Gesture,
+    Hand,
     Head,
     HeadDirectionShift,
     Mark,
@@ -236,3 +237,26 @@ async def test_within_a_block_nobody_loses_a_stroke_to_another(seed: int) -> Non
 def middle(behavior: BlockBehavior) -> str:
     """The point that it is there for."""
     return "end" if isinstance(behavior, GazeShift | HeadDirectionShift) else "stroke"
+
+
+def test_the_way_home_of_one_that_nobody_has_placed_is_cut_and_it_waits_for_nobody() -> None:
+    """Its stroke is over when the other begins at its fixed time: there is nothing to wait for."""
+    first, second = (Gesture(id=id, lexeme="BEAT", mode="RIGHT_HAND") for id in "pq")
+    made = plan(block((first, timed(second, start="1.75"))))
+
+    assert (at(made, "p:start"), at(made, "p:stroke_end"), at(made, "q:start")) == (0.0, 1.5, 1.75)
+    assert made.dropped == ()
+
+
+@pytest.mark.parametrize("sooner", ["LEFT_HAND", "RIGHT_HAND"])
+def test_of_two_who_take_an_arm_each_the_first_ends_what_both_arms_did(sooner: Hand) -> None:
+    both = Gesture(id="p", lexeme="BEAT", mode="BOTH_HANDS")
+    hands: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
+    takers = [
+        timed(Gesture(id=hand[0], lexeme="BEAT", mode=hand), start="1.75" if hand == sooner else "2")
+        for hand in hands
+    ]
+    made = plan(block((both, *takers)))
+
+    assert (at(made, "p:relax"), at(made, "p:end")) == (1.75, 1.75)
+    assert [at(made, f"{hand[0]}:start") for hand in hands] == [1.75 if hand == sooner else 2.0 for hand in hands]

@@ -5,9 +5,9 @@ import asyncio
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Gesture, Mark, Speech, Wait
+from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Gesture, Mark, Speech, Wait
 from engage_hri.schemas.feedback import SyncPointProgress
-from tests.realizer.fake_body import FakeBody
+from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, after, block, stage, together
 from tests.realizer.test_holding import BEAT, NOD, STORY, steered
@@ -166,3 +166,22 @@ async def test_a_word_that_waits_for_a_held_voice_is_not_pointed_at_before() -> 
 
     times = instants(seen)
     assert times["h:stroke"] == pytest.approx(times["t:m"], abs=0.05)
+
+
+async def test_what_a_held_behavior_has_passed_is_waited_for_no_more() -> None:
+    """Look and smile are to end with the word, and are slow. The word has come, and only then the voice is held."""
+    words = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)))
+    shown = (Gaze(id="g", target="x"), FaceLexeme(id="f", lexeme="SMILE"))
+    async with stage(FakeBody({"g": Script(slow=5.0), "f": Script(slow=7.0)})) as seen:
+        performing = seen.ask(block((*shown, words), together("g:relax", "f:relax", "s:m1")))
+        await seen.seen("s:m1")
+        await asyncio.sleep(0.25)
+        await steered(seen, "hold", "b", "s")
+        await asyncio.sleep(5.0)
+        assert "g:relax" in seen.times()
+        assert "s:m2" not in seen.times()
+        await steered(seen, "continue", "b", "s")
+        await performing.outcome
+
+    assert seen.times()["s:m1"] == 1.0
+    assert seen.times()["g:relax"] == seen.times()["f:relax"] == 2.5

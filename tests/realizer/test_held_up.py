@@ -4,13 +4,15 @@ import asyncio
 
 import pytest
 
-from engage_hri.schemas.behaviors import Gesture, Speech
+from engage_hri.schemas.behaviors import Gesture, Mark, Speech, Wait
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.held_up import STANDING, HeldUp
 from engage_hri.services.realizer.foresee.outlook import Outlook
-from engage_hri.services.realizer.points import Point
-from tests.realizer.planning import timed
+from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.realizer.planning import elastic, plan, timed
 from tests.realizer.stage import block, together
 from tests.realizer.steering import steer
 from tests.realizer.test_simulated_body import Robot, robot
@@ -100,3 +102,19 @@ def test_holds_add_up() -> None:
         held.settle(Outlook({A: since + 1.0, B: since / 10.0}))
 
     assert held.between(A, B, 0.0, 20.0) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("longest", "comes"), [(2.0, 1.5), (1.25, 1.25), (1.0, 1.0)])
+def test_who_is_slower_for_others_is_expected_with_them_or_as_late_as_it_can_be(longest: float, comes: float) -> None:
+    """The voice cannot wait at its mark. By its own pace it would be there after one second, the other after 1.5."""
+    words, other = Speech(id="s", text="one two", marks=(Mark("m", 3),)), Wait(id="w", duration=1.0)
+    said = elastic("s", ("start", "m", "end"), 1.0, 1.0, longest)
+    made = plan(block((words, other), together("s:m", "w:end")), said)
+    decisions = Decisions(made, 0.0, RealizerConfig())
+    list(decisions.advance(0.0))
+    for behavior in ("s", "w"):
+        decisions.reach(Point(behavior, "start"), 0.0 if behavior == "s" else 0.5)
+    outlook = decisions.foresight.outlook(0.5)
+
+    assert outlook.apart(Point("w", "end"), ORIGIN) == 1.5
+    assert outlook.apart(Point("s", "m"), ORIGIN) == comes

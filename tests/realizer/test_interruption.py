@@ -98,6 +98,7 @@ async def test_waiting_ends_at_once(waits: Wait | Event) -> None:
     assert isinstance(outcome, BlockOutcome)
     assert (outcome.status, outcome.interrupted) == ("done", ("w",))
     assert (seen.times()["s:start"], seen.times()["s:end"]) == (0.0, 3.0)
+    assert seen.recognition.cancelled == [each.id for each in seen.recognition.events]  # nobody looks out for it now
 
 
 @pytest.mark.parametrize("behavior", ["x", "s"])

@@ -1,10 +1,12 @@
 """Who is late, once, and who is given up, once: each at its instant."""
 
-from engage_hri.schemas.behaviors import Gesture
+import pytest
+
+from engage_hri.schemas.behaviors import Event, Gesture, Mark, Speech
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
-from engage_hri.services.realizer.decide.lateness import Late, LatenessWatch, Stalled
+from engage_hri.services.realizer.decide.lateness import Late, LatenessWatch, Stalled, event_deadline
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
@@ -52,3 +54,27 @@ def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> Non
     stalled = 1.2 + CONFIG.stall + CONFIG.stall_factor * 0.25
     assert authority.advance(stalled - 0.01) == []
     assert [type(each) for each in authority.advance(stalled)] == [Stalled]
+
+
+@pytest.mark.parametrize(
+    ("reached", "since"),
+    [
+        ({}, 2.0),
+        ({("s", "m"): 1.0}, 2.0),
+        ({("s", "m"): 3.0}, 3.0),
+        ({("s", "m"): 3.0, ("g", "stroke"): 5.0}, 5.0),
+        ({("s", "m"): 5.0, ("g", "stroke"): 3.0}, 5.0),
+    ],
+)
+def test_the_time_of_an_event_runs_from_its_start_or_the_last_anchor(
+    reached: dict[tuple[str, str], float], since: float
+) -> None:
+    """An anchor that has not come by now does not count. Recognition, if it has the request, is given longer."""
+    beat, words = Gesture(id="g", lexeme="BEAT"), Speech(id="s", text="one two", marks=(Mark("m", 3),))
+    event = Event(id="e", kind="backchannel", responder="human", limit=4.0, anchors=("s:m", "g:stroke"))
+    points = {Point("e", "start"): 2.0, **{Point(*point): at for point, at in reached.items()}}
+    config = RealizerConfig(event_grace=0.5, event_patience=10.0)
+    said = block((words, beat, event))
+
+    assert event_deadline(event, said, points, config, is_received=False) == since + 4.5
+    assert event_deadline(event, said, points, config, is_received=True) == since + 14.0

@@ -5,8 +5,10 @@ from typing import get_args
 import pytest
 from msgspec.structs import fields
 
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import EventKind, Wait
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.requests.ends import RequestRefused
+from tests.realizer.stage import block, stage
 
 NAMES = [field.name for field in fields(RealizerConfig)]
 
@@ -73,3 +75,14 @@ def test_what_is_documented_as_noticed_late_or_stalled_holds_of_the_defaults() -
     assert limits.skew == 0.1
     assert limits.event_grace < limits.event_patience
     assert limits.pulse * 3 <= limits.lease < limits.longest_hold
+
+
+@pytest.mark.parametrize("behaviors", [3, 4])
+async def test_a_block_may_be_as_large_as_is_said_and_no_larger(behaviors: int) -> None:
+    large = block([Wait(id=f"w{number}", duration=1.0) for number in range(behaviors)])
+    async with stage(config=RealizerConfig(most=3)) as seen:
+        if behaviors == 3:
+            assert (await seen.perform(large)).status == "done"
+        else:
+            with pytest.raises(RequestRefused, match=r"4 behaviors.*; at most 3 are planned in time.*realizer\.most"):
+                await seen.perform(large)

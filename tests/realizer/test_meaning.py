@@ -167,6 +167,14 @@ def test_a_duration_longer_than_natural_slows_down_what_cannot_hold() -> None:
     assert at(made, "s:end") == 2.25
 
 
+def test_what_has_no_longest_time_takes_as_long_as_is_said() -> None:
+    speech = Speech(id="s", text="a")
+    made = plan(block((timed(speech, start="1", end="11"),)), elastic("s", ("start", "end"), 0.5, 1.0, None))
+
+    assert made.problems == ()
+    assert (at(made, "s:start"), at(made, "s:end")) == (1.0, 11.0)
+
+
 @pytest.mark.parametrize("end", ["1.25", "9"])
 def test_words_whose_end_cannot_be_lose_that_with_one_warning_and_are_said(end: str) -> None:
     speech = Speech(id="s", text="a")

@@ -1,11 +1,13 @@
 """The net as data: what it may fire, that it lives and is safe, and that other tools can read it."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from lxml import etree
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Timing
 from engage_hri.schemas.blocks import Block
@@ -170,18 +172,43 @@ def test_pnml_keeps_seconds_lines_bounds_and_strange_names() -> None:
     assert read_pnml(pnml.as_pnml(net, "ü")) == net
 
 
-def test_a_net_of_another_tool_is_read_without_seconds() -> None:
-    foreign = """<pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">
-      <net id="n" type="http://www.pnml.org/version-2009/grammar/ptnet"><page id="g">
-        <place id="a"><initialMarking><text>1</text></initialMarking></place><place id="b"/>
-        <transition id="x"><name><text>go</text></name></transition><transition id="y"/>
-        <arc id="1a" source="a" target="x"/><arc id="2a" source="x" target="b"/>
-        <arc id="3a" source="b" target="y"/><arc id="4a" source="y" target="a"/>
-      </page></net></pnml>"""
+FOREIGN = """<pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">
+  <net id="n" type="http://www.pnml.org/version-2009/grammar/ptnet"><page id="g">
+    <place id="a"><initialMarking><text>1</text></initialMarking></place><place id="b"/>
+    <transition id="x"><name><text>go</text></name></transition><transition id="y"/>
+    <arc id="1a" source="a" target="x"/><arc id="2a" source="x" target="b"/>
+    <arc id="3a" source="b" target="y"/><arc id="4a" source="y" target="a"/>
+  </page></net></pnml>"""
 
-    net = read_pnml(foreign)
+
+@pytest.mark.parametrize(
+    "marked", ["<text>1</text>", "<text><!-- at rest -->1</text>", "<!-- 2 --><text>\n1 </text>"]
+)
+def test_a_net_of_another_tool_is_read_without_seconds(marked: str) -> None:
+    net = read_pnml(FOREIGN.replace("<text>1</text>", marked))
+
     assert net.places == (Place("idle", 1, 0), Place("order", 0, 1))
     assert enabled(net, net.initial) == (0,)
+    assert [each.name for each in net.transitions] == ["go", ""]
+
+
+def test_a_net_reads_no_other_file(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("swordfish", encoding="utf-8")
+    declared = f'<!DOCTYPE pnml [<!ENTITY other SYSTEM "{(tmp_path / "secret").as_uri()}">]>'
+    net = read_pnml(declared + FOREIGN.replace("<text>go</text>", "<text>&other;</text>"))
+
+    assert [each.name for each in net.transitions] == ["", ""]
+
+
+def test_a_drawing_has_tokens_at_rest_and_the_seconds_of_what_takes_time() -> None:
+    net = PetriNet(
+        (Transition("one", ()), Transition("two", ())),
+        (Place("phase", 0, 1, 1.25), Place("order", 0, 1), Place("idle", 1, 0)),
+    )
+    drawn = as_dot(replace(plan(FIGURE_4_4), net=net))
+
+    labels = re.findall(r'p\d \[shape=circle, label="(.*?)", tooltip="(.*?)"', drawn)
+    assert labels == [("1.25", "phase"), ("", "order"), ("●", "idle")]
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,12 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.effects import Extend
+from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point
-from tests.realizer.fake_body import FakeBody, Script
+from tests.realizer.fake_body import SEVEN, FakeBody, Script
+from tests.realizer.planning import elastic
 from tests.realizer.stage import after, block, stage, together
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
@@ -182,6 +184,30 @@ def test_nobody_is_told_to_be_slower_than_its_body_can() -> None:
     paces = [dict(each.pace)["end"] for each in told if isinstance(each, Extend) and each.behavior == "shift"]
     assert 4.0 < paces[0] < 5.5
     assert max(paces) == pytest.approx(1.0 + 1.5 * 3.0)
+
+
+def test_only_who_waits_for_nobody_may_be_slower_so_as_not_to_stop() -> None:
+    said = [FakeBody(elastic=ELASTIC).estimate(each) for each in (BEAT, STORY)]
+    alone = plan_block(block((BEAT, STORY)), said)
+    shared = plan_block(block((BEAT, STORY), together("beat:stroke_start", "s:start")), said)
+
+    assert slack(alone, Point("beat", "stroke_start")) == BRIEF == 0.05
+    assert slack(shared, Point("beat", "stroke_start")) == 0.0
+    assert slack(shared, Point("beat", "stroke_end")) == BRIEF
+    assert slack(alone, Point("beat", "stroke")) == 0.0  # it does not stop there in any case
+
+
+def test_only_who_can_be_faster_is_told_to_hurry() -> None:
+    """The two take 3 s one after the other, and have 2.75: the arm can be faster, the voice cannot."""
+    arm = Pointing(id="p", target="a")
+    said = elastic("s", ("start", "m", "end"), 0.5, 0.5, 0.5), elastic("p", SEVEN, 0.25, 0.5, 1.0)
+    fixed = (together("s:end", "p:start"), together("p:stroke_end", "2.75"), together("s:start", "bml:start"))
+    made = plan_block(block((STORY, arm), *fixed), said)
+    decisions = Decisions(made, 0.0, RealizerConfig())
+
+    assert (made.dropped, decisions.advance(0.0)) == ((), [Begin("s", "end")])  # at its own pace
+    assert decisions.foresight.forecast is not None
+    assert [decisions.foresight.forecast.is_hurried(id) for id in "sp"] == [False, True]
 
 
 class OneJoint(FakeBody):

@@ -7,10 +7,12 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import (
     After,
+    BlockBehavior,
     Constraint,
     Event,
     FaceLexeme,
     Gaze,
+    Head,
     Pointing,
     Speech,
     Synchronize,
@@ -159,6 +161,14 @@ def test_what_the_body_cannot_do_is_dropped() -> None:
 
     assert [(each.kind, each.behavior) for each in made.problems] == [("NO_SUCH_TARGET", "p")]
     assert at(made, "s:start") == 0.0
+
+
+@pytest.mark.parametrize("behavior", [GAZE, POINT, SPEECH, Head(id="n", lexeme="NOD", repetition=2)])
+def test_what_the_body_says_nothing_of_is_planned_as_is_usual(behavior: BlockBehavior) -> None:
+    made = plan_block(block((behavior,)), [])
+
+    assert (made.dropped, made.problems) == ((), ())
+    assert at(made, f"{behavior.id}:end") > at(made, f"{behavior.id}:start") == 0.0
 
 
 def test_what_is_required_and_cannot_be_done_refuses_the_block() -> None:

@@ -1,6 +1,7 @@
 """The realizer as others meet it: refusals, several blocks at once, composition, feedback."""
 
 import asyncio
+import gc
 
 import pytest
 
@@ -9,6 +10,7 @@ from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.requests.ends import RequestRefused
 from tests.bus.faulty import Faults, FaultyHub
 from tests.realizer.fake_body import FakeBody, Script
@@ -129,6 +131,17 @@ async def test_an_id_in_use_is_refused_and_free_again_after_the_end() -> None:
         third = seen.requests.send(keys.BLOCK, PerformBlock(id="r3", requester="test", block=block((STORY,))))
 
         assert getattr(await third.outcome, "status", "") == "done"
+
+
+async def test_nothing_is_kept_of_the_performance_of_blocks_that_have_ended() -> None:
+    async with stage() as seen:
+        for number in range(3):
+            await seen.perform(block((STORY,), id=f"b{number}"))
+        await asyncio.sleep(1.0)
+        gc.collect()
+        kept = [each for each in gc.get_objects() if type(each) is BlockPerformance]
+
+    assert kept == []
 
 
 async def test_a_gaze_shift_ends_on_arrival_and_holds_nothing() -> None:

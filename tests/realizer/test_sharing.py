@@ -111,6 +111,23 @@ async def test_a_look_that_lasts_is_handed_over_once_it_is_on_target(earlier: Ga
     assert (seen.warnings(), mispredicted(seen)) == ([], [])
 
 
+@pytest.mark.parametrize("awaits", ["two", "three"])
+async def test_a_look_that_lasts_leaves_by_itself_if_others_wait_for_that(awaits: str) -> None:
+    """It would leave for who takes its place; but that one waits until it has left, as does who is tied to that."""
+    first = block((Posture(id="p", stance="SITTING"), Speech(id="t", text="five")), id="one")
+    leaves = after("one:p:relax", "e:relax")
+    smile, taker = FaceLexeme(id="e", lexeme="SMILE"), Posture(id="p", stance="STANDING")
+    second = block((taker,), id="two") if awaits == "three" else block((taker, smile), leaves, id="two")
+    third = block((smile,), leaves, id="three")
+    sent = [(0.0, first), (0.125, third), (0.25, second)] if awaits == "three" else [(0.0, first), (0.25, second)]
+    seen, outcomes = await told(*sent)
+
+    assert [each.status for each in outcomes] == ["done"] * len(sent)
+    times = instants(seen)
+    assert times["one:p:relax"] == times["one:t:end"] == 1.0
+    assert times[f"{awaits}:e:relax"] == times["two:p:start"] == 1.0
+
+
 async def test_a_gesture_that_has_made_its_stroke_loses_its_way_home_and_no_more() -> None:
     asked = block((timed(RIGHT, start="t:start"), MORE), id="two")
     seen, _ = await told((0.0, block((RIGHT,), id="one")), (0.5, asked))

@@ -210,11 +210,10 @@ class Grants(Observer):
         return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
 
     def _sets_out(self, member: Member) -> Seconds:
-        """Planned time of the next point of a behavior, from the block's start; of another block, it may be now."""
+        """Planned time of the next point of a behavior that is stuck; of another block, that may be now."""
         if (chain := self._plan.chains.get(member.behavior)) is None:
             return -inf
-        points = chain.points
-        return self._plan.predicted(points[min(self._facts.next_number(member.behavior), len(points) - 1)])
+        return self._plan.predicted(chain.points[self._facts.next_number(member.behavior)])
 
     def _goes_to_held(self, member: Member, stuck: Container[int]) -> bool:
         """True if a behavior cannot wait any more before an instant that is tied to a point of one that is held."""

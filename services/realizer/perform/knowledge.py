@@ -47,7 +47,8 @@ class Asker(Struct, frozen=True):
 
     named: points of other blocks that it names. parts: those that it may use. blocks: see `Known`. met: behaviors
     of others, by `block:behavior`, that have a part that one of its behaviors was to take. later: blocks of which
-    only these count, since they have begun after it.
+    only these count, since they have begun after it. unnamed: points of others that the block names, but its plan
+    does not, so far.
     """
 
     block: str
@@ -58,11 +59,12 @@ class Asker(Struct, frozen=True):
     blocks: Elsewhere
     met: Container[str] = ()
     later: Container[str] = ()
+    unnamed: Collection[Point] = ()
 
 
 def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks) -> Known:
     """Other live blocks, as known now. others: those that are given, in the order in which they began."""
-    concerned = [each for each in others if concerns(asker.block, asker.named, asker.parts, each)]
+    concerned = [each for each in others if concerns(asker.named, asker.parts, each)]
     there = {each.decisions.plan.block.id for each in concerned}
     points: dict[Point, Seconds] = {}
     holders: dict[str, Holder] = {}
@@ -87,13 +89,15 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
             named = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}
             takers = {id: taker for id, (of, _, taker) in named.items() if taker and of == asker.block}
             holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over, reached, takers)
-    return Known(blocks=asker.blocks, points=points, holders=holders)
+    # What had no tie could be waited for. It has none from then on, or two blocks would wait for each other.
+    untied = frozenset(point for point in asker.unnamed if point.behavior in dependent)
+    return Known(blocks=asker.blocks, points=points, holders=holders, untied=untied)
 
 
-def concerns(block: str, named: Iterable[Point], parts: Collection[str], other: Performed) -> bool:
-    """True if a block has to be planned with the other in mind: it names it, or is named, or uses a part of it."""
+def concerns(named: Iterable[Point], parts: Collection[str], other: Performed) -> bool:
+    """True if a block has to be planned with the other in mind: it names it, or uses a part that the other has."""
     plan = other.decisions.plan
-    if is_named_in(plan.block.id, named) or is_named_in(block, plan.foreign):
+    if is_named_in(plan.block.id, named):
         return True
     has_ended = other.decisions.facts.has_ended
     return any(part in parts and not has_ended(id) for id, each in plan.chains.items() for part in each.parts)

@@ -13,7 +13,7 @@ from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.handover import is_overlaid
-from engage_hri.services.realizer.plan.known import Known, block_of, is_named_in
+from engage_hri.services.realizer.plan.known import Known, block_of, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import EPSILON, Point
@@ -155,7 +155,8 @@ class Ties:
         met = frozenset(name for _, name in self._met)
         parts = parts_of(plan.block.behaviors, plan.estimates.values())
         now = owner.report.now()
-        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self._blocks, met, later)
+        unnamed = [each for each in plan.relations.named if is_foreign(each.behavior) and each not in plan.at]
+        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self._blocks, met, later, unnamed)
         found = knowledge(asker, others, self._live_blocks)
         points = dict(found.points)
         performances = self._performances
@@ -163,9 +164,6 @@ class Ties:
             if (other := performances.get(block_of(taker))) is not None:
                 start = Point(taker.behavior.partition(":")[2], taker.sync)
                 points[taker] = other.decisions.foresight.times(now).get(start, now) - decisions.began
-        for point in self.foreign:
-            if (at := decisions.facts.reached.get(point, decisions.foresight.foreseen.get(point))) is not None:
-                points.setdefault(point, at - decisions.began)
         begun = decisions.facts.begun
         points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in plan.chains}
         return Known(
@@ -175,6 +173,7 @@ class Ties:
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
             kept=frozenset(self._live_blocks.named(plan.block.id)),
             begun=frozenset(begun),
+            untied=found.untied,
             due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )
 

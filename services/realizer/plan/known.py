@@ -40,6 +40,7 @@ class Known(Struct, frozen=True, kw_only=True):
     given: behaviors of this block that hand their parts over to another block by plan, and the start of the one there
     that takes them. kept: points of this block that other blocks wait for. begun: behaviors of this block that have
     begun; they wait for nobody any more. due: those that would begin now, but for a behavior of another block.
+    untied: points of others to which nothing is to be tied: these wait for this block by now.
     """
 
     blocks: Elsewhere = {}
@@ -49,6 +50,7 @@ class Known(Struct, frozen=True, kw_only=True):
     kept: Set[Point] = frozenset()
     begun: frozenset[str] = frozenset()
     due: Set[str] = frozenset()
+    untied: Set[Point] = frozenset()
 
     def with_own(self, times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
         """Times of a schedule for the block's own points, with those of others as they are known here.

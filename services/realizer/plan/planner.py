@@ -90,7 +90,7 @@ class _Planner:
         self.known = known
         self.doubted: set[Point] = set()
         """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
-        self.untied: set[Point] = set()
+        self.untied: set[Point] = set(known.untied)
         """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates

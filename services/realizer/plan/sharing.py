@@ -138,13 +138,15 @@ class _Sharing:
     def give(self, id: str) -> None:
         """Hand the part over to the behavior of another block that takes it by that block's plan.
 
-        That waits for what this one keeps, whenever it is expected.
+        That waits for what this one keeps, whenever it is expected. If that is the way home of one that lasts until
+        something takes its place, it does not wait for who takes it: the two would wait for each other.
         """
         if (taker := self.known.given.get(id)) is not None and taker in self.times:
             chain, kept = self.chains[id], self.held | self.known.kept
             first = self._first_after(chain, self.times[taker])
             least_kept = max([least(chain), *(number for number, point in enumerate(chain.points) if point in kept)])
-            if first is not None and least_kept + 1 < len(chain.points):
+            is_awaited = id in self.natural and least_kept >= RELAX
+            if first is not None and least_kept + 1 < len(chain.points) and not is_awaited:
                 self._hand_over(id, taker.behavior, max(first, least_kept + 1))
 
     def _first_after(self, chain: Chain, at: Seconds) -> int | None:
