@@ -33,7 +33,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received
-from engage_hri.services.requests import asking, serving
+from engage_hri.services.requests import asking_effects, serving_effects
 from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_table import State
@@ -111,7 +111,7 @@ class Requester:
             return self._failed(key, request, self._broken)
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
-            case [asking.TellEnd(end=EngageError() as error)]:
+            case [asking_effects.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error)
         if (pending := self._pending.get(request.id)) is None:
             pending = self._pending[request.id] = Pending(key, request)
@@ -153,20 +153,20 @@ class Requester:
     def _tick(self) -> None:
         self._carry_out(self._asking.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[asking.Effect]) -> None:
+    def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
-            if isinstance(effect, asking.Publish):
+            if isinstance(effect, asking_effects.Publish):
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
                     self._could_not_send(effect.message.id, error)
-            elif isinstance(effect, asking.TellAccepted):
+            elif isinstance(effect, asking_effects.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
                     pending.accept()
-            elif isinstance(effect, asking.TellEnd):
+            elif isinstance(effect, asking_effects.TellEnd):
                 if (ended := self._pending.pop(effect.id, None)) is not None:
                     ended.end(effect.end)
-            elif isinstance(effect, asking.Renew):
+            elif isinstance(effect, asking_effects.Renew):
                 at, name = self._bus.stamp(), self._bus.name
                 still = KeepAlive(live=effect.live, at=at, requester=name, life=self._life)
                 self._publish(keys.keep_alive(effect.server), still)
@@ -246,8 +246,9 @@ class RequestDesk:
     that. The answers carry the id that was asked with.
 
     on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
-    not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. term: the lease
-    of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
+    not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. on_hold: called
+    with the name of a request that is to be held, since nobody renews it, and with the time when it ends otherwise;
+    with None when it is to go on. term: the lease of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
     """
 
     def __init__(
@@ -257,12 +258,14 @@ class RequestDesk:
         on_cancel: Callable[[Cancel], None],
         *,
         on_extend: Callable[[Request], None] | None = None,
+        on_hold: Callable[[str, Seconds | None], None] | None = None,
         term: Seconds | None = None,
     ) -> None:
         self._bus = bus
         self._server = server
         self._on_cancel = on_cancel
         self._on_extend = on_extend
+        self._on_hold = on_hold
         self._serving = Serving(server, term)
         self._answers = keys.request_state(server)
         self._alarm = Alarm(self._tick)
@@ -347,17 +350,19 @@ class RequestDesk:
     def _tick(self) -> None:
         self._carry_out(self._serving.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
+    def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
-            if isinstance(effect, serving.Publish):
+            if isinstance(effect, serving_effects.Publish):
                 self._bus.publish(self._answers, effect.answer)  # type: ignore[arg-type]
-            elif isinstance(effect, serving.Hand):
+            elif isinstance(effect, serving_effects.Hand):
                 if effect.is_asked:
                     handed = effect.request
                 else:
                     self._call_back(effect.request)
+            elif isinstance(effect, serving_effects.Hold):
+                self._hold(effect.name, effect.until)
             elif effect.is_ours:
                 self._bus.report(effect.fault)
             else:
@@ -371,6 +376,11 @@ class RequestDesk:
                 self._on_cancel(request)
             elif self._on_extend is not None:
                 self._on_extend(request)
+
+    def _hold(self, name: str, until: Seconds | None) -> None:
+        if self._on_hold is not None:
+            with self._bus.containing(f"request {name}, which nobody renews"):
+                self._on_hold(name, until)
 
     def serving(self, request: Request) -> Containing:
         """Contain exceptions in the body of `with`: they end this request, and nothing else."""

@@ -48,6 +48,8 @@ class Event(Name):
     REBORN = auto()
     """The requester is there, but in another life."""
     GRACE_OVER = auto()
+    UNHEARD = auto()
+    """It has not been renewed for as long as it may go on without."""
     LEASE_OVER = auto()
 
 
@@ -64,7 +66,9 @@ class Do(Name):
     HAND_LAPSED = auto()
     """Tell the service to end the request: its lease is over."""
     RENEW = auto()
-    """Count the lease from now."""
+    """Count the lease from now, and let the service go on with what it was told to hold."""
+    HOLD = auto()
+    """Tell the service to hold what it does, if the request is of a kind that is held."""
     WAIT_GRACE = auto()
     STOP_GRACE = auto()
     SAY_OUTDATED = auto()
@@ -97,7 +101,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.UNKNOWN, Do.WARN_ENDED),
         E.REFUSE: (S.UNKNOWN, Do.WARN_ENDED),
         E.END: (S.UNKNOWN, Do.WARN_ENDED),
-    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
+    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.TAKEN: rows(S.TAKEN, {
         E.CAME: (S.TAKEN, Do.RENEW, Do.REPEAT),
         E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
@@ -108,10 +112,11 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: (S.TAKEN, Do.WAIT_GRACE),
+        E.GONE: (S.TAKEN, Do.WAIT_GRACE, Do.HOLD),
         E.BACK: (S.TAKEN, Do.STOP_GRACE),
         E.REBORN: (S.CANCELLED, Do.HAND_GONE),
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
+        E.UNHEARD: (S.TAKEN, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
     }),
     S.ACCEPTED: rows(S.ACCEPTED, {
@@ -124,10 +129,11 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: (S.ACCEPTED, Do.WAIT_GRACE),
+        E.GONE: (S.ACCEPTED, Do.WAIT_GRACE, Do.HOLD),
         E.BACK: (S.ACCEPTED, Do.STOP_GRACE),
         E.REBORN: (S.CANCELLED, Do.HAND_GONE),
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
+        E.UNHEARD: (S.ACCEPTED, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
     }),
     S.CANCELLED: rows(S.CANCELLED, {
@@ -138,7 +144,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.CANCELLED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-    }, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
+    }, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.ENDED: rows(S.ENDED, {
         E.CAME: (S.ENDED, Do.REPEAT),
         E.CHANGED: (S.ENDED, Do.REPEAT),
@@ -149,5 +155,5 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ENDED, Do.WARN_ENDED),
         E.REFUSE: (S.ENDED, Do.WARN_ENDED),
         E.END: (S.ENDED, Do.WARN_ENDED),
-    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
+    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
 }  # fmt: skip

@@ -1,0 +1,121 @@
+"""The pulse is the lease: who is not renewed is held, and then ended; who is given up is cancelled until it answers."""
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Wait
+from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
+from engage_hri.schemas.requests import Accepted, Cancel, KeepAlive, Kept, Request
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.requests.asking import Asking
+from engage_hri.services.requests.asking_effects import Publish, Renew, TellEnd
+from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.serving import LAPSED, Serving
+from engage_hri.services.requests.serving_effects import Hand, Hold
+
+MOVES = PerformBehavior(
+    id="a", requester="me", life="1", block="b", behavior=Wait(id="w"), through="start", lease=4.0, held_after=0.5
+)
+
+
+def handed(effects: list[Any]) -> list[Request]:
+    return [each.request for each in effects if isinstance(each, Hand)]
+
+
+def pulse(serving: Serving, sent: float, now: float) -> list[Any]:
+    kept = Kept("perform_behavior", "a", 0, "start", 4.0)
+    return serving.keep_alive(KeepAlive(live=(kept,), at=Stamp("w", sent), requester="me", life="1"), sent, now)
+
+
+def holds(effects: list[Any]) -> list[float | None]:
+    return [each.until for each in effects if isinstance(each, Hold)]
+
+
+def test_what_is_not_renewed_is_held_goes_on_when_it_is_and_ends_with_its_lease() -> None:
+    serving = Serving("control")
+    serving.take(MOVES, 10.0)
+    serving.answer("a", Accepted(id="a"), 10.0)
+    assert holds(pulse(serving, 10.4, 10.4)) == []
+    assert holds(serving.tick(10.89)) == []
+    assert holds(serving.tick(10.9)) == [14.4]
+    assert holds(pulse(serving, 12.0, 12.1)) == [None]
+    assert holds(serving.tick(12.5)) == [16.0]
+    (end,) = handed(serving.tick(16.0))
+    assert isinstance(end, Cancel)
+    assert end.reason == LAPSED
+
+
+def test_a_renewal_that_was_long_on_its_way_lets_nothing_go_on() -> None:
+    serving = Serving("control")
+    serving.take(MOVES, 10.0)
+    assert holds(serving.tick(10.5)) == [14.0]
+    assert holds(pulse(serving, 10.6, 11.2)) == []
+    assert holds(pulse(serving, 11.1, 11.3)) == [None]
+
+
+def test_a_requester_that_goes_holds_it_at_once_and_one_without_held_after_goes_on() -> None:
+    serving = Serving("control")
+    serving.take(MOVES, 10.0)
+    assert holds(serving.requester_gone("me", 10.1)) == [12.1]
+    assert holds(serving.requester_there("me", "run", 11.0)) == []
+    assert holds(pulse(serving, 11.1, 11.1)) == [None]
+
+    serving = Serving("control")
+    serving.take(replace(MOVES, held_after=0.0), 10.0)
+    assert holds(serving.requester_gone("me", 10.1)) == []
+    assert holds(serving.tick(11.9)) == []
+
+
+def asked_to_move() -> Asking:
+    asking = Asking("me", "1", Patience(lease=4.0))
+    asking.server_there("control", "run", 10.0)
+    asking.send(keys.BEHAVIOR, MOVES, 10.0)
+    return asking
+
+
+def test_it_is_renewed_three_times_within_held_after() -> None:
+    asking = asked_to_move()
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
+    renewed, at = [], 10.01
+    while at < 12.0:
+        at += 0.01
+        renewed += [at for each in asking.tick(at) if isinstance(each, Renew)]
+
+    assert max(after - before for before, after in pairwise(renewed)) <= 0.5 / 3 + 0.011
+    assert len(renewed) < 14
+
+
+def test_what_is_not_accepted_yet_is_sent_as_often_since_it_may_have_begun() -> None:
+    asking, at, sent = asked_to_move(), 10.0, list[float]()
+    while at < 12.0:
+        at += 0.01
+        sent += [at for each in asking.tick(at) if isinstance(each, Publish)]
+
+    assert max(after - before for before, after in pairwise(sent)) <= 0.5 / 3 + 0.011
+
+
+def test_while_the_server_is_gone_nothing_is_sent_and_what_is_given_up_is_cancelled_until_it_answers() -> None:
+    asking = asked_to_move()
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
+    asking.server_gone("control", 11.0)
+    during = [each for tenth in range(200) for each in asking.tick(11.0 + tenth / 10)]
+    (end,) = during
+    assert isinstance(end, TellEnd)
+    assert "is gone" in str(end.end)
+
+    cancels = list[float]()
+    for tenth in range(100):
+        effects = asking.server_there("control", "run", 40.0) if not tenth else asking.tick(40.0 + tenth / 10)
+        cancels += [40.0 + tenth / 10 for each in effects if isinstance(each, Publish)]
+        assert all(isinstance(each.message, Cancel) for each in effects if isinstance(each, Publish))
+    assert len(cancels) == pytest.approx(7, abs=1)  # 0.3 s, doubling to 2 s
+    outcome = BehaviorOutcome(
+        id="a", requester="me", life="1", kind="perform_behavior", block="b", behavior="w", status="aborted",
+        at=Stamp("w", 0.0),
+    )  # fmt: skip
+    asking.hear(outcome, 50.0, "control")
+    assert [each for tenth in range(600) for each in asking.tick(50.0 + tenth / 10)] == []
