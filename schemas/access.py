@@ -59,7 +59,8 @@ SERVED = {
 """Commands by their subject."""
 WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_CONNECTION_EVENT,
-    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
+    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
+    keys.ANY_ALIVE,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")

@@ -20,7 +20,16 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Stamp
 
 LineMessage = (
-    ConnectionEvent | Statistics | Feedback | HeadOwner | Held | BodyHeld | Fault | NetPlanned | NetMarked | NetWaiting
+    ConnectionEvent
+    | Statistics
+    | Feedback
+    | HeadOwner
+    | Held
+    | BodyHeld
+    | Fault
+    | NetPlanned
+    | NetMarked
+    | NetWaiting
 )
 """Messages that have a line."""
 _KINDS = get_args(LineMessage)

@@ -26,6 +26,7 @@ from engage_hri.schemas.body import (
 from engage_hri.schemas.check import check_behavior
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
@@ -68,7 +69,8 @@ async def embody(
             bus.answer(keys.DESCRIBE, control.describe)
             ready()
             try:
-                control.begin()
+                control.tell_held()
+                control.publish_state()
                 async for received in inbox:
                     with bus.containing(received):
                         control.take(received)
@@ -100,14 +102,9 @@ class _Control:
         self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, objects: CoveredObjects
     ) -> None:
         self._live: dict[str, LiveBehavior] = {}
-        self._unheard = Unheard(bus, self._live)
+        self._unheard = Unheard()
         self.desk = RequestDesk(
-            bus,
-            "control",
-            self._requester_lost,
-            on_extend=self.serve,
-            on_hold=self._unheard.hold,
-            term=config.dead_man,
+            bus, "control", self._requester_lost, on_extend=self.serve, on_hold=self._hold, term=config.dead_man
         )
         self._bus = bus
         self._config = config
@@ -253,7 +250,8 @@ class _Control:
 
     def _forget(self, live: LiveBehavior) -> None:
         del self._live[live.request.id]
-        self._unheard.forget(live.request.id)
+        if self._unheard.let_go(live):
+            self.tell_held()
 
     def _end(self, live: LiveBehavior) -> None:
         request, at = live.request, self._bus.now()
@@ -333,11 +331,6 @@ class _Control:
             entity = self._body.state().looking_at
             self._publish(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
 
-    def begin(self) -> None:
-        """Tell how the body is, and that nothing waits."""
-        self._unheard.tell()
-        self.publish_state()
-
     def publish_state(self) -> None:
         """Publish the state of the body, and set the timer for the next time: soon if the body moves."""
         self._next_state.set(self._bus.now() + IDLE)
@@ -364,6 +357,19 @@ class _Control:
             self._next_state.set(due)
 
     # -- dead man -----------------------------------------------------------------------------------------------
+
+    def _hold(self, name: str, until: Seconds | None) -> None:
+        """Hold a behavior that nobody renews, or let it go on. until: when it ends otherwise; None: it goes on."""
+        if (live := self._live.get(name)) is None:
+            return
+        self._unheard.let_go(live)
+        if until is not None:
+            self._unheard.hold(live, self._bus.stamp(), self._bus.stamp(until))
+        self.tell_held()
+
+    def tell_held(self) -> None:
+        """Publish what waits since nobody renews it."""
+        self._bus.publish(keys.BODY_HELD, BodyHeld(at=self._bus.stamp(), holds=self._unheard.holds))
 
     def _requester_lost(self, cancel: Cancel) -> None:
         """Revoke a behavior that has lost its requester. With the last one of that requester the body goes home."""

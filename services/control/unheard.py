@@ -1,45 +1,28 @@
 """Behaviors that wait since nobody renews their authority. The pulse of a requester is the lease of its movements."""
 
-from collections.abc import Mapping
-
-from engage_hri.schemas import keys
-from engage_hri.schemas.holds import BodyHeld, Hold
-from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus
+from engage_hri.schemas.holds import Hold
+from engage_hri.schemas.units import Stamp
 from engage_hri.services.control.live import LiveBehavior
 
 
 class Unheard:
-    """Holds behaviors whose requester is not heard, and tells of it. live: behaviors by the name of their request."""
+    """Behaviors whose requester is not heard, by the names of their requests."""
 
-    def __init__(self, bus: Bus, live: Mapping[str, LiveBehavior]) -> None:
-        self._bus = bus
-        self._live = live
-        self._held: dict[str, Hold] = {}
+    def __init__(self) -> None:
+        self._holds: dict[str, Hold] = {}
 
-    def hold(self, name: str, until: Seconds | None) -> None:
-        """Hold a behavior, or let it go on if `until` is None. until: when it ends unless it is renewed."""
-        if (live := self._live.get(name)) is None:
-            return
-        live.miss(until is not None)
-        if until is None:
-            self.forget(name)
-        else:
-            since, until = self._bus.stamp(), max(until, self._bus.now())
-            hold = Hold(
-                block=live.request.block,
-                behavior=live.request.behavior.id,
-                since=since,
-                until=self._bus.stamp(until),
-            )
-            self._held[name] = hold
-            self.tell()
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """Holds that are in force, the oldest first."""
+        return tuple(self._holds.values())
 
-    def forget(self, name: str) -> None:
-        """Hold a behavior no longer: it goes on, or has ended."""
-        if self._held.pop(name, None) is not None:
-            self.tell()
+    def hold(self, live: LiveBehavior, since: Stamp, until: Stamp) -> None:
+        """Hold a behavior. until: when it ends unless it is renewed."""
+        live.miss(True)
+        request = live.request
+        self._holds[request.id] = Hold(block=request.block, behavior=request.behavior.id, since=since, until=until)
 
-    def tell(self) -> None:
-        """Publish what waits now."""
-        self._bus.publish(keys.BODY_HELD, BodyHeld(at=self._bus.stamp(), holds=tuple(self._held.values())))
+    def let_go(self, live: LiveBehavior) -> bool:
+        """Hold a behavior no longer: it goes on, or has ended. True if it was held."""
+        live.miss(False)
+        return self._holds.pop(live.request.id, None) is not None

@@ -41,7 +41,6 @@ from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
 
-
 _Said = Answer | None
 """The answer of the server that is the event; None with all other events."""
 

@@ -248,7 +248,8 @@ class RequestDesk:
     on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
     not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. on_hold: called
     with the name of a request that is to be held, since nobody renews it, and with the time when it ends otherwise;
-    with None when it is to go on. term: the lease of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
+    with None when it is to go on. term: the lease of requests that name none. The service's subscription must hold
+    `RequestDesk.patterns(server)`.
     """
 
     def __init__(

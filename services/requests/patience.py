@@ -9,8 +9,8 @@ class Patience(Struct, frozen=True, kw_only=True):
     """Time limits of a requester, in seconds.
 
     first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
-    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By then
-    it has ended them, if it lives: it sees us gone a silent link's lease later than we see it, and has its own grace.
+    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By
+    then it has ended them, if it lives: it misses us a silent link's lease later than we miss it, and has its grace.
     pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
     cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
     leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.

@@ -56,7 +56,7 @@ _DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
 
 
 class Renewal(Struct, frozen=True):
-    """What a `KeepAlive` says of one request. sent: when it was sent, by local time."""
+    """Part of a `KeepAlive` about one request. sent: when it was sent, by local time."""
 
     kept: Kept
     sent: Seconds

@@ -33,9 +33,13 @@ LAYOUT: dict[int, dict[int, tuple[str, ...]]] = {
 }  # fmt: skip
 """Processes of each machine, by the number of machines."""
 KINDS = ("kill", "freeze", "cut", "reboot", "router")
+CALM = "calm"
+"""No fault: play goes on for a while."""
 HELD_WITHIN = 0.5 + 0.1
 """Seconds after a fault by which the body holds: the bound, and a moment for a busy machine to write it down."""
 BACK_WITHIN = 3.0
+AFTERMATH = 2.0
+"""Seconds after everything is back in which a hold still comes of the fault: services begin anew."""
 HUNG_AFTER = 40.0
 """Seconds after which a request without an end counts as hung: more than the longest behavior, event or patience."""
 LONG = 60.0
@@ -58,6 +62,7 @@ class Run(NamedTuple):
     """Result of a run. back: seconds after healing until all see one another. next: until the next word."""
 
     broken: Broken
+    span: Span
     motion: Motion
     back: float | None
     next: float | None
@@ -203,6 +208,8 @@ def draw(chance: random.Random, stage: Stage, kinds: Sequence[str]) -> Broken:
             one, other = sorted(chance.sample(sorted(stage.layout), 2))
             stops = 1 in (one, other) and bool({one, other} & ({realizer, control} - {1}))
             return Broken(kind, f"{one}-{other}", chance.choice([0.5, 1.0, 3.0, 10.0]), stops)
+        case "calm":
+            return Broken(kind, "play", 30.0, False)
         case "reboot":
             number = chance.choice([each for each in stage.layout if each != 1])
             return Broken(kind, str(number), chance.choice([0.5, 2.0]), number == realizer)
@@ -221,6 +228,10 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
 
             async def heal() -> None:
                 await stage.start(name)
+        case "calm":
+
+            async def heal() -> None:
+                pass
         case "freeze":
             await stage.signal(fault.what, signal.SIGSTOP)
 
@@ -273,15 +284,20 @@ async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
         f"hung: {each}" for each in verdict.unanswered(stage.events, stage.living(), time.monotonic() - HUNG_AFTER)
     ]
     took = verdict.motion(stage.events, control, span) if fault.stops else Motion(None, None, None)
-    return Run(fault, took, back, max(0.0, words[0] - span.healed) if words else None, wrong)
+    return Run(fault, span, took, back, max(0.0, words[0] - span.healed) if words else None, wrong)
 
 
 def _has_ended(stage: Stage) -> bool:
     return stage.processes["collaboration"].returncode is not None
 
 
-async def play(folder: Path, runs: int, seed: int, machines: int, kinds: Sequence[str]) -> list[str]:
-    """Play and break things; prints each run and the distributions. Returns what was wrong."""
+async def play(
+    folder: Path, runs: int, seed: int, machines: int, kinds: Sequence[str] = KINDS, settle: float = HUNG_AFTER
+) -> list[str]:
+    """Play and break things; prints each run and the distributions. Returns what was wrong.
+
+    settle: seconds at the end after which what has no end counts as lost, if it is half as old.
+    """
     chance, results, wrong = random.Random(seed), list[Run](), list[str]()
     async with laboratory(folder, tuple(LAYOUT[machines]), seed=seed) as lab:
         stage = Stage(lab, folder, machines)
@@ -293,14 +309,20 @@ async def play(folder: Path, runs: int, seed: int, machines: int, kinds: Sequenc
             wrong += [f"run {number}, {run.broken}: {each}" for each in run.wrong]
             print(f"{number:>3} {run.broken}: {_told(run)}{'; '.join(['', *run.wrong])}", flush=True)
             await stage.revive()
-        await asyncio.sleep(HUNG_AFTER)
+        await asyncio.sleep(settle)
         stage.read()
-        wrong += [f"lost: {each}" for each in verdict.unanswered(stage.events, stage.living(), time.monotonic() - 30)]
+        lost = verdict.unanswered(stage.events, stage.living(), time.monotonic() - max(settle, HUNG_AFTER) / 2)
+        wrong += [f"lost: {each}" for each in lost]
         wrong += [f"doubled: {each}" for each in verdict.doubled(stage.events)]
         for number in range(stage.plays + 1):
             of_play = [each for each in stage.events if each["play"] == number]
             wrong += [f"spoken twice: {each}" for each in verdict.spoken_twice(of_play)]
         stage.close()
+    calm = [(run.span.began - 0.1, run.span.healed + (run.back or 0.0) + AFTERMATH) for run in results]
+    groundless = verdict.groundless(
+        stage.events, [span for span, run in zip(calm, results, strict=True) if run.broken.kind != CALM]
+    )
+    wrong += [f"held without a fault: {each}" for each in groundless]
     told = Counter(each["told"].split(":")[0] for each in stage.events if _is_fragment(each))
     print(f"\n{len(results)} faults, seed {seed}, {machines} machines; {stage.plays} tangrams came to their end")
     print(f"fragments told to the manager: {dict(told)}")
@@ -332,7 +354,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--machines", type=int, choices=sorted(LAYOUT), default=3)
-    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--kinds", nargs="+", choices=(*KINDS, CALM), default=KINDS)
     parser.add_argument("--folder", type=Path, help="where records are kept; a new one unless given")
     options = parser.parse_args()
     if why := missing():

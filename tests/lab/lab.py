@@ -90,7 +90,7 @@ class Machine:
             await process.wait()
 
     def _go_on(self, process: Process) -> None:
-        """Let what stands for a process on the host go on: it stops when that is stopped, and nobody else wakes it."""
+        """Let what stands for a process on the host go on: it stops with that, and nobody else wakes it."""
         if process.returncode is None:
             process.send_signal(signal.SIGCONT)
 

@@ -71,9 +71,9 @@ def performed_at(events: Iterable[Event], control: str, at: Seconds) -> set[str]
     """Behaviors, by their requests, that the body performed at some time."""
     live = set[str]()
     for each in events:
-        if each["process"] == control and each["what"] == "answer" and each["t"] <= at:
-            if "|perform_behavior|" in each["whose"]:
-                (live.add if each["status"] == "Accepted" else live.discard)(each["whose"])
+        is_its = each["process"] == control and each["what"] == "answer" and each["t"] <= at
+        if is_its and "|perform_behavior|" in each["whose"]:
+            (live.add if each["status"] == "Accepted" else live.discard)(each["whose"])
     return live
 
 
@@ -108,6 +108,13 @@ def unheld(events: Sequence[Event], control: str, span: Span, within: Seconds) -
         for behavior in each["behaviors"]
     }
     return [whose for whose in going_on if whose.rpartition("/")[2] not in held]
+
+
+def groundless(events: Iterable[Event], faults: Collection[tuple[Seconds, Seconds]]) -> list[str]:
+    """Holds that came while nothing was broken. faults: since when until when something was."""
+    holds = [each for each in events if each["what"] == "held" and each["behaviors"]]
+    calm = [each for each in holds if not any(since <= each["t"] <= to for since, to in faults)]
+    return [f"{', '.join(each['behaviors'])} at {each['t']:.1f}" for each in calm]
 
 
 def shares(values: Iterable[Seconds | None]) -> str:

@@ -1,4 +1,4 @@
-"""The pulse is the lease: who is not renewed is held, and then ended; who is given up is cancelled until it answers."""
+"""The pulse is the lease: not renewed is held, and then ended; given up is cancelled until that is answered."""
 
 from itertools import pairwise
 from typing import Any

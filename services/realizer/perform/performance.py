@@ -58,9 +58,7 @@ class BlockPerformance:
         self._requests = shared.requests
         self._config = shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
-        self.body = ControlLink(
-            shared.bus, shared.requests, live.request.id, plan.block.id, shared.config.held_after
-        )
+        self.body = ControlLink(shared.bus, shared.requests, live.request.id, plan.block.id, shared.config)
         self.futures = SyncPointFutures()
         self._held = held
         self._is_held = is_held
