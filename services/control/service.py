@@ -250,7 +250,7 @@ class _Control:
 
     def _forget(self, live: LiveBehavior) -> None:
         del self._live[live.request.id]
-        if self._unheard.let_go(live):
+        if self._unheard.forget(live):
             self.tell_held()
 
     def _end(self, live: LiveBehavior) -> None:

@@ -22,7 +22,11 @@ class Unheard:
         request = live.request
         self._holds[request.id] = Hold(block=request.block, behavior=request.behavior.id, since=since, until=until)
 
-    def let_go(self, live: LiveBehavior) -> bool:
-        """Hold a behavior no longer: it goes on, or has ended. True if it was held."""
+    def let_go(self, live: LiveBehavior) -> None:
+        """Let a behavior go on."""
         live.miss(False)
+        self.forget(live)
+
+    def forget(self, live: LiveBehavior) -> bool:
+        """Forget a behavior that has ended. True if it was held."""
         return self._holds.pop(live.request.id, None) is not None

@@ -141,9 +141,11 @@ class Serving:
     def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds, sender: str = "") -> list[Effect]:
         """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`.
 
-        sender: as in `take`.
+        What has expired on its way, as behind a cut, is left out: a newer one follows it. sender: as in `take`.
         """
         for kept in message.live:
+            if sent + kept.valid < now:
+                continue
             record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
             if record is None:
                 unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)

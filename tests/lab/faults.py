@@ -151,7 +151,7 @@ class Stage:
                 whole = file.read().rpartition(b"\n")[0]
             self._read[path] = self._read.get(path, 0) + len(whole) + bool(whole)
             for line in whole.splitlines():
-                new.append(json.loads(line) | {"service": path.stem, "play": self.plays})
+                new.append(json.loads(line) | {"service": path.stem})
         self.events += sorted(new, key=lambda each: float(each["t"]))
         for each in self.events[-len(new) or len(self.events) :]:
             if each["what"] == "began":
@@ -207,7 +207,8 @@ def draw(chance: random.Random, stage: Stage, kinds: Sequence[str]) -> Broken:
         case "cut":
             one, other = sorted(chance.sample(sorted(stage.layout), 2))
             stops = 1 in (one, other) and bool({one, other} & ({realizer, control} - {1}))
-            return Broken(kind, f"{one}-{other}", chance.choice([0.5, 1.0, 3.0, 10.0]), stops)
+            seconds = 60.0 if chance.random() < 0.04 else chance.choice([0.5, 1.0, 3.0, 10.0])
+            return Broken(kind, f"{one}-{other}", seconds, stops)
         case "calm":
             return Broken(kind, "play", 30.0, False)
         case "reboot":
@@ -314,9 +315,7 @@ async def play(
         lost = verdict.unanswered(stage.events, stage.living(), time.monotonic() - max(settle, HUNG_AFTER) / 2)
         wrong += [f"lost: {each}" for each in lost]
         wrong += [f"doubled: {each}" for each in verdict.doubled(stage.events)]
-        for number in range(stage.plays + 1):
-            of_play = [each for each in stage.events if each["play"] == number]
-            wrong += [f"spoken twice: {each}" for each in verdict.spoken_twice(of_play)]
+        wrong += [f"spoken twice: {each}" for each in verdict.spoken_twice(stage.events, "collaboration")]
         stage.close()
     calm = [(run.span.began - 0.1, run.span.healed + (run.back or 0.0) + AFTERMATH) for run in results]
     groundless = verdict.groundless(

@@ -32,8 +32,14 @@ async def test_what_breaks_at_random_heals_and_nothing_is_hung_lost_or_said_twic
 
 
 def test_a_word_that_is_said_again_is_found() -> None:
-    assert verdict.spoken_twice([word(1.0, 4), word(2.0, 9)]) == []
-    assert verdict.spoken_twice([word(1.0, 4), word(2.0, 9), word(3.0, 4)]) == ["b:s at 4"]
+    said = [word(1.0, 4), word(2.0, 9)]
+
+    assert verdict.spoken_twice(said, "manager") == []
+    assert verdict.spoken_twice([*said, word(3.0, 4)], "manager") == ["b:s at 4"]
+    assert (
+        verdict.spoken_twice([*said, event(2.5, "asked", "m", service="manager", whose="x"), word(3.0, 4)], "manager")
+        == []
+    )
 
 
 def test_a_request_with_two_outcomes_is_found_and_one_that_was_refused_by_another_life_is_none() -> None:
@@ -68,8 +74,9 @@ def test_a_behavior_that_goes_on_without_being_held_is_found() -> None:
 def test_how_the_body_took_it_is_measured_until_it_goes_on() -> None:
     held = [event(2.4, "held", behaviors=["b:s"]), event(5.0, "held", behaviors=[])]
     moves = [event(3.0, "still", since=2.9), event(5.5, "moves", since=5.4), event(6.0, "still", since=5.9)]
+    live = answer(1.0, "s", "Accepted")
     took = verdict.motion(
-        [*held[:1], word(2.7, 4), *moves[:1], held[1], word(5.2, 9), *moves[1:]], BODY, Span(2.0, 4.9)
+        [live, *held[:1], word(2.7, 4), *moves[:1], held[1], word(5.2, 9), *moves[1:]], BODY, Span(2.0, 4.9)
     )
 
     assert took == pytest.approx((0.4, 0.7, 0.9))

@@ -29,10 +29,17 @@ class Motion(NamedTuple):
     still: Seconds | None
 
 
-def spoken_twice(events: Iterable[Event]) -> list[str]:
-    """Words that were said more than once."""
-    said = Counter((each["block"], each["behavior"], each["position"]) for each in events if each["what"] == "word")
-    return [f"{block}:{behavior} at {position}" for (block, behavior, position), times in said.items() if times > 1]
+def spoken_twice(events: Iterable[Event], manager: str) -> list[str]:
+    """Words that were said more than once for one life of the manager. A new one asks for all of it anew."""
+    said, life = Counter[tuple[str, str, str, int]](), ""
+    for each in events:
+        if each["what"] == "asked" and each["service"] == manager:
+            life = each["process"]
+        elif each["what"] == "word":
+            said[life, each["block"], each["behavior"], each["position"]] += 1
+    return [
+        f"{block}:{behavior} at {position}" for (_, block, behavior, position), times in said.items() if times > 1
+    ]
 
 
 def doubled(events: Iterable[Event]) -> list[str]:
@@ -80,7 +87,9 @@ def performed_at(events: Iterable[Event], control: str, at: Seconds) -> set[str]
 def motion(events: Sequence[Event], control: str, span: Span) -> Motion:
     """How the body took a fault."""
     its = [each for each in events if each["process"] == control and each["t"] >= span.began]
-    held = next((each["t"] for each in its if each["what"] == "held" and each["behaviors"]), None)
+    live = {whose.rpartition("/")[2] for whose in performed_at(events, control, span.began)}
+    holds = (each for each in its if each["what"] == "held" and live & set(map(_behavior, each["behaviors"])))
+    held = next((each["t"] for each in holds), None)
     until = next((each["t"] for each in its if held and each["t"] > held and _goes_on(each)), None) or span.healed
     quiet = [each["at"] for each in its if each["what"] == "word" and each["t"] < until]
     still = [each["since"] for each in its if each["what"] == "still" and each["t"] < until]
@@ -89,6 +98,10 @@ def motion(events: Sequence[Event], control: str, span: Span) -> Motion:
         max(quiet) - span.began if quiet else None,
         max(0.0, max(still) - span.began) if still else None,
     )
+
+
+def _behavior(label: str) -> str:
+    return label.partition(":")[2]
 
 
 def _goes_on(event: Event) -> bool:
@@ -102,7 +115,7 @@ def unheld(events: Sequence[Event], control: str, span: Span, within: Seconds) -
         return []
     going_on = performed_at(events, control, span.began) & performed_at(events, control, due)
     held = {
-        behavior.partition(":")[2]
+        _behavior(behavior)
         for each in events
         if each["process"] == control and each["what"] == "held" and span.began - 0.05 <= each["t"] <= due
         for behavior in each["behaviors"]
