@@ -97,7 +97,7 @@ class Asking:
         self._runs: dict[str, str] = {}
         """Participants that are there: the life of each."""
         self._gone: set[str] = set()
-        """Participants that have been there, and are not."""
+        """Servers of live requests that have been there, and are not."""
         self._deadlines: Deadlines[tuple[Event | None, str]] = Deadlines()
         """Deadlines of requests, by event and id; of the next `KeepAlive`, by None and server."""
         self._effects: list[Effect] = []
@@ -181,9 +181,9 @@ class Asking:
 
     def server_gone(self, server: str, now: Seconds) -> list[Effect]:
         """Take the news that the presence token of a server has gone."""
-        if self._runs.pop(server, None) is not None:
-            self._gone.add(server)
+        self._runs.pop(server, None)
         for asked in self._asked_of(server):
+            self._gone.add(server)
             self._step(asked, Event.GONE, now)
         return self._new_effects()
 

@@ -119,3 +119,13 @@ def test_while_the_server_is_gone_nothing_is_sent_and_what_is_given_up_is_cancel
     )  # fmt: skip
     asking.hear(outcome, 50.0, "control")
     assert [each for tenth in range(600) for each in asking.tick(50.0 + tenth / 10)] == []
+
+
+def test_participants_that_come_and_go_are_forgotten() -> None:
+    asking = asked_to_move()
+    for number in range(1000):
+        asking.server_there(f"client-{number}", "run", 11.0)
+        asking.server_gone(f"client-{number}", 11.0)
+    size = sum(len(each) for each in vars(asking).values() if isinstance(each, dict | set | list))
+
+    assert size < 10
