@@ -17,7 +17,7 @@ from engage_hri.services.requests.ends import Requester
 
 
 class Presence:
-    """Services that are on the bus, or were; not managers, of whom ever new ones come. changed: at the next change."""
+    """Services that are, or were, on the bus; not managers: ever new ones come. changed: at the next change."""
 
     def __init__(self) -> None:
         self._there: set[str] = set()
