@@ -276,9 +276,10 @@ async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
     stage.read()
     control = stage.ids["control"]
     async with broken(stage, fault) as span:
+        await stage.until(lambda: bool(stage.words_since(span.healed)) or _has_ended(stage), 12.0)
+        # Who was frozen or cut off learns late that others have missed it: what counts is the last time.
         is_back = await stage.until(lambda: stage.back_since() is not None, 20.0)
         back = max(0.0, (stage.back_since() or span.healed) - span.healed) if is_back else None
-        await stage.until(lambda: bool(stage.words_since(span.healed)) or _has_ended(stage), 12.0)
     words = stage.words_since(span.healed)
     wrong = []
     if back is None or back > BACK_WITHIN:
@@ -327,6 +328,8 @@ async def play(
     )
     wrong += [f"held without a fault: {each}" for each in groundless]
     told = Counter(each["told"].split(":")[0] for each in stage.events if _is_fragment(each))
+    spans = [{"fault": str(run.broken), "began": run.span.began, "healed": run.span.healed} for run in results]
+    (folder / "faults.json").write_text(json.dumps(spans))
     print(f"\n{len(results)} faults, seed {seed}, {machines} machines; {stage.plays} tangrams came to their end")
     print(f"fragments told to the manager: {dict(told)}")
     for name, values in (
