@@ -237,6 +237,8 @@ class Asking:
     def _send_and_repeat(self, asked: _Asked, now: Seconds, answer: _Said, *, is_first: bool) -> None:
         after = self._patience.first_resend if is_first else 2 * asked.resend_after
         asked.resend_after = min(after, self._patience.longest_resend)
+        if asked.server in self._gone:
+            return  # Sent when it is back: what nobody gets now would all come then.
         self._send(asked, now, None)
         wait = asked.resend_after
         if asked.cancel is None and asked.server in self._runs:  # it may have begun: sending it renews it

@@ -45,6 +45,8 @@ __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused",
 
 
 _COMMANDS = (Request, KeepAlive)
+LATE: Seconds = 0.05
+"""Lateness from which on a process was asleep on a busy machine, and the time for what came meanwhile to be heard."""
 
 
 class Pending:
@@ -247,9 +249,8 @@ class RequestDesk:
 
     on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
     not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. on_hold: called
-    with the name of a request that is to be held, since nobody renews it, and with the time when it ends otherwise;
-    with None when it is to go on. term: the lease of requests that name none. The service's subscription must hold
-    `RequestDesk.patterns(server)`.
+    with the name of a request to hold, as nobody renews it, and when it ends otherwise; None: it goes on. term: the
+    lease of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
     """
 
     def __init__(
@@ -270,6 +271,7 @@ class RequestDesk:
         self._serving = Serving(server, term)
         self._answers = keys.request_state(server)
         self._alarm = Alarm(self._tick)
+        self._late_for: Seconds | None = None
 
     @staticmethod
     def patterns(server: str) -> tuple[str, str]:
@@ -349,7 +351,13 @@ class RequestDesk:
         self._carry_out(self._serving.answer(name, answer, self._bus.now()))
 
     def _tick(self) -> None:
-        self._carry_out(self._serving.tick(self._bus.now()))
+        """Carry out what is due. If this process was late for it, what came meanwhile is heard first."""
+        now, due = self._bus.now(), self._serving.deadline
+        if due is not None and now - due > LATE and due != self._late_for:
+            self._late_for = due
+            self._alarm.set(now + LATE)
+        else:
+            self._carry_out(self._serving.tick(now))
 
     def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
@@ -363,7 +371,9 @@ class RequestDesk:
                 else:
                     self._call_back(effect.request)
             elif isinstance(effect, serving_effects.Hold):
-                self._hold(effect.name, effect.until)
+                if self._on_hold is not None:
+                    with self._bus.containing(f"request {effect.name}, which nobody renews"):
+                        self._on_hold(effect.name, effect.until)
             elif effect.is_ours:
                 self._bus.report(effect.fault)
             else:
@@ -377,11 +387,6 @@ class RequestDesk:
                 self._on_cancel(request)
             elif self._on_extend is not None:
                 self._on_extend(request)
-
-    def _hold(self, name: str, until: Seconds | None) -> None:
-        if self._on_hold is not None:
-            with self._bus.containing(f"request {name}, which nobody renews"):
-                self._on_hold(name, until)
 
     def serving(self, request: Request) -> Containing:
         """Contain exceptions in the body of `with`: they end this request, and nothing else."""

@@ -296,11 +296,12 @@ class Serving:
             return
         record.is_held = True
         self._deadlines.clear((_UNHEARD, record.name))
-        ends = (self._deadlines[record.lease], self._deadlines[_GRACE_OVER, record.name])
-        self._effects.append(Hold(record.name, min([at for at in ends if at is not None], default=inf)))
+        lease = self._deadlines[record.lease]
+        self._effects.append(Hold(record.name, inf if lease is None else lease))
 
     def _wait_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
-        self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
+        if not record.request.unheard:  # else it is held meanwhile, and may take the time of its lease
+            self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
 
     def _stop_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
         self._deadlines.clear((_GRACE_OVER, record.name))

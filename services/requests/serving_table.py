@@ -70,6 +70,7 @@ class Do(Name):
     HOLD = auto()
     """Tell the service to hold what it does, if the request is of a kind that is held."""
     WAIT_GRACE = auto()
+    """Count the time that the requester may be gone, unless the request is of a kind that is held meanwhile."""
     STOP_GRACE = auto()
     SAY_OUTDATED = auto()
     """Ask the requester for the newest content."""

@@ -237,6 +237,7 @@ def draw(chance: random.Random, stage: Stage, kinds: Sequence[str]) -> Broken:
 @asynccontextmanager
 async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
     """Break something for its time, and heal it. The body is run with the time of both."""
+    began = time.monotonic()
     heal: Callable[[], Awaitable[Any]]
     match fault.kind:
         case "kill" | "router":
@@ -268,7 +269,6 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
                 await machine.boot()
                 await stage.start(*stage.layout[machine.number])
 
-    began = time.monotonic()
     await asyncio.sleep(fault.seconds)
     over = time.monotonic()
     await heal()

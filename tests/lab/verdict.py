@@ -12,7 +12,7 @@ NO_END = ("Accepted", "Refused")
 
 
 class Span(NamedTuple):
-    """Times between which a fault lasted. began: when it was in force. healed: when it was over."""
+    """Times between which a fault lasted. began: when it was put in force. healed: when it was over."""
 
     began: Seconds
     healed: Seconds
@@ -117,7 +117,7 @@ def unheld(events: Sequence[Event], control: str, span: Span, within: Seconds) -
     held = {
         _behavior(behavior)
         for each in events
-        if each["process"] == control and each["what"] == "held" and span.began - 0.05 <= each["t"] <= due
+        if each["process"] == control and each["what"] == "held" and span.began <= each["t"] <= due
         for behavior in each["behaviors"]
     }
     return [whose for whose in going_on if whose.rpartition("/")[2] not in held]

@@ -1,5 +1,6 @@
 """The pulse is the lease: not renewed is held, and then ended; given up is cancelled until that is answered."""
 
+import asyncio
 from itertools import pairwise
 from typing import Any
 
@@ -11,8 +12,10 @@ from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
 from engage_hri.schemas.requests import Accepted, Cancel, KeepAlive, Kept, Request
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_effects import Publish, Renew, TellEnd
+from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import LAPSED, Serving
 from engage_hri.services.requests.serving_effects import Hand, Hold
@@ -60,7 +63,7 @@ def test_a_renewal_that_was_long_on_its_way_lets_nothing_go_on() -> None:
 def test_a_requester_that_goes_holds_it_at_once_and_one_without_held_after_goes_on() -> None:
     serving = Serving("control")
     serving.take(MOVES, 10.0)
-    assert holds(serving.requester_gone("me", 10.1)) == [12.1]
+    assert holds(serving.requester_gone("me", 10.1)) == [14.0]
     assert holds(serving.requester_there("me", "run", 11.0)) == []
     assert holds(pulse(serving, 11.1, 11.1)) == [None]
 
@@ -129,3 +132,46 @@ def test_participants_that_come_and_go_are_forgotten() -> None:
     size = sum(len(each) for each in vars(asking).values() if isinstance(each, dict | set | list))
 
     assert size < 10
+
+
+def test_what_is_cancelled_while_the_server_is_gone_is_cancelled_once_when_it_is_back() -> None:
+    asking = asked_to_move()
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
+    asking.server_gone("control", 11.0)
+    during = [*asking.cancel("a", "no more", 12.0), *asking.tick(12.5), *asking.tick(14.9)]
+    assert during == []
+    (cancel,) = asking.server_there("control", "run", 14.95)
+    assert isinstance(cancel, Publish)
+    assert isinstance(cancel.message, Cancel)
+
+
+async def test_a_server_that_was_itself_asleep_hears_first_what_came_meanwhile(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, client = hub.join("control", role="control"), hub.join("me", role="realizer")
+    holds = list[str]()
+    desk = RequestDesk(server, "control", lambda _: None, on_hold=lambda name, until: holds.append(name))
+    with server.subscribe(*RequestDesk.patterns("control")) as inbox:
+
+        async def take() -> None:
+            while len(inbox):
+                received = await inbox.next()
+                assert received is not None
+                desk.take(received)
+
+        client.publish(keys.command(keys.BEHAVIOR, "realizer", "me"), replace(MOVES, life=""))
+        await take()
+        desk.accept("a")
+        await asyncio.sleep(0.4)
+        kept = Kept("perform_behavior", "a", 0, "start", 4.0)
+        pulse = KeepAlive(live=(kept,), at=client.stamp(), requester="me")
+        client.publish(keys.command(keys.keep_alive("control"), "realizer", "me"), pulse)
+        monkeypatch.setattr(server, "now", lambda: asyncio.get_running_loop().time() + 0.3)  # as after a long sleep
+        await asyncio.sleep(0.11)
+        assert holds == []
+        await take()
+        await asyncio.sleep(0.05)
+        assert holds == []
+        await asyncio.sleep(1.0)
+        assert holds == ["a"]
+    desk.close()
