@@ -107,7 +107,7 @@ class Answer(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Heard(Answer, frozen=True, kw_only=True, tag="heard", omit_defaults=True):
-    """The request has come more than once and is not decided yet."""
+    """The request has come more than once, or has begun, and is not decided yet: no other life begins it again."""
 
 
 class Accepted(Answer, frozen=True, kw_only=True, tag="accepted", omit_defaults=True):

@@ -174,7 +174,7 @@ class Asking:
             return []
         if answer.kind != asked.kind or server != asked.server:
             return []
-        if isinstance(answer, Accepted):
+        if isinstance(answer, Accepted | Heard):
             asked.run = self._runs.get(server, asked.run)
         self._step(asked, _ANSWERS.get(type(answer), _FINISHED), now, answer)
         return self._new_effects()

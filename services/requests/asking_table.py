@@ -14,6 +14,8 @@ class State(Name):
 
     SENT = auto()
     """The server has neither accepted nor ended it yet: it is sent again and again."""
+    HEARD = auto()
+    """The server has it, and may have begun, though it has not decided: another life must not begin it again."""
     ACCEPTED = auto()
     """The server performs it: `KeepAlive` names it."""
     WITHDRAWING = auto()
@@ -100,7 +102,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
     S.SENT: rows(S.SENT, {
         E.ASKED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
         E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
-        E.HEARD: (S.SENT, Do.AWAIT_ANSWER),
+        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
         E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
         E.OUTDATED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
         E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
@@ -109,6 +111,21 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.BACK: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
         E.REBORN: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
         E.RESEND_DUE: (S.SENT, Do.SEND_AGAIN),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
+    }, E.SWALLOW_OVER),
+    S.HEARD: rows(S.HEARD, {
+        E.ASKED: (S.HEARD, Do.SEND, Do.AWAIT_ANSWER),
+        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
+        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
+        E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
+        E.OUTDATED: (S.HEARD, Do.SEND, Do.AWAIT_ANSWER),
+        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
+        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
+        E.GONE: (S.HEARD, Do.WAIT_GRACE),
+        E.BACK: (S.HEARD, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
+        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
+        E.RESEND_DUE: (S.HEARD, Do.SEND_AGAIN),
         E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
         E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
     }, E.SWALLOW_OVER),

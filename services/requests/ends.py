@@ -5,10 +5,8 @@ moment. What follows from each of these is in two tables (asking_table.py, servi
 follow (asking.py, serving.py). Here they meet the bus, the clock and the futures that callers await: each request has
 exactly one terminal state, whatever happens in between.
 
-A restarted server remembers nothing. What its former life had accepted fails at the requester and is not sent
-again: a robot must not say and do things twice. What had not been accepted is sent again. The gap that remains
-is an acceptance lost in the same moment as its server; its request is performed again from the start.
-A server leaves commands that it gets from history to their requester, which knows what became of them.
+A restarted server remembers nothing. What its former life had heard fails at the requester and is not sent again: a
+robot must not say and do things twice. A server leaves commands from history to their requester.
 """
 
 import asyncio
@@ -30,7 +28,17 @@ from engage_hri.schemas.faults import (
 )
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
+from engage_hri.schemas.requests import (
+    Accepted,
+    Answer,
+    Cancel,
+    Heard,
+    KeepAlive,
+    Outcome,
+    Refused,
+    Request,
+    Unreadable,
+)
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received
 from engage_hri.services.requests import asking_effects, serving_effects
@@ -38,48 +46,14 @@ from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_table import State
 from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.pending import Pending
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.runtime.alarm import Alarm
 
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
-
-
 _COMMANDS = (Request, KeepAlive)
 LATE: Seconds = 0.05
 """Lateness from which on a process was asleep on a busy machine, and the time for what came meanwhile to be heard."""
-
-
-class Pending:
-    """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died or does not answer.
-
-    Cancelling a future only stops waiting; `Requester.cancel` ends the request.
-    """
-
-    def __init__(self, key: str, request: Request) -> None:
-        loop = asyncio.get_running_loop()
-        self.key = key
-        self.request = request
-        self.accepted: asyncio.Future[None] = loop.create_future()
-        self.outcome: asyncio.Future[Outcome] = loop.create_future()
-
-    @property
-    def server(self) -> str:
-        return keys.server_of(self.key)
-
-    def accept(self) -> None:
-        if not self.accepted.done():
-            self.accepted.set_result(None)
-
-    def end(self, end: Outcome | EngageError) -> None:
-        if isinstance(end, Outcome):
-            self.accept()
-            if not self.outcome.done():
-                self.outcome.set_result(end)
-            return
-        for future in (self.accepted, self.outcome):
-            if not future.done():
-                future.set_exception(end)
-                future.exception()  # marked as seen: a caller may await only one of the two
 
 
 class Requester:
@@ -333,6 +307,10 @@ class RequestDesk:
         if (fault := misplaced(message, received.key)) is not None:
             return self._carry_out(self._serving.refuse(message, fault))
         return self._carry_out(self._serving.take(message, now, sender))
+
+    def hear(self, name: str) -> None:
+        """Tell the requester that it is not accepted, but may have begun: no other life is to begin it."""
+        self._answer(name, Heard(id=name))
 
     def accept(self, name: str) -> None:
         """Tell the requester that the request is being performed."""

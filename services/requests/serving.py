@@ -51,7 +51,7 @@ GONE = "requester is gone"
 _ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN
 _STOPPED = (State.CANCELLED, State.ENDED)
 _GRACE_OVER, _UNHEARD, _LEASE_OVER = Event.GRACE_OVER, Event.UNHEARD, Event.LEASE_OVER
-_DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
+_DECISIONS = {Heard: Event.HEAR, Accepted: Event.ACCEPT, Refused: Event.REFUSE}
 """The event that an answer of the service is; every other answer is an end."""
 
 

@@ -38,8 +38,9 @@ class Event(Name):
     """A `KeepAlive` names the request, to keep it alive."""
     EXTENDED = auto()
     """A `KeepAlive` names the request, with newer content than is known here."""
+    HEAR = auto()
+    """The service itself answers, here and in the next three; here that it has begun, and will decide."""
     ACCEPT = auto()
-    """The service itself answers, here and in the next two."""
     REFUSE = auto()
     END = auto()
     GONE = auto()
@@ -99,6 +100,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.CANCEL: (S.ENDED, Do.REFUSE_UNHEARD),
         E.NAMED: (S.UNKNOWN, Do.REFUSE_FORGOTTEN),
         E.EXTENDED: (S.UNKNOWN, Do.REFUSE_FORGOTTEN),
+        E.HEAR: (S.UNKNOWN, Do.WARN_ENDED),
         E.ACCEPT: (S.UNKNOWN, Do.WARN_ENDED),
         E.REFUSE: (S.UNKNOWN, Do.WARN_ENDED),
         E.END: (S.UNKNOWN, Do.WARN_ENDED),
@@ -110,6 +112,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.CANCEL: (S.CANCELLED, Do.HAND_CANCEL),
         E.NAMED: (S.TAKEN, Do.RENEW),
         E.EXTENDED: (S.TAKEN, Do.RENEW, Do.HAND_EXTENDED, Do.SAY_OUTDATED),
+        E.HEAR: (S.TAKEN, Do.ANSWER),
         E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
@@ -136,7 +139,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
         E.UNHEARD: (S.ACCEPTED, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
-    }),
+    }, E.HEAR),
     S.CANCELLED: rows(S.CANCELLED, {
         E.CAME: (S.CANCELLED, Do.REPEAT),
         E.CHANGED: (S.CANCELLED, Do.REPEAT),
@@ -145,7 +148,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.CANCELLED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-    }, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
+    }, E.HEAR, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.ENDED: rows(S.ENDED, {
         E.CAME: (S.ENDED, Do.REPEAT),
         E.CHANGED: (S.ENDED, Do.REPEAT),
@@ -156,5 +159,5 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ENDED, Do.WARN_ENDED),
         E.REFUSE: (S.ENDED, Do.WARN_ENDED),
         E.END: (S.ENDED, Do.WARN_ENDED),
-    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
+    }, E.HEAR, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
 }  # fmt: skip

@@ -10,7 +10,8 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
-from engage_hri.schemas.requests import Accepted, Cancel, KeepAlive, Kept, Request
+from engage_hri.schemas.faults import ServerRestarted
+from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.requests.asking import Asking
@@ -19,6 +20,7 @@ from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import LAPSED, Serving
 from engage_hri.services.requests.serving_effects import Hand, Hold
+from engage_hri.services.requests.serving_effects import Publish as Answered
 
 MOVES = PerformBehavior(
     id="a", requester="me", life="1", block="b", behavior=Wait(id="w"), through="start", lease=4.0, held_after=0.5
@@ -175,3 +177,29 @@ async def test_a_server_that_was_itself_asleep_hears_first_what_came_meanwhile(
         await asyncio.sleep(1.0)
         assert holds == ["a"]
     desk.close()
+
+
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_what_a_server_has_heard_is_not_begun_again_by_its_next_life(is_heard: bool) -> None:
+    asking = asked_to_move()
+    if is_heard:
+        asking.hear(Heard(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
+    asking.server_gone("control", 10.1)
+    effects = asking.server_there("control", "another", 11.0)
+
+    if is_heard:
+        (end,) = [each.end for each in effects if isinstance(each, TellEnd)]
+        assert isinstance(end, ServerRestarted)
+        assert all(isinstance(each.message, Cancel) for each in effects if isinstance(each, Publish))
+    else:
+        assert [each.message for each in effects if isinstance(each, Publish)] == [asking.request("a")]
+
+
+def test_a_service_says_that_it_has_begun_what_it_has_not_accepted() -> None:
+    serving = Serving("control")
+    serving.take(MOVES, 10.0)
+    (heard,) = serving.answer("a", Heard(id="a"), 10.0)
+    assert isinstance(heard, Answered)
+    assert isinstance(heard.answer, Heard)
+    serving.answer("a", Accepted(id="a"), 10.0)
+    assert serving.answer("a", Heard(id="a"), 10.0) == []
