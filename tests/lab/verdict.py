@@ -85,8 +85,8 @@ def performed_at(events: Iterable[Event], control: str, at: Seconds) -> set[str]
 
 
 def motion(events: Sequence[Event], control: str, span: Span) -> Motion:
-    """How the body took a fault."""
-    its = [each for each in events if each["process"] == control and each["t"] >= span.began]
+    """How the body took a fault, while it lasted."""
+    its = [each for each in events if each["process"] == control and span.began <= each["t"] <= span.healed]
     live = {whose.rpartition("/")[2] for whose in performed_at(events, control, span.began)}
     holds = (each for each in its if each["what"] == "held" and live & set(map(_behavior, each["behaviors"])))
     held = next((each["t"] for each in holds), None)
