@@ -43,7 +43,7 @@ STANDSTILL = 1.5
 AFTERMATH = 2.0
 """Seconds after everything is back in which a hold still comes of the fault: services begin anew."""
 HUNG_AFTER = 40.0
-"""Seconds after which a request without an end counts as hung: more than the longest behavior, event or patience."""
+"""Calm seconds after which a request without an end is hung: more than the longest behavior, event or patience."""
 LONG = 60.0
 SETTINGS = (
     "--set", "recognition.gaze_resolution=table", "--set", "simulation.human=scripted",
@@ -87,6 +87,7 @@ class Stage:
         """Process of each service, as the records name it."""
         self.events: list[dict[str, Any]] = []
         self.plays = 0
+        self.faults: list[Span] = []
         self._folder = folder
         self._read: dict[Path, int] = {}
         self._ready: dict[str, asyncio.Event] = {}
@@ -294,13 +295,13 @@ async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
         back = max(0.0, (stage.back_since() or span.healed) - span.healed) if is_back else None
     words = stage.words_since(span.healed)
     wrong = []
+    stage.faults.append(span)
+    before = verdict.calm_ago(time.monotonic(), stage.faults, HUNG_AFTER)
     if back is None or back > BACK_WITHIN:
         wrong.append(f"back after {back} s")
     if fault.stops:
         wrong += [f"not held: {each}" for each in verdict.unheld(stage.events, control, span, HELD_WITHIN)]
-    wrong += [
-        f"hung: {each}" for each in verdict.unanswered(stage.events, stage.living(), time.monotonic() - HUNG_AFTER)
-    ]
+    wrong += [f"hung: {each}" for each in verdict.unanswered(stage.events, stage.living(), before)]
     if any(since < time.monotonic() and span.began < to for since, to in stage.stood_still):
         print("the host stood still: not counted:", "; ".join(wrong) or "nothing was wrong", flush=True)
         wrong = []

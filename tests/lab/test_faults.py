@@ -60,6 +60,13 @@ def test_a_request_of_a_living_process_without_an_end_is_found() -> None:
     assert verdict.unanswered([*asked, event(10.0, "told", "a", whose="x")], {"a"}, 5.0) == []
 
 
+def test_the_time_for_which_something_is_broken_does_not_count_as_waiting() -> None:
+    assert verdict.calm_ago(100.0, [], 40.0) == 60.0
+    assert verdict.calm_ago(100.0, [Span(20.0, 80.0)], 40.0) == 0.0
+    assert verdict.calm_ago(100.0, [Span(5.0, 10.0), Span(20.0, 80.0)], 15.0) == 85.0
+    assert verdict.calm_ago(100.0, [Span(5.0, 10.0), Span(20.0, 80.0)], 40.0) == -5.0
+
+
 def test_a_behavior_that_goes_on_without_being_held_is_found() -> None:
     span = Span(2.0, 9.0)
     goes_on = [answer(1.0, "s", "Accepted"), answer(1.5, "g", "Accepted"), answer(2.2, "g", "done")]

@@ -62,6 +62,16 @@ def unanswered(events: Iterable[Event], living: Collection[str], before: Seconds
     return [whose for (_, whose), at in asked.items() if at < before]
 
 
+def calm_ago(now: Seconds, faults: Sequence[Span], seconds: Seconds) -> Seconds:
+    """The time since which so many seconds have passed with nothing broken: a request waits for its server."""
+    at, left = now, seconds
+    for span in reversed(faults):
+        if (calm := max(0.0, at - span.healed)) >= left:
+            break
+        at, left = span.began, left - calm
+    return at - left
+
+
 def sees(events: Iterable[Event], process: str) -> dict[str, Seconds]:
     """Participants that a process sees after these events, and since when."""
     seen = dict[str, Seconds]()
