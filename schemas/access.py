@@ -59,7 +59,8 @@ SERVED = {
 """Commands by their subject."""
 WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_CONNECTION_EVENT,
-    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
+    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
+    keys.ANY_ALIVE,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
@@ -124,7 +125,7 @@ TABLE: tuple[Row, ...] = (
                keys.ROBOT_STATE),
     ),
     *_service(
-        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE,
+        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.BODY_HELD,
         heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
     *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, *_RAW)),

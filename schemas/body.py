@@ -44,6 +44,13 @@ class PerformBehavior(Request, frozen=True, kw_only=True, tag="perform_behavior"
     """True to wait at the next place where the body can, whatever `through` says: a movement at its next hold point
     (`SyncPointArrived`), a voice at the next word gap, mark or no mark. It goes there at its `pace`. Sent again
     without it, the behavior goes on as far as `through` says. One that can wait nowhere any more ends by itself."""
+    held_after: Seconds = 0.0
+    """Seconds after the last renewal from which on the behavior is held, as by `held`, until it is renewed; 0: never.
+    Renewed is it by a `KeepAlive` that names it, or by being sent again. Its `lease` says when it ends."""
+
+    @property
+    def unheard(self) -> Seconds:
+        return self.held_after
 
     @property
     def authority(self) -> str:
@@ -129,14 +136,14 @@ class BehaviorOutcome(Outcome, frozen=True, kw_only=True, tag="behavior_outcome"
     """evt: terminal state of `PerformBehavior`.
 
     status: `done`: its `end` was passed; `taken_over`: before that another behavior took one of its parts, at `at`;
-    `aborted`: it was ended before; `failed`: see `fault`.
+    `aborted`: it was ended before; `lapsed`: its requester was lost, and the body goes home; `failed`: see `fault`.
     passed: the last sync point that was passed; empty: none, or the body does not say.
     spoken: of a speech, the words that the voice has said.
     """
 
     block: str
     behavior: str
-    status: Literal["done", "taken_over", "aborted", "failed"]
+    status: Literal["done", "taken_over", "aborted", "lapsed", "failed"]
     at: Stamp
     passed: str = ""
     spoken: str = ""

@@ -29,3 +29,17 @@ class Held(Struct, frozen=True, kw_only=True, tag="held", omit_defaults=True):
 
     at: Stamp
     holds: tuple[Hold, ...] = ()
+
+
+class BodyHeld(Struct, frozen=True, kw_only=True, tag="body_held", omit_defaults=True):
+    """state: control. All behaviors that wait because whoever asked for them is not heard (`held_after`), the oldest
+    first; none: nothing waits for that.
+
+    Published at every change; a late subscriber gets the last one. Of a behavior that is not among them any more, its
+    requester was heard again, or it has ended; `until` is when it ends otherwise.
+
+    at: when it was published.
+    """
+
+    at: Stamp
+    holds: tuple[Hold, ...] = ()

@@ -46,6 +46,7 @@ ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 WORLD = f"{PREFIX}/state/perception/world"
 HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
 HELD = f"{PREFIX}/state/realizer/held"
+BODY_HELD = f"{PREFIX}/state/control/held"
 
 ROBOT_STATE = f"{PREFIX}/stream/control/robot_state"
 NET = f"{PREFIX}/stream/realizer/net"

@@ -13,13 +13,24 @@ from msgspec import Struct
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import Feedback
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Stamp
 
-LineMessage = ConnectionEvent | Statistics | Feedback | HeadOwner | Held | Fault | NetPlanned | NetMarked | NetWaiting
+LineMessage = (
+    ConnectionEvent
+    | Statistics
+    | Feedback
+    | HeadOwner
+    | Held
+    | BodyHeld
+    | Fault
+    | NetPlanned
+    | NetMarked
+    | NetWaiting
+)
 """Messages that have a line."""
 _KINDS = get_args(LineMessage)
 _DECIMALS = 6

@@ -37,7 +37,7 @@ from engage_hri.schemas.body import (
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -60,7 +60,7 @@ Message = (
     Heard | Accepted | Outdated | Refused | Cancel | KeepAlive | Unreadable | Fault
     | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
     | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted | SteerPerformance | SteerRobot
-    | PerformanceSteered | Held | NetPlanned | NetMarked | NetWaiting
+    | PerformanceSteered | Held | BodyHeld | NetPlanned | NetMarked | NetWaiting
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState

@@ -43,6 +43,11 @@ class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
         return self.lease
 
     @property
+    def unheard(self) -> Seconds:
+        """Seconds without renewal after which the server holds what it does, until it is renewed; 0: never."""
+        return 0.0
+
+    @property
     def authority(self) -> str:
         """Limit up to which the request may be carried out without asking; empty: no limit."""
         return ""
@@ -102,7 +107,7 @@ class Answer(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Heard(Answer, frozen=True, kw_only=True, tag="heard", omit_defaults=True):
-    """The request has come more than once and is not decided yet."""
+    """The request has come more than once, or has begun, and is not decided yet: no other life begins it again."""
 
 
 class Accepted(Answer, frozen=True, kw_only=True, tag="accepted", omit_defaults=True):

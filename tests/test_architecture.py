@@ -23,9 +23,11 @@ IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket",
 MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 """Packages of `services` that pure files don't know either; their own pure files aside."""
 PURE_MACHINERY = {
-    "services/requests/asking.py", "services/requests/asking_table.py", "services/requests/deadlines.py",
+    "services/requests/asking.py", "services/requests/asking_effects.py", "services/requests/asking_table.py",
+    "services/requests/deadlines.py",
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
-    "services/requests/serving.py", "services/requests/serving_table.py", "services/requests/transitions.py",
+    "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
+    "services/requests/transitions.py",
     "services/runtime/publisher.py", "services/client/chunking.py",
     "services/client/event_stream.py",
 }  # fmt: skip
@@ -65,7 +67,7 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > actions waiting > body > variability > config",
+    "services/control": "service > torso > voice > actions unheard waiting > live > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",

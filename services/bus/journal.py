@@ -6,7 +6,7 @@ streams. Loggers are named `engage.<service>`, or `engage.<role>` for a particip
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from engage_hri.schemas import keys
@@ -14,7 +14,7 @@ from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
@@ -88,8 +88,16 @@ def _event(message: ConnectionEvent) -> Entry:
 
 
 def _held(message: Held) -> Entry:
-    names = [": ".join(filter(None, (each.block, each.behavior))) or "everything" for each in message.holds]
-    return INFO if names else DEBUG, f"held: {', '.join(names) or 'nothing'}"
+    return INFO if message.holds else DEBUG, f"held: {_names(message.holds)}"
+
+
+def _body_held(message: BodyHeld) -> Entry:
+    return WARNING if message.holds else DEBUG, f"held, since nobody renews it: {_names(message.holds)}"
+
+
+def _names(holds: Iterable[Hold]) -> str:
+    names = [": ".join(filter(None, (each.block, each.behavior))) or "everything" for each in holds]
+    return ", ".join(names) or "nothing"
 
 
 def _refused(message: Refused) -> Entry:
@@ -115,6 +123,7 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
     TurnClosed: _turn,
     ConnectionEvent: _event,
     Held: _held,
+    BodyHeld: _body_held,
     Refused: _refused,
     Fault: _fault,
     ActorFound: _actor,

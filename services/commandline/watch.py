@@ -12,7 +12,7 @@ from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
@@ -24,13 +24,13 @@ from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import LiveNets, Log, NetLog
 from engage_hri.services.console.log import Telling
 
-OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.HELD, keys.ANY_FAULT)
+OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.ANY_FAULT)
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "events": (ConnectionEvent,),
     "statistics": (Statistics,),
     "feedback": (BlockProgress, SyncPointProgress, WarningFeedback),
     "head": (HeadOwner,),
-    "holds": (Held,),
+    "holds": (Held, BodyHeld),
     "faults": (Fault,),
 }
 

@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import HeadOwner
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetWaiting
 from engage_hri.schemas.recognition import ConnectionEvent, OpenEvents
@@ -24,6 +24,7 @@ FOLLOWED = (
     keys.ANY_STATISTICS,
     keys.HEAD_OWNER,
     keys.HELD,
+    keys.BODY_HELD,
     keys.ANY_REQUEST_STATE,
     keys.ANY_FAULT,
     keys.ANY_ALIVE,
@@ -58,7 +59,7 @@ async def following(
         message, at = received.message, instant(bus, received.message, received.at)
         for event in events.feed(message, at, bus.now(), past=received.past):
             tell(event, instant(bus, event, at))
-        is_now = past or not received.past or isinstance(message, Held)
+        is_now = past or not received.past or isinstance(message, Held | BodyHeld)
         if is_now and not isinstance(message, ConnectionEvent | OpenEvents):
             tell(message, at)
 

@@ -8,7 +8,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
@@ -57,6 +57,9 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")
         case Held():
             return "; ".join(holds(before, after, at)) or None
+        case BodyHeld(holds=waiting) if waiting:
+            named = ", ".join(wording.held(each) for each in waiting)
+            return f"! the body holds {named}: nobody renews it"
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:

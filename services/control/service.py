@@ -4,10 +4,9 @@ import asyncio
 from contextlib import aclosing
 from math import inf
 from pathlib import Path
-from typing import Literal
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -27,6 +26,7 @@ from engage_hri.schemas.body import (
 from engage_hri.schemas.check import check_behavior
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
@@ -47,6 +47,8 @@ from engage_hri.services.control.body import (
     Spoke,
 )
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.live import LiveBehavior
+from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.service import Ready
@@ -67,6 +69,7 @@ async def embody(
             bus.answer(keys.DESCRIBE, control.describe)
             ready()
             try:
+                control.tell_held()
                 control.publish_state()
                 async for received in inbox:
                     with bus.containing(received):
@@ -92,39 +95,17 @@ def _read(file: str) -> str:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
 
 
-class _LiveBehavior:
-    """A `PerformBehavior` that is under way."""
-
-    def __init__(self, request: PerformBehavior, id: str, authority: MovementAuthority) -> None:
-        """id: as the requester gave it; `request.id` is unique among the requests of all requesters."""
-        self.request = request
-        self.id = id
-        self.authority = authority
-        self.position = 0
-        self.status: Literal["done", "taken_over", "aborted", "failed"] = "aborted"
-        self.passed = ""
-        """The last sync point that it has passed."""
-        self.aborts: list[str] = []
-        """Ids of the abort requests that end with this behavior."""
-
-    @property
-    def label(self) -> str:
-        return f"{self.request.block}:{self.request.behavior.id}"
-
-    @property
-    def spoken(self) -> str:
-        """Text that the voice has said so far; empty for a behavior that is no speech."""
-        behavior = self.request.behavior
-        return behavior.text[: self.position] if isinstance(behavior, Speech) else ""
-
-
 class _Control:
     """State of the service, and what it does with each message that `embody` receives."""
 
     def __init__(
         self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, objects: CoveredObjects
     ) -> None:
-        self.desk = RequestDesk(bus, "control", self._requester_lost, on_extend=self.serve, term=config.dead_man)
+        self._live: dict[str, LiveBehavior] = {}
+        self._unheard = Unheard()
+        self.desk = RequestDesk(
+            bus, "control", self._requester_lost, on_extend=self.serve, on_hold=self._hold, term=config.dead_man
+        )
         self._bus = bus
         self._config = config
         self._body = body
@@ -132,7 +113,6 @@ class _Control:
         self._actions = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
         self._objects = objects
-        self._live: dict[str, _LiveBehavior] = {}
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
@@ -202,9 +182,7 @@ class _Control:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         id = self.desk.asked(request.id).id
-        if request.held:
-            authority.hold()
-        live = self._live[request.id] = _LiveBehavior(request, id, authority)
+        live = self._live[request.id] = LiveBehavior(request, id, authority)
         self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
 
     def _abort(self, request: AbortBehavior) -> None:
@@ -219,7 +197,7 @@ class _Control:
             self._revoke(live, request.how)
             live.aborts.append(request.id)
 
-    def _revoke(self, live: _LiveBehavior, how: AbortMode = "relax") -> None:
+    def _revoke(self, live: LiveBehavior, how: AbortMode = "relax") -> None:
         """Revoke the authority of a behavior. An error of a driver that watches it is contained."""
         with self._bus.containing(f"the end of behavior {live.label}"):
             live.authority.revoke(how)
@@ -227,9 +205,9 @@ class _Control:
     def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
         return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
 
-    def _extend(self, live: _LiveBehavior, request: PerformBehavior) -> None:
+    def _extend(self, live: LiveBehavior, request: PerformBehavior) -> None:
         if request.held:
-            live.authority.hold()
+            live.hold(True)
         live.authority.set_pace(self._pace(request))
         try:
             live.authority.extend(request.through)
@@ -237,11 +215,11 @@ class _Control:
             where = live.request.behavior.id
             self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
         if not request.held:
-            live.authority.go_on()
+            live.hold(False)
 
-    async def _perform(self, live: _LiveBehavior) -> None:
+    async def _perform(self, live: LiveBehavior) -> None:
         """Perform a behavior, from its request to the one terminal answer."""
-        request, fault = live.request, None
+        request = live.request
         accepted = False
         try:
             async with aclosing(self._body.perform(request.behavior, live.authority)) as stream:
@@ -251,37 +229,42 @@ class _Control:
                         accepted = True
                     self._report(live, progress)
         except BehaviorRefused as error:
-            del self._live[request.id]
+            self._forget(live)
             self.desk.refuse(request.id, error.fault)
             self._end_aborts(live)
             return
         except BodyFailed as error:
-            live.status, fault = "failed", error.fault
+            live.status, live.fault = "failed", error.fault
         except (Exception, asyncio.CancelledError) as error:
             if is_asked_to_stop():
                 raise
             # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
-            live.status, fault = "failed", self._bus.failed(error, f"behavior {live.label}")
+            live.status, live.fault = "failed", self._bus.failed(error, f"behavior {live.label}")
             self._take_home(f"after {live.label} broke")
-        if live.status == "aborted" and live.authority.revoked == "taken_over":
-            live.status = "taken_over"
-        del self._live[request.id]
+        if live.status == "aborted":
+            live.status = "taken_over" if live.authority.revoked == "taken_over" else live.aborted
+        self._forget(live)
         with self.desk.serving(request):
-            self._end(live, fault)
+            self._end(live)
         self._end_aborts(live)
 
-    def _end(self, live: _LiveBehavior, fault: Fault | None) -> None:
+    def _forget(self, live: LiveBehavior) -> None:
+        del self._live[live.request.id]
+        if self._unheard.forget(live):
+            self.tell_held()
+
+    def _end(self, live: LiveBehavior) -> None:
         request, at = live.request, self._bus.now()
         self._publish(self._actions.ended(request.id, at))
         self.note_look()
         self._keep_publishing()
         outcome = BehaviorOutcome(
             id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
-            at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=fault,
+            at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=live.fault,
         )  # fmt: skip
         self.desk.end(outcome)
 
-    def _end_aborts(self, live: _LiveBehavior) -> None:
+    def _end_aborts(self, live: LiveBehavior) -> None:
         """Answer the abort requests that waited for this behavior and wait for no other one."""
         awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
@@ -306,7 +289,7 @@ class _Control:
 
     # -- reports ------------------------------------------------------------------------------------------------
 
-    def _report(self, live: _LiveBehavior, progress: Progress) -> None:
+    def _report(self, live: LiveBehavior, progress: Progress) -> None:
         request = live.request
         id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
         at = self._bus.stamp(progress.at)
@@ -340,7 +323,7 @@ class _Control:
         for action in actions:
             self._bus.publish(keys.ROBOT_ACTION, action)
 
-    def note_look(self, live: _LiveBehavior | None = None, at: Seconds | None = None) -> None:
+    def note_look(self, live: LiveBehavior | None = None, at: Seconds | None = None) -> None:
         """Publish what the eyes rest on, if that has changed."""
         of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
         label = live.label if live is not None and of_head else ""
@@ -375,14 +358,31 @@ class _Control:
 
     # -- dead man -----------------------------------------------------------------------------------------------
 
+    def _hold(self, name: str, until: Seconds | None) -> None:
+        """Hold a behavior that nobody renews, or let it go on. until: when it ends otherwise; None: it goes on."""
+        if (live := self._live.get(name)) is None:
+            return
+        self._unheard.let_go(live)
+        if until is not None:
+            self._unheard.hold(live, self._bus.stamp(), self._bus.stamp(until))
+        self.tell_held()
+
+    def tell_held(self) -> None:
+        """Publish what waits since nobody renews it."""
+        self._bus.publish(keys.BODY_HELD, BodyHeld(at=self._bus.stamp(), holds=self._unheard.holds))
+
     def _requester_lost(self, cancel: Cancel) -> None:
         """Revoke a behavior that has lost its requester. With the last one of that requester the body goes home."""
         live = self._live.get(cancel.id)
         if live is None:
             return
+        live.lapse(f"{cancel.requester}: {cancel.reason}")
         self._revoke(live)
         others = (each for each in self._live.values() if each.request.requester == cancel.requester)
         if all(each.authority.revoked for each in others):
+            reason = f"{cancel.requester}: {cancel.reason}; the body goes home"
+            self._bus.log.warning("control: %s", reason)
+            self._bus.publish(keys.fault("control"), Fault(reason=reason, service="control"))
             self._take_home(f"after {cancel.requester}")
 
     def close(self) -> None:

@@ -272,6 +272,8 @@ class FragmentRunner:
             follows=tuple([each.fragment.id for each in followed]),
         )
         self._turns.fragment_begins(performance.turn.turn)
+        if not performance.accepted:  # From here on the robot may speak.
+            self._desk.hear(performance.request.id)
         pending = self._requests.send(keys.BLOCK, request)
         await pending.accepted
         self._accept(performance)

@@ -12,7 +12,7 @@ from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, Perform
 from engage_hri.schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import COMMANDS, MAJOR, Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
@@ -40,6 +40,7 @@ FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
     NetPlanned: keys.NET, NetMarked: keys.NET, NetWaiting: keys.NET, Held: keys.HELD,
+    BodyHeld: keys.BODY_HELD,
 }  # fmt: skip
 """Key of each type of message that always has the same."""
 

@@ -20,8 +20,10 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     estimate: how long the body may take to answer what it expects of a block.
     abort: how long the body may take to end what was aborted before the block ends without it.
     pulse: time between two renewals of the requests to the body and to recognition.
-    lease: how long movement authority lasts that is not renewed, so that a body stops by itself when the realizer is
-    gone. At least three pulses.
+    held_after: how long the body may go on without hearing of the realizer; then it holds, and goes on as soon as it
+    does. It hears of it three times as often. 0: for as long as it has authority.
+    lease: how long movement authority lasts that is not renewed; then the body ends what it holds, and goes home.
+    Longer than that, and at least three pulses.
     utterance: characters of one speech, some five minutes; a block with a longer one is refused.
     blocks: number of live blocks; one more is refused. The default is the most with which a command follows its sync
         point within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py).
@@ -42,7 +44,8 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     estimate: Seconds = 2.0
     abort: Seconds = 5.0
     pulse: Seconds = 1.0
-    lease: Seconds = 5.0
+    held_after: Seconds = 0.5
+    lease: Seconds = 4.0
     utterance: int = 5000
     blocks: int = 300
     event_grace: Seconds = 0.5
@@ -58,6 +61,8 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         not_negative(self, self.__struct_fields__)
         if self.stall < self.late or self.stall_factor < self.late_factor:
             raise ValueError("stall and stall_factor must not be below late and late_factor")
+        if self.held_after >= self.lease:
+            raise ValueError(f"held_after {self.held_after} s must be below lease {self.lease} s")
         if not 0.0 < 3.0 * self.pulse <= self.lease:
             raise ValueError(
                 f"lease {self.lease} s must be at least three times pulse {self.pulse} s, which is above 0"

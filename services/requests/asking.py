@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from math import inf
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -30,45 +29,18 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.requests.asking_effects import (
+    Complain,
+    Effect,
+    Publish,
+    Renew,
+    TellAccepted,
+    TellEnd,
+)
 from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
 
-
-class Publish(Struct, frozen=True):
-    """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
-
-    expression: str
-    message: Request
-
-
-class Renew(Struct, frozen=True):
-    """Send `server` a `KeepAlive` for these requests."""
-
-    server: str
-    live: tuple[Kept, ...]
-
-
-class TellAccepted(Struct, frozen=True):
-    """Tell the caller that the server has accepted the request."""
-
-    id: str
-
-
-class TellEnd(Struct, frozen=True):
-    """Tell the caller how the request has ended. There is exactly one for each request."""
-
-    id: str
-    end: Outcome | EngageError
-
-
-class Complain(Struct, frozen=True):
-    """Publish this fault for all to see."""
-
-    fault: Fault
-
-
-Effect = Publish | Renew | TellAccepted | TellEnd | Complain
 _Said = Answer | None
 """The answer of the server that is the event; None with all other events."""
 
@@ -124,6 +96,8 @@ class Asking:
         self._servers: dict[str, _Server] = {}
         self._runs: dict[str, str] = {}
         """Participants that are there: the life of each."""
+        self._gone: set[str] = set()
+        """Servers of live requests that have been there, and are not."""
         self._deadlines: Deadlines[tuple[Event | None, str]] = Deadlines()
         """Deadlines of requests, by event and id; of the next `KeepAlive`, by None and server."""
         self._effects: list[Effect] = []
@@ -200,7 +174,7 @@ class Asking:
             return []
         if answer.kind != asked.kind or server != asked.server:
             return []
-        if isinstance(answer, Accepted):
+        if isinstance(answer, Accepted | Heard):
             asked.run = self._runs.get(server, asked.run)
         self._step(asked, _ANSWERS.get(type(answer), _FINISHED), now, answer)
         return self._new_effects()
@@ -209,12 +183,14 @@ class Asking:
         """Take the news that the presence token of a server has gone."""
         self._runs.pop(server, None)
         for asked in self._asked_of(server):
+            self._gone.add(server)
             self._step(asked, Event.GONE, now)
         return self._new_effects()
 
     def server_there(self, server: str, run: str, now: Seconds) -> list[Effect]:
         """Take the news that the presence token of a server is there. run: its life; empty: unknown."""
         self._runs[server] = run
+        self._gone.discard(server)
         for asked in self._asked_of(server):
             is_another = bool(asked.run and run and asked.run != run)
             self._step(asked, Event.REBORN if is_another else Event.BACK, now)
@@ -253,24 +229,32 @@ class Asking:
             self._let_go(asked)
             id = asked.request.id
             for clock in _CLOCKS:
-                if clock is not _SWALLOW or asked.state is _ENDED:
+                if clock not in (_SWALLOW, _RESEND) or asked.state is _ENDED:
                     self._deadlines.clear((clock, id))
             if asked.state is _ENDED:
                 del self._asked[id]
 
     def _send_and_repeat(self, asked: _Asked, now: Seconds, answer: _Said, *, is_first: bool) -> None:
-        longer = min(2 * asked.resend_after, self._patience.longest_resend)
-        asked.resend_after = self._patience.first_resend if is_first else longer
+        after = self._patience.first_resend if is_first else 2 * asked.resend_after
+        asked.resend_after = min(after, self._patience.longest_resend)
+        if asked.server in self._gone:
+            return  # Sent when it is back: what nobody gets now would all come then.
         self._send(asked, now, None)
-        self._deadlines.set((_RESEND, asked.request.id), now + asked.resend_after)
+        wait = asked.resend_after
+        if asked.cancel is None and asked.server in self._runs:  # it may have begun: sending it renews it
+            wait = min(wait, _period(asked.request))
+        self._deadlines.set((_RESEND, asked.request.id), now + wait)
 
     def _send(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
         self._effects.append(Publish(expression, asked.cancel or asked.request))
 
-    def _cancel_once(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
-        cancel = asked.cancel or self._cancellation(asked, "given up")
-        self._effects.append(Publish(keys.cancel(asked.server), cancel))
+    def _withdraw(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        asked.cancel = asked.cancel or self._cancellation(asked, "given up")
+        self._send_and_repeat(asked, now, answer, is_first=True)
+
+    def _send_no_more(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+        self._deadlines.clear((_RESEND, asked.request.id))
 
     def _keep_soon(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, self._patience.first_resend)
@@ -280,6 +264,7 @@ class Asking:
 
     def _wait_grace(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_GRACE, asked.request.id), now + self._patience.grace)
+        self._send_no_more(asked, now, answer)
         if asked.cancel is None:
             self._deadlines.clear((_PATIENCE, asked.request.id))
 
@@ -336,7 +321,7 @@ class Asking:
         if server is None:
             server = self._servers[asked.server] = _Server(self._patience.pulse)
         server.kept[asked.request.id] = asked
-        server.period = max(SHORTEST_PULSE, min(server.period, asked.request.lease / 3))
+        server.period = max(SHORTEST_PULSE, min(server.period, _period(asked.request)))
         self._renew_soon(asked.server, now, server.period)
 
     def _let_go(self, asked: _Asked, now: Seconds = 0.0, answer: _Said = None) -> None:
@@ -352,13 +337,23 @@ class Asking:
             self._deadlines.set((None, name), min(inf if at is None else at, now + after))
 
     def _renew(self, name: str, now: Seconds) -> None:
-        """Send `server` a `KeepAlive`. Each wait is twice the last, up to the period: a lost change shows soon."""
+        """Send `server` a `KeepAlive`. Each wait is twice the last, up to the period: a lost change shows soon.
+
+        One that has gone gets none: what it performs ends when the lease is over that was granted before.
+        """
+        if name in self._gone:
+            return
         server = self._servers[name]
         requests = [asked.request for asked in server.kept.values()]
         kept = [Kept(kind_of(each), each.id, each.revision, each.authority, each.lease) for each in requests]
         self._effects.append(Renew(name, tuple(kept)))
         self._deadlines.set((None, name), now + server.soon)
         server.soon = min(2 * server.soon, server.period)
+
+
+def _period(request: Request) -> Seconds:
+    """Seconds between two renewals of a request: two may be late, or lost."""
+    return min(request.lease, request.unheard or inf) / 3
 
 
 def _id_taken(asked: _Asked, request: Request) -> Fault | None:
@@ -377,7 +372,8 @@ _ACTIONS: Mapping[Do, Callable[[Asking, _Asked, Seconds, _Said], None]] = {
     Do.SEND: partial(Asking._send_and_repeat, is_first=True),
     Do.SEND_AGAIN: partial(Asking._send_and_repeat, is_first=False),
     Do.SEND_ONCE: Asking._send,
-    Do.CANCEL_ONCE: Asking._cancel_once,
+    Do.WITHDRAW: Asking._withdraw,
+    Do.SEND_NO_MORE: Asking._send_no_more,
     Do.KEEP: Asking._keep,
     Do.KEEP_SOON: Asking._keep_soon,
     Do.KEEP_NOW: Asking._keep_now,

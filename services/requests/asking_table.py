@@ -14,6 +14,8 @@ class State(Name):
 
     SENT = auto()
     """The server has neither accepted nor ended it yet: it is sent again and again."""
+    HEARD = auto()
+    """The server has it, and may have begun, though it has not decided: another life must not begin it again."""
     ACCEPTED = auto()
     """The server performs it: `KeepAlive` names it."""
     WITHDRAWING = auto()
@@ -21,7 +23,8 @@ class State(Name):
     STOPPING = auto()
     """Cancelled after it was accepted."""
     GIVEN_UP = auto()
-    """The caller has been told that it failed; answers that come late are ignored."""
+    """The caller has been told that it failed. Its cancellation is sent until it is answered; other answers are
+    ignored."""
     ENDED = auto()
     """Nothing is known of it any more; or it was never sent."""
 
@@ -60,8 +63,10 @@ class Do(Name):
     """The same; the wait until the next time is twice as long."""
     SEND_ONCE = auto()
     """Publish the request; `KeepAlive` finds out whether it got there."""
-    CANCEL_ONCE = auto()
-    """Publish a cancellation without waiting for its effect."""
+    WITHDRAW = auto()
+    """Publish a cancellation, and repeat that after a while."""
+    SEND_NO_MORE = auto()
+    """Stop publishing for now: nobody would get it."""
     KEEP = auto()
     """Name the request in `KeepAlive` from now on instead of sending it again."""
     KEEP_SOON = auto()
@@ -70,6 +75,7 @@ class Do(Name):
     LET_GO = auto()
     """Name the request in `KeepAlive` no longer."""
     WAIT_GRACE = auto()
+    """Count the time that the server may be gone; nothing is sent and renewed meanwhile."""
     STOP_GRACE = auto()
     AWAIT_ANSWER = auto()
     """Count the time anew that a server that is there has for a decisive answer."""
@@ -96,7 +102,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
     S.SENT: rows(S.SENT, {
         E.ASKED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
         E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
-        E.HEARD: (S.SENT, Do.AWAIT_ANSWER),
+        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
         E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
         E.OUTDATED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
         E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
@@ -105,8 +111,23 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.BACK: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
         E.REBORN: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
         E.RESEND_DUE: (S.SENT, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.CANCEL_ONCE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.CANCEL_ONCE, Do.SWALLOW),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
+    }, E.SWALLOW_OVER),
+    S.HEARD: rows(S.HEARD, {
+        E.ASKED: (S.HEARD, Do.SEND, Do.AWAIT_ANSWER),
+        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
+        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
+        E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
+        E.OUTDATED: (S.HEARD, Do.SEND, Do.AWAIT_ANSWER),
+        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
+        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
+        E.GONE: (S.HEARD, Do.WAIT_GRACE),
+        E.BACK: (S.HEARD, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
+        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
+        E.RESEND_DUE: (S.HEARD, Do.SEND_AGAIN),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
     }, E.SWALLOW_OVER),
     S.ACCEPTED: rows(S.ACCEPTED, {
         E.ASKED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
@@ -116,8 +137,8 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
         E.GONE: (S.ACCEPTED, Do.WAIT_GRACE),
         E.BACK: (S.ACCEPTED, Do.STOP_GRACE, Do.KEEP_NOW),
-        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.CANCEL_ONCE, Do.SWALLOW),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.CANCEL_ONCE, Do.SWALLOW),
+        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
     }, E.HEARD, E.ACCEPTED, E.RESEND_DUE, E.PATIENCE_OVER, E.SWALLOW_OVER),
     S.WITHDRAWING: rows(S.WITHDRAWING, {
         E.ACCEPTED: (S.STOPPING, Do.TELL_ACCEPTED),
@@ -127,27 +148,27 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.BACK: (S.WITHDRAWING, Do.STOP_GRACE, Do.SEND),
         E.REBORN: (S.WITHDRAWING, Do.STOP_GRACE, Do.SEND),
         E.RESEND_DUE: (S.WITHDRAWING, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.CANCEL_ONCE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.SWALLOW),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.WITHDRAW, Do.SWALLOW),
     }, E.ASKED, E.CANCELLED, E.HEARD, E.OUTDATED, E.SWALLOW_OVER),
     S.STOPPING: rows(S.STOPPING, {
         E.REFUSED: (S.ENDED, Do.TELL_FORGOTTEN),
         E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
         E.GONE: (S.STOPPING, Do.WAIT_GRACE),
         E.BACK: (S.STOPPING, Do.STOP_GRACE, Do.SEND),
-        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.CANCEL_ONCE, Do.SWALLOW),
+        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
         E.RESEND_DUE: (S.STOPPING, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.CANCEL_ONCE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.SWALLOW),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.WITHDRAW, Do.SWALLOW),
     }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.SWALLOW_OVER),
     S.GIVEN_UP: rows(S.GIVEN_UP, {
-        # A server that still performs it stops when the lease is over, since nobody renews that. A cancellation for
-        # each of its messages, which it would answer in turn, would never end.
         E.REFUSED: (S.ENDED,),
         E.FINISHED: (S.ENDED,),
-        E.BACK: (S.GIVEN_UP, Do.CANCEL_ONCE),
+        E.GONE: (S.GIVEN_UP, Do.SEND_NO_MORE),
+        E.BACK: (S.GIVEN_UP, Do.WITHDRAW),
         E.REBORN: (S.ENDED,),
+        E.RESEND_DUE: (S.GIVEN_UP, Do.SEND_AGAIN),
         E.SWALLOW_OVER: (S.ENDED,),
-    }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.GONE, E.RESEND_DUE, E.GRACE_OVER, E.PATIENCE_OVER),
+    }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.GRACE_OVER, E.PATIENCE_OVER),
     S.ENDED: rows(S.ENDED, {}, *Event),
 }  # fmt: skip

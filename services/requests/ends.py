@@ -5,10 +5,8 @@ moment. What follows from each of these is in two tables (asking_table.py, servi
 follow (asking.py, serving.py). Here they meet the bus, the clock and the futures that callers await: each request has
 exactly one terminal state, whatever happens in between.
 
-A restarted server remembers nothing. What its former life had accepted fails at the requester and is not sent
-again: a robot must not say and do things twice. What had not been accepted is sent again. The gap that remains
-is an acceptance lost in the same moment as its server; its request is performed again from the start.
-A server leaves commands that it gets from history to their requester, which knows what became of them.
+A restarted server remembers nothing. What its former life had heard fails at the requester and is not sent again: a
+robot must not say and do things twice. A server leaves commands from history to their requester.
 """
 
 import asyncio
@@ -30,54 +28,32 @@ from engage_hri.schemas.faults import (
 )
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, Unreadable
+from engage_hri.schemas.requests import (
+    Accepted,
+    Answer,
+    Cancel,
+    Heard,
+    KeepAlive,
+    Outcome,
+    Refused,
+    Request,
+    Unreadable,
+)
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received
-from engage_hri.services.requests import asking, serving
+from engage_hri.services.requests import asking_effects, serving_effects
 from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_table import State
 from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.pending import Pending
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.runtime.alarm import Alarm
 
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
-
-
 _COMMANDS = (Request, KeepAlive)
-
-
-class Pending:
-    """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died or does not answer.
-
-    Cancelling a future only stops waiting; `Requester.cancel` ends the request.
-    """
-
-    def __init__(self, key: str, request: Request) -> None:
-        loop = asyncio.get_running_loop()
-        self.key = key
-        self.request = request
-        self.accepted: asyncio.Future[None] = loop.create_future()
-        self.outcome: asyncio.Future[Outcome] = loop.create_future()
-
-    @property
-    def server(self) -> str:
-        return keys.server_of(self.key)
-
-    def accept(self) -> None:
-        if not self.accepted.done():
-            self.accepted.set_result(None)
-
-    def end(self, end: Outcome | EngageError) -> None:
-        if isinstance(end, Outcome):
-            self.accept()
-            if not self.outcome.done():
-                self.outcome.set_result(end)
-            return
-        for future in (self.accepted, self.outcome):
-            if not future.done():
-                future.set_exception(end)
-                future.exception()  # marked as seen: a caller may await only one of the two
+LATE: Seconds = 0.05
+"""Lateness from which on a process was asleep on a busy machine, and the time for what came meanwhile to be heard."""
 
 
 class Requester:
@@ -111,7 +87,7 @@ class Requester:
             return self._failed(key, request, self._broken)
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
-            case [asking.TellEnd(end=EngageError() as error)]:
+            case [asking_effects.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error)
         if (pending := self._pending.get(request.id)) is None:
             pending = self._pending[request.id] = Pending(key, request)
@@ -153,20 +129,20 @@ class Requester:
     def _tick(self) -> None:
         self._carry_out(self._asking.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[asking.Effect]) -> None:
+    def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
-            if isinstance(effect, asking.Publish):
+            if isinstance(effect, asking_effects.Publish):
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
                     self._could_not_send(effect.message.id, error)
-            elif isinstance(effect, asking.TellAccepted):
+            elif isinstance(effect, asking_effects.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
                     pending.accept()
-            elif isinstance(effect, asking.TellEnd):
+            elif isinstance(effect, asking_effects.TellEnd):
                 if (ended := self._pending.pop(effect.id, None)) is not None:
                     ended.end(effect.end)
-            elif isinstance(effect, asking.Renew):
+            elif isinstance(effect, asking_effects.Renew):
                 at, name = self._bus.stamp(), self._bus.name
                 still = KeepAlive(live=effect.live, at=at, requester=name, life=self._life)
                 self._publish(keys.keep_alive(effect.server), still)
@@ -246,8 +222,9 @@ class RequestDesk:
     that. The answers carry the id that was asked with.
 
     on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
-    not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. term: the lease
-    of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
+    not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. on_hold: called
+    with the name of a request to hold, as nobody renews it, and when it ends otherwise; None: it goes on. term: the
+    lease of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
     """
 
     def __init__(
@@ -257,15 +234,18 @@ class RequestDesk:
         on_cancel: Callable[[Cancel], None],
         *,
         on_extend: Callable[[Request], None] | None = None,
+        on_hold: Callable[[str, Seconds | None], None] | None = None,
         term: Seconds | None = None,
     ) -> None:
         self._bus = bus
         self._server = server
         self._on_cancel = on_cancel
         self._on_extend = on_extend
+        self._on_hold = on_hold
         self._serving = Serving(server, term)
         self._answers = keys.request_state(server)
         self._alarm = Alarm(self._tick)
+        self._late_for: Seconds | None = None
 
     @staticmethod
     def patterns(server: str) -> tuple[str, str]:
@@ -328,6 +308,10 @@ class RequestDesk:
             return self._carry_out(self._serving.refuse(message, fault))
         return self._carry_out(self._serving.take(message, now, sender))
 
+    def hear(self, name: str) -> None:
+        """Tell the requester that it is not accepted, but may have begun: no other life is to begin it."""
+        self._answer(name, Heard(id=name))
+
     def accept(self, name: str) -> None:
         """Tell the requester that the request is being performed."""
         self._answer(name, Accepted(id=name))
@@ -345,19 +329,29 @@ class RequestDesk:
         self._carry_out(self._serving.answer(name, answer, self._bus.now()))
 
     def _tick(self) -> None:
-        self._carry_out(self._serving.tick(self._bus.now()))
+        """Carry out what is due. If this process was late for it, what came meanwhile is heard first."""
+        now, due = self._bus.now(), self._serving.deadline
+        if due is not None and now - due > LATE and due != self._late_for:
+            self._late_for = due
+            self._alarm.set(now + LATE)
+        else:
+            self._carry_out(self._serving.tick(now))
 
-    def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
+    def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
-            if isinstance(effect, serving.Publish):
+            if isinstance(effect, serving_effects.Publish):
                 self._bus.publish(self._answers, effect.answer)  # type: ignore[arg-type]
-            elif isinstance(effect, serving.Hand):
+            elif isinstance(effect, serving_effects.Hand):
                 if effect.is_asked:
                     handed = effect.request
                 else:
                     self._call_back(effect.request)
+            elif isinstance(effect, serving_effects.Hold):
+                if self._on_hold is not None:
+                    with self._bus.containing(f"request {effect.name}, which nobody renews"):
+                        self._on_hold(effect.name, effect.until)
             elif effect.is_ours:
                 self._bus.report(effect.fault)
             else:

@@ -15,10 +15,10 @@ Key = tuple[str, str, str]
 class Record:
     """One request. sender: the process that it came from. run: the requester's life by its token.
 
-    kind: of the request, or of what a cancellation ends.
+    kind: of the request, or of what a cancellation ends. is_held: the service was told to hold it.
     """
 
-    __slots__ = ("answer", "ended_at", "key", "kind", "lease", "name", "request", "run", "sender", "state")
+    __slots__ = ("answer", "ended_at", "is_held", "key", "kind", "lease", "name", "request", "run", "sender", "state")
 
     def __init__(self, name: str, request: Request, sender: str, run: str) -> None:
         self.name = name
@@ -30,6 +30,7 @@ class Record:
         self.lease = (Event.LEASE_OVER, name)
         """Name of its lease among the deadlines."""
         self.state = State.UNKNOWN
+        self.is_held = False
         self.answer: Answer | None = None
         self.ended_at: Seconds = inf
 

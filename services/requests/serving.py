@@ -35,6 +35,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.records import Key, Record, content_of, event_of, key_of
+from engage_hri.services.requests.serving_effects import Complain, Effect, Hand, Hold, Publish
 from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
 
 GRACE: Seconds = 2.0
@@ -49,36 +50,19 @@ GONE = "requester is gone"
 # Members that are used with each message: an enum is slow to look one up.
 _ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN
 _STOPPED = (State.CANCELLED, State.ENDED)
-_GRACE_OVER, _LEASE_OVER = Event.GRACE_OVER, Event.LEASE_OVER
-_DECISIONS = {Accepted: Event.ACCEPT, Refused: Event.REFUSE}
+_GRACE_OVER, _UNHEARD, _LEASE_OVER = Event.GRACE_OVER, Event.UNHEARD, Event.LEASE_OVER
+_DECISIONS = {Heard: Event.HEAR, Accepted: Event.ACCEPT, Refused: Event.REFUSE}
 """The event that an answer of the service is; every other answer is an end."""
 
 
-class Publish(Struct, frozen=True):
-    """Publish this answer."""
+class Renewal(Struct, frozen=True):
+    """Part of a `KeepAlive` about one request. sent: when it was sent, by local time."""
 
-    answer: Answer
-
-
-class Hand(Struct, frozen=True):
-    """Give this to the service: a request, new or changed, or a `Cancel`. Its `id` is its name at this server.
-
-    is_asked: the message itself has just come; otherwise it was made here, as after a lease is over.
-    """
-
-    request: Request
-    is_asked: bool
+    kept: Kept
+    sent: Seconds
 
 
-class Complain(Struct, frozen=True):
-    """Publish this fault for all to see. is_ours: it is a mistake of the service itself."""
-
-    fault: Fault
-    is_ours: bool
-
-
-Effect = Publish | Hand | Complain
-_Cause = Request | Answer | Kept | None
+_Cause = Request | Answer | Renewal | None
 """The message, or the part of a `KeepAlive`, that is the event; None with all other events."""
 
 
@@ -157,9 +141,11 @@ class Serving:
     def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds, sender: str = "") -> list[Effect]:
         """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`.
 
-        sender: as in `take`.
+        What has expired on its way, as behind a cut, is left out: a newer one follows it. sender: as in `take`.
         """
         for kept in message.live:
+            if sent + kept.valid < now:
+                continue
             record = self._known.get(((message.requester, message.life, kept.id), kept.kind))
             if record is None:
                 unknown = Cancel(id=kept.id, requester=message.requester, life=message.life, of=kept.kind)
@@ -168,7 +154,7 @@ class Serving:
                 self._warn_stranger(kept.id, "keep_alive")
                 continue
             is_newer = record.request.is_updatable and kept.revision > record.request.revision
-            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, sent, kept)
+            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, now, Renewal(kept, sent))
         return self._new_effects()
 
     def answer(self, name: str, answer: Answer, now: Seconds) -> list[Effect]:
@@ -265,8 +251,8 @@ class Serving:
         for action in actions:
             _ACTIONS[action](self, record, now, cause)
         if record.state is not before and record.state in _STOPPED:
-            self._deadlines.clear((_GRACE_OVER, record.name))
-            self._deadlines.clear(record.lease)
+            for clock in ((_GRACE_OVER, record.name), (_UNHEARD, record.name), record.lease):
+                self._deadlines.clear(clock)
             if record.state is _ENDED:
                 record.ended_at = now
                 self._ended[record.name] = record
@@ -283,20 +269,39 @@ class Serving:
 
     def _hand_extended(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Hand over the old content with new authority; the answer `Outdated` then asks for the newest content."""
-        assert isinstance(cause, Kept)
-        self._hand(record, record.request.with_authority(cause.authority))
+        assert isinstance(cause, Renewal)
+        self._hand(record, record.request.with_authority(cause.kept.authority))
 
     def _renew(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Extend the lease. A late message never shortens what a newer one has granted."""
-        term = cause.valid if isinstance(cause, Kept) else record.request.term
+        sent, term = (cause.sent, cause.kept.valid) if isinstance(cause, Renewal) else (now, record.request.term)
         if not 0.0 < term < inf:
-            if self._term is None:
-                return
-            term = self._term
-        self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, now + term))
+            term = inf if self._term is None else self._term
+        if term < inf:
+            self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, sent + term))
+        self._heard(record, sent, now)
+
+    def _heard(self, record: Record, sent: Seconds, now: Seconds) -> None:
+        """Let a request go on for as long as it may without being renewed again, from when it was renewed."""
+        unheard, clock = record.request.unheard, (_UNHEARD, record.name)
+        if not 0.0 < unheard < inf or sent + unheard <= now:
+            return
+        self._deadlines.set(clock, max(self._deadlines[clock] or 0.0, sent + unheard))
+        if record.is_held:
+            record.is_held = False
+            self._effects.append(Hold(record.name, None))
+
+    def _hold(self, record: Record, now: Seconds, cause: _Cause) -> None:
+        if record.is_held or not 0.0 < record.request.unheard < inf:
+            return
+        record.is_held = True
+        self._deadlines.clear((_UNHEARD, record.name))
+        lease = self._deadlines[record.lease]
+        self._effects.append(Hold(record.name, inf if lease is None else lease))
 
     def _wait_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
-        self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
+        if not record.request.unheard:  # else it is held meanwhile, and may take the time of its lease
+            self._deadlines.set((_GRACE_OVER, record.name), now + GRACE)
 
     def _stop_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
         self._deadlines.clear((_GRACE_OVER, record.name))
@@ -367,6 +372,7 @@ _ACTIONS: Mapping[Do, Callable[[Serving, Record, Seconds, _Cause], None]] = {
     Do.HAND_GONE: partial(Serving._hand_end, reason=GONE),
     Do.HAND_LAPSED: partial(Serving._hand_end, reason=LAPSED),
     Do.RENEW: Serving._renew,
+    Do.HOLD: Serving._hold,
     Do.WAIT_GRACE: Serving._wait_grace,
     Do.STOP_GRACE: Serving._stop_grace,
     Do.SAY_OUTDATED: Serving._say_outdated,

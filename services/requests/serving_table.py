@@ -38,8 +38,9 @@ class Event(Name):
     """A `KeepAlive` names the request, to keep it alive."""
     EXTENDED = auto()
     """A `KeepAlive` names the request, with newer content than is known here."""
+    HEAR = auto()
+    """The service itself answers, here and in the next three; here that it has begun, and will decide."""
     ACCEPT = auto()
-    """The service itself answers, here and in the next two."""
     REFUSE = auto()
     END = auto()
     GONE = auto()
@@ -48,6 +49,8 @@ class Event(Name):
     REBORN = auto()
     """The requester is there, but in another life."""
     GRACE_OVER = auto()
+    UNHEARD = auto()
+    """It has not been renewed for as long as it may go on without."""
     LEASE_OVER = auto()
 
 
@@ -64,8 +67,11 @@ class Do(Name):
     HAND_LAPSED = auto()
     """Tell the service to end the request: its lease is over."""
     RENEW = auto()
-    """Count the lease from now."""
+    """Count the lease from now, and let the service go on with what it was told to hold."""
+    HOLD = auto()
+    """Tell the service to hold what it does, if the request is of a kind that is held."""
     WAIT_GRACE = auto()
+    """Count the time that the requester may be gone, unless the request is of a kind that is held meanwhile."""
     STOP_GRACE = auto()
     SAY_OUTDATED = auto()
     """Ask the requester for the newest content."""
@@ -94,10 +100,11 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.CANCEL: (S.ENDED, Do.REFUSE_UNHEARD),
         E.NAMED: (S.UNKNOWN, Do.REFUSE_FORGOTTEN),
         E.EXTENDED: (S.UNKNOWN, Do.REFUSE_FORGOTTEN),
+        E.HEAR: (S.UNKNOWN, Do.WARN_ENDED),
         E.ACCEPT: (S.UNKNOWN, Do.WARN_ENDED),
         E.REFUSE: (S.UNKNOWN, Do.WARN_ENDED),
         E.END: (S.UNKNOWN, Do.WARN_ENDED),
-    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
+    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.TAKEN: rows(S.TAKEN, {
         E.CAME: (S.TAKEN, Do.RENEW, Do.REPEAT),
         E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
@@ -105,13 +112,15 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.CANCEL: (S.CANCELLED, Do.HAND_CANCEL),
         E.NAMED: (S.TAKEN, Do.RENEW),
         E.EXTENDED: (S.TAKEN, Do.RENEW, Do.HAND_EXTENDED, Do.SAY_OUTDATED),
+        E.HEAR: (S.TAKEN, Do.ANSWER),
         E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: (S.TAKEN, Do.WAIT_GRACE),
+        E.GONE: (S.TAKEN, Do.WAIT_GRACE, Do.HOLD),
         E.BACK: (S.TAKEN, Do.STOP_GRACE),
         E.REBORN: (S.CANCELLED, Do.HAND_GONE),
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
+        E.UNHEARD: (S.TAKEN, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
     }),
     S.ACCEPTED: rows(S.ACCEPTED, {
@@ -124,12 +133,13 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: (S.ACCEPTED, Do.WAIT_GRACE),
+        E.GONE: (S.ACCEPTED, Do.WAIT_GRACE, Do.HOLD),
         E.BACK: (S.ACCEPTED, Do.STOP_GRACE),
         E.REBORN: (S.CANCELLED, Do.HAND_GONE),
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
+        E.UNHEARD: (S.ACCEPTED, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
-    }),
+    }, E.HEAR),
     S.CANCELLED: rows(S.CANCELLED, {
         E.CAME: (S.CANCELLED, Do.REPEAT),
         E.CHANGED: (S.CANCELLED, Do.REPEAT),
@@ -138,7 +148,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.CANCELLED, Do.ANSWER),
         E.REFUSE: (S.ENDED, Do.ANSWER),
         E.END: (S.ENDED, Do.ANSWER),
-    }, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
+    }, E.HEAR, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.ENDED: rows(S.ENDED, {
         E.CAME: (S.ENDED, Do.REPEAT),
         E.CHANGED: (S.ENDED, Do.REPEAT),
@@ -149,5 +159,5 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.ACCEPT: (S.ENDED, Do.WARN_ENDED),
         E.REFUSE: (S.ENDED, Do.WARN_ENDED),
         E.END: (S.ENDED, Do.WARN_ENDED),
-    }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.LEASE_OVER),
+    }, E.HEAR, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
 }  # fmt: skip

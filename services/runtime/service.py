@@ -7,20 +7,22 @@ process, loudly.
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.bus.interface import Bus, Hub, Subscription
 
 Ready = Callable[[], None]
-Service = Callable[[Bus, Ready], Awaitable[None]]
+Service = Callable[[Bus, Ready], Coroutine[Any, Any, None]]
 """Coroutine function with its configuration bound already (`functools.partial(realize, config=...)`)."""
 
 
@@ -49,9 +51,42 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 
     bus.answer(keys.status(name), status, empty=AskStatus())
     try:
-        await service(bus, stands)
+        await _while_alone(bus, service(bus, stands))
     finally:
         await bus.leave()
+
+
+async def _while_alone(bus: Bus, work: Coroutine[Any, Any, None]) -> None:
+    """Serve until the work ends, or another service of this name has precedence. Raises InputRefused then.
+
+    One that starts while another is there is refused before it begins. So two of one name have started at once, or
+    without seeing one another, as behind a cut. Neither knows who was first; the one of the lesser run stays.
+    """
+    with bus.subscribe(keys.ANY_ALIVE) as presence:
+        serving = asyncio.ensure_future(work)
+        watching = asyncio.create_task(_rival(bus, presence), name=f"rivals of {bus.name}")
+        try:
+            await asyncio.wait((serving, watching), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            is_over = serving.done()
+            serving.cancel()
+            watching.cancel()
+            await asyncio.wait((serving, watching))
+        if is_over or not serving.cancelled():
+            serving.result()
+        elif not watching.cancelled():
+            watching.result()
+
+
+async def _rival(bus: Bus, presence: Subscription) -> None:
+    async for received in presence:
+        match received.message:
+            case PeerAlive(participant=bus.name, run=run) if run and run != bus.run:
+                where, advice = bus.name, "stop one of the two, or give it another --robot"
+                if run < bus.run:
+                    reason = f"robot {bus.robot!r} has this on the bus twice; the other one stays"
+                    raise InputRefused(Fault(reason=reason, where=where, advice=advice))
+                bus.log.warning("robot %r has %s on the bus twice; this one stays (%s)", bus.robot, where, advice)
 
 
 @cache

@@ -12,7 +12,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.holds import BodyHeld, Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent
@@ -65,6 +65,12 @@ LASTS = {"since": AT, "until": AT}
             "held: b, c: g",
         ),
         (Held(at=AT), "DEBUG", "held: nothing"),
+        (
+            BodyHeld(at=AT, holds=(Hold(block="b", behavior="g", **LASTS),)),
+            "WARNING",
+            "held, since nobody renews it: b: g",
+        ),
+        (BodyHeld(at=AT), "DEBUG", "held, since nobody renews it: nothing"),
         (FragmentOutcome(id="f", requester="me", fragment="f", status="done"), "INFO", "fragment f of me: done"),
         (
             FragmentOutcome(id="f", requester="me", fragment="f", status="interrupted", replaced_by="g"),

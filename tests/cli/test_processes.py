@@ -365,3 +365,24 @@ async def test_watch_prints_json_lines_of_a_running_system(endpoint: str, tmp_pa
         codes = [await stopped(process) for process in (watch, control, realizer)]
 
     assert codes == [0, 0, 0]
+
+
+async def test_of_two_services_of_one_name_that_are_started_at_once_exactly_one_goes_on(endpoint: str) -> None:
+    where = ("--robot", f"one-name-{os.getpid()}", "--connect", endpoint, "--mode", "client")
+    router = await start("router", "--listen", endpoint)
+    twins = []
+    try:
+        await line(router, "router is ready")
+        twins = [await start("run", "control", *where) for _ in range(2)]
+        ends = [asyncio.create_task(twin.wait()) for twin in twins]
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        loser, winner = sorted(twins, key=lambda twin: twin.returncode is None)
+        _, err = await loser.communicate()
+
+        assert loser.returncode == 2
+        assert b"has this on the bus " in err
+        assert winner.returncode is None
+    finally:
+        for process in (*twins, router):
+            await stopped(process)

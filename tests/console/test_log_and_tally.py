@@ -6,7 +6,7 @@ from rich.console import Console
 
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome
-from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.holds import BodyHeld, Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
@@ -79,6 +79,14 @@ def test_it_is_told_what_is_held_and_when_it_is_held_no_longer() -> None:
         "0:04.0  held: b: wave, for at most 60.00 s",
         "0:05.5  held: block c, for at most 60.00 s; no longer held: everything, after 12.50 s",
         "0:10.0  no longer held: b: wave, after 6.00 s; no longer held: block c, after 4.50 s",
+    ]
+
+
+def test_it_is_told_what_waits_since_nobody_renews_it() -> None:
+    waiting = BodyHeld(at=at(13.0), holds=(Hold(block="b", behavior="wave", since=at(13.0), until=at(17.0)),))
+
+    assert lines(((waiting, 13.0), (BodyHeld(at=at(14.0)), 14.0)), Telling()) == [
+        "0:03.0  ! the body holds b: wave: nobody renews it"
     ]
 
 

@@ -305,7 +305,7 @@ async def test_it_goes_home_by_itself_when_commands_stop_in_mid_behavior(hub: Me
 
         assert before[2] < 0.79
         assert tip(client)[2] == pytest.approx(0.8, abs=1e-3)
-        assert [item.status for item in client.of(BehaviorOutcome)] == ["aborted"]
+        assert [item.status for item in client.of(BehaviorOutcome)] == ["lapsed"]
 
 
 async def test_repeated_requests_keep_a_held_behavior_alive(hub: MemoryHub):

@@ -14,7 +14,7 @@ from engage_hri.schemas.messages import encode
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.requests.ends import RequestRefused
+from engage_hri.services.requests.ends import Patience, RequestRefused
 from engage_hri.services.requests.serving import GRACE
 from tests.generation.partners import TABLE, stage
 
@@ -343,7 +343,7 @@ async def test_a_dead_realizer_fails_the_fragment(hub: MemoryHub) -> None:
 
         assert isinstance(outcome, FragmentOutcome)
         assert outcome.status == "failed"
-        assert now() == GRACE
+        assert now() == Patience().grace
 
 
 async def test_a_dead_manager_ends_what_it_asked_for(hub: MemoryHub) -> None:

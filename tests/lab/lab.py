@@ -73,8 +73,7 @@ class Machine:
         self._first.kill()
         await self._first.wait()
         for process in self.processes:
-            with suppress(ProcessLookupError):
-                process.send_signal(signal.SIGCONT)  # what stands for a frozen process freezes with it
+            self._go_on(process)
             await process.wait()
         self.processes.clear()
 
@@ -91,8 +90,15 @@ class Machine:
     async def kill(self, process: Process, number: signal.Signals = signal.SIGKILL) -> None:
         """Send a signal to a process of this machine; if it is to be killed, wait until it is."""
         os.kill(_child_of(process.pid), number)  # the process itself only stands for it on the host
+        if number in (signal.SIGKILL, signal.SIGCONT):
+            self._go_on(process)
         if number == signal.SIGKILL:
             await process.wait()
+
+    def _go_on(self, process: Process) -> None:
+        """Let what stands for a process on the host go on: it stops with that, and nobody else wakes it."""
+        if process.returncode is None:
+            process.send_signal(signal.SIGCONT)
 
     async def stop(self) -> None:
         """End everything on the machine, and the machine."""

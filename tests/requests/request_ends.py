@@ -8,10 +8,10 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
-from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, life_of
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.requests import asking, serving
+from engage_hri.services.requests import asking_effects, serving, serving_effects
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
@@ -44,16 +44,18 @@ class Client:
         self.asked: list[str] = []
         self.cancelled: set[Asked] = set()
 
-    def carry_out(self, effects: list[asking.Effect]) -> None:
+    def carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:
             match effect:
-                case asking.Publish(message=message):
+                case asking_effects.Publish(message=message):
                     self.world.to_server(self, message)
-                case asking.Renew(live=live):
+                case asking_effects.Renew(live=live):
                     still = KeepAlive(live=live, at=Stamp("w", self.world.now), requester=self.name, life=self.life)
                     self.world.to_server(self, still)
-                case asking.TellEnd(id=id, end=end):
+                case asking_effects.TellEnd(id=id, end=end):
                     self.ends[id].append(end)
+                    if isinstance(end, RunFailed) and "is gone" in end.fault.reason:
+                        self.world.judge_gone(Asked(self.name, self.life, id))
         self.world.wake(self.machine.deadline, self.tick)
 
     def tick(self) -> None:
@@ -70,6 +72,7 @@ class Server:
         self.machine = Serving("realizer", 5.0)
         self.is_alive = True
         self.handed: Counter[Asked] = Counter()
+        self.handed_at: dict[Asked, float] = {}
         self.ended: dict[Asked, list[Answer]] = defaultdict(list)
         self.names: dict[str, tuple[Asked, Request]] = {}
         self.deaf: set[str] = set()
@@ -78,21 +81,21 @@ class Server:
         self.content: dict[Asked, Request] = {}
         self.mistakes: list[Fault] = []
 
-    def carry_out(self, effects: list[serving.Effect]) -> None:
+    def carry_out(self, effects: list[serving_effects.Effect]) -> None:
         for effect in effects:
             match effect:
-                case serving.Publish(answer=answer):
+                case serving_effects.Publish(answer=answer):
                     self.world.to_clients(self, answer)
-                case serving.Hand(request=Cancel() as cancel):
+                case serving_effects.Hand(request=Cancel() as cancel):
                     whose = self.names[cancel.id][0]
                     assert whose not in self.stopped, "told to stop twice"
                     self.stopped.add(whose)
                     if cancel.reason == serving.LAPSED:
                         self.lapsed.append(whose)
                     self.stop(cancel.id)
-                case serving.Hand(request=request):
+                case serving_effects.Hand(request=request):
                     self.begin(request)
-                case serving.Complain(fault=fault, is_ours=True):
+                case serving_effects.Complain(fault=fault, is_ours=True):
                     self.mistakes.append(fault)
         self.world.wake(self.machine.deadline, self.tick)
 
@@ -106,6 +109,7 @@ class Server:
         self.names[request.id] = (whose, original)
         self.content[whose] = request
         self.handed[whose] += 1
+        self.handed_at[whose] = self.world.now
         chance, world = self.world.chance, self.world
         if chance.random() < 0.1:
             world.later(

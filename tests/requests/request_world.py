@@ -13,9 +13,9 @@ from msgspec import structs
 from engage_hri.schemas.faults import EngageError, RunFailed
 from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Kept, Outcome, Refused, Request, kind_of
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.requests import asking
+from engage_hri.services.requests import asking, asking_effects
 from engage_hri.services.requests.asking import NeverEnded, RequestRefused
-from engage_hri.services.requests.serving import Complain
+from engage_hri.services.requests.serving_effects import Complain
 from tests.requests.request_ends import REQUESTS, Asked, Client, Server
 
 CALM = 150.0
@@ -45,6 +45,8 @@ class World:
         self.clients: dict[str, Client] = {}
         self.all_clients: list[Client] = []
         self.sent = 0
+        self.missed_at: dict[str, float] = {}
+        """When the server last missed the token of each client."""
         if is_fair:
             self.start_server()
         for name in ("ann", "bob"):
@@ -158,12 +160,21 @@ class World:
                 self.later(self.chance.uniform(0.0, 0.2), lambda client=client: self.tell_client(client, server.run))  # type: ignore[misc]
 
     def flap(self, name: str) -> None:
-        """The link is cut for so long that its token goes, and comes back with the same life."""
+        """The link is cut for so long that its token goes, and comes back with the same life.
+
+        One end finds it dead up to the lease of a silent link later than the other.
+        """
         server, client = self.server, self.clients[name]
         if server is None:
             return
         self.cut.add(name)
-        server.carry_out(server.machine.requester_gone(name, self.now))
+
+        def missed() -> None:
+            if self.server is server and self.clients[name] is client and name in self.cut:
+                self.missed_at[name] = self.now
+                server.carry_out(server.machine.requester_gone(name, self.now))
+
+        self.later(self.chance.uniform(0.0, 1.9), missed)
         client.carry_out(client.machine.server_gone("realizer", self.now))
 
         def back() -> None:
@@ -188,7 +199,7 @@ class World:
         if is_new:
             client.asked.append(id)
         elif was is not None and type(was) is not type(request(id)):
-            assert isinstance(effects[0], asking.TellEnd)  # refused by name, and the live one goes on
+            assert isinstance(effects[0], asking_effects.TellEnd)  # refused by name, and the live one goes on
             return
         elif client.machine.state(id) is asking.State.GIVEN_UP:
             return
@@ -295,6 +306,15 @@ class World:
         for whose, _ in self.server.names.values():
             if whose[:2] not in lives:
                 assert whose in self.server.stopped | self.server.ended.keys(), "performed for the dead"
+
+    def judge_gone(self, asked: Asked) -> None:
+        """Who is told that the server is gone is not told it while that still performs the request.
+
+        What was on its way as the server missed the client has a lease, and is not counted.
+        """
+        server, missed = self.server, self.missed_at.get(asked.client, 0.0)
+        if server is not None and server.handed_at.get(asked, self.now) < missed < self.now:
+            assert asked in server.stopped | server.ended.keys(), f"{asked} goes on after it was told to have failed"
 
     def _judge_end(self, asked: Asked, end: Outcome | EngageError) -> None:
         """A caller is told an outcome only if a service has ended this very request with it."""

@@ -14,7 +14,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Request
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
-from engage_hri.services.requests.ends import RequestDesk, Requester, RequestRefused
+from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, RequestRefused
 from engage_hri.services.requests.serving import ENDED_KEPT, GRACE
 from tests.bus.performer import Server, answered, bare, block, extent
 from tests.commanding import command, key_of
@@ -122,7 +122,7 @@ async def test_a_killed_server_fails_the_request_after_the_grace(hub: MemoryHub)
         with pytest.raises(RunFailed, match="realizer is gone"):
             await pending.outcome
 
-    assert asyncio.get_running_loop().time() == 1.0 + GRACE
+    assert asyncio.get_running_loop().time() == 1.0 + Patience().grace
 
 
 async def test_a_restarted_server_does_not_perform_again_what_it_had_accepted(hub: MemoryHub):

@@ -4,6 +4,7 @@ from importlib.metadata import version
 import pytest
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.status import AskStatus, Status
@@ -78,3 +79,21 @@ async def test_a_service_answers_how_it_is_before_and_after_it_stands(hub: Memor
     assert early.bus.peers == ("other",)
     assert late.bus.peers == ("other", "worker")
     assert (early.bus.overflowed, late.bus.overflowed) == (0, 3)
+
+
+@pytest.mark.parametrize("is_other_first", [True, False])
+async def test_of_two_services_with_one_name_that_started_at_once_one_is_refused(
+    hub: MemoryHub, is_other_first: bool
+) -> None:
+    serving = asyncio.create_task(serve(hub, "control", stand_late))
+    await asyncio.sleep(3.0)
+    run = "" if is_other_first else "~"
+    hub.announce("control", PeerAlive(participant="control", run=f"{run}0"))
+    await asyncio.sleep(0.1)
+    assert serving.done() == is_other_first
+    if is_other_first:
+        with pytest.raises(InputRefused, match="control: robot 'robot' has this on the bus twice"):
+            await serving
+    serving.cancel()
+    await asyncio.gather(serving, return_exceptions=True)
+    assert "control" not in hub.alive

@@ -33,6 +33,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
     utterance = utter(behavior.text, pace)
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
     unwatch = authority.watch(bell.ring)
+    is_silent = False
     try:
         for progress in _score(behavior, utterance):
             while not bell.is_past(begin + progress.at) and authority.revoked is None:
@@ -42,6 +43,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
                 while authority.held and authority.revoked is None:
                     await bell.wait(inf)
                     begin = bell.now() - progress.at
+                    is_silent = authority.revoked is not None
                 continue
             if isinstance(progress, Reached) and progress.sync in gaps and not authority.covers(progress.sync):
                 yield Arrived(progress.sync, arrived)
@@ -49,11 +51,12 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
                     await bell.wait(inf)
                 at = bell.now()
                 begin += at - arrived
+                is_silent = authority.revoked is not None
             if authority.revoked is not None:
                 break
             yield Reached(progress.sync, at, arrived) if isinstance(progress, Reached) else replace(progress, at=at)
         since = bell.now() - begin
-        for word in utterance.words:
+        for word in () if is_silent else utterance.words:
             if authority.revoked is not None and word.start + ROUNDING < since < word.end - ROUNDING:
                 while not bell.is_past(begin + word.end):
                     await bell.wait(begin + word.end)

@@ -141,6 +141,9 @@ class BehaviorRun:
             block.lose(self.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
             return
         block.spoken.end(outcome)
+        if outcome.status == "lapsed":  # the body has gone home: nothing of this block can be as planned
+            block.lose_body(outcome.fault or Fault(reason="nobody has renewed it", where=block.plan.block.id))
+            return
         facts, end = block.decisions.facts, Point(self.id, sync_points(behavior)[-1])
         at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
         if outcome.status == "taken_over":  # its last report may be lost

@@ -7,6 +7,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import GoHome, PerformBehavior, PlannedInstant
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.requests.ends import Pending, Requester
 
@@ -21,11 +22,12 @@ class ControlLink:
     the behavior's, so that no two are alike. Ids of behaviors hold no colon.
     """
 
-    def __init__(self, bus: Bus, requests: Requester, request: str, block: str) -> None:
+    def __init__(self, bus: Bus, requests: Requester, request: str, block: str, config: RealizerConfig) -> None:
         self._bus = bus
         self._requests = requests
         self._request = request
         self._block = block
+        self._held_after = config.held_after
 
     def id(self, behavior: str) -> str:
         """Id of the request for a behavior, to whatever service performs it."""
@@ -41,6 +43,7 @@ class ControlLink:
             through=asked.through.partition(":")[0],  # without the number of a repeated stroke
             pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
             held=isinstance(asked, Extend) and asked.held,
+            held_after=self._held_after,
         )
         return self._requests.send(keys.BEHAVIOR, perform)
 

@@ -57,7 +57,7 @@ class BlockPerformance:
         self._requests = shared.requests
         self._config = shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
-        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id)
+        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
         self._held = held
         self._is_held = is_held

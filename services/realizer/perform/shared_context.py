@@ -6,6 +6,7 @@ from typing import Protocol
 
 from msgspec import Struct
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Bus, Containing
@@ -16,7 +17,7 @@ from engage_hri.services.requests.ends import Requester
 
 
 class Presence:
-    """Participants that are on the bus. changed: resolved at the next change."""
+    """Services that are, or were, on the bus; not managers: ever new ones come. changed: at the next change."""
 
     def __init__(self) -> None:
         self._there: set[str] = set()
@@ -25,6 +26,8 @@ class Presence:
         self.changed: asyncio.Future[None] = self._loop.create_future()
 
     def feed(self, message: PeerAlive | PeerGone) -> None:
+        if message.participant not in keys.SERVICES:
+            return
         now, before = (self._there, self._left) if isinstance(message, PeerAlive) else (self._left, self._there)
         now.add(message.participant)
         before.discard(message.participant)

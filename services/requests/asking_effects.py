@@ -1,0 +1,42 @@
+"""Effects of the asking side of long requests: what it wants published, or told to the caller. Pure."""
+
+from msgspec import Struct
+
+from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.requests import Kept, Outcome, Request
+
+
+class Publish(Struct, frozen=True):
+    """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
+
+    expression: str
+    message: Request
+
+
+class Renew(Struct, frozen=True):
+    """Send `server` a `KeepAlive` for these requests."""
+
+    server: str
+    live: tuple[Kept, ...]
+
+
+class TellAccepted(Struct, frozen=True):
+    """Tell the caller that the server has accepted the request."""
+
+    id: str
+
+
+class TellEnd(Struct, frozen=True):
+    """Tell the caller how the request has ended. There is exactly one for each request."""
+
+    id: str
+    end: Outcome | EngageError
+
+
+class Complain(Struct, frozen=True):
+    """Publish this fault for all to see."""
+
+    fault: Fault
+
+
+Effect = Publish | Renew | TellAccepted | TellEnd | Complain

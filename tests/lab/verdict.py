@@ -1,0 +1,149 @@
+"""What the records of processes say of a run in which something broke. Pure: it reads events, and nothing of ours."""
+
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+Event = Mapping[str, Any]
+"""A line of a record (recorded.py): `t`, `process`, `what`, and more."""
+Seconds = float
+NO_END = ("Accepted", "Refused")
+"""Answers that are no outcome: one life of a server may refuse what another has performed."""
+
+
+class Span(NamedTuple):
+    """Times between which a fault lasted. began: when it was put in force. healed: when it was over."""
+
+    began: Seconds
+    healed: Seconds
+
+
+class Motion(NamedTuple):
+    """How the body took a fault, in seconds after it began; None: it did not come to that.
+
+    held: it told that it holds. quiet: the last word's end. still: no joint moved.
+    """
+
+    held: Seconds | None
+    quiet: Seconds | None
+    still: Seconds | None
+
+
+def spoken_twice(events: Iterable[Event], manager: str) -> list[str]:
+    """Words that were said more than once for one life of the manager. A new one asks for all of it anew."""
+    said, life = Counter[tuple[str, str, str, int]](), ""
+    for each in events:
+        if each["what"] == "asked" and each["service"] == manager:
+            life = each["process"]
+        elif each["what"] == "word":
+            said[life, each["block"], each["behavior"], each["position"]] += 1
+    return [
+        f"{block}:{behavior} at {position}" for (_, block, behavior, position), times in said.items() if times > 1
+    ]
+
+
+def doubled(events: Iterable[Event]) -> list[str]:
+    """Requests with two different outcomes."""
+    ends = defaultdict[str, set[str]](set)
+    for each in events:
+        if each["what"] == "answer" and each["status"] not in NO_END:
+            ends[each["whose"]].add(each["status"])
+    return [f"{whose}: {', '.join(sorted(told))}" for whose, told in ends.items() if len(told) > 1]
+
+
+def unanswered(events: Iterable[Event], living: Collection[str], before: Seconds) -> list[str]:
+    """Requests of living processes that were made before some time and of which the caller knows no end yet."""
+    asked = dict[tuple[str, str], Seconds]()
+    for each in events:
+        if each["what"] == "asked" and each["process"] in living:
+            asked[each["process"], each["whose"]] = each["t"]
+        elif each["what"] == "told":
+            asked.pop((each["process"], each["whose"]), None)
+    return [whose for (_, whose), at in asked.items() if at < before]
+
+
+def calm_ago(now: Seconds, faults: Sequence[Span], seconds: Seconds) -> Seconds:
+    """The time since which so many seconds have passed with nothing broken: a request waits for its server."""
+    at, left = now, seconds
+    for span in reversed(faults):
+        if (calm := max(0.0, at - span.healed)) >= left:
+            break
+        at, left = span.began, left - calm
+    return at - left
+
+
+def sees(events: Iterable[Event], process: str) -> dict[str, Seconds]:
+    """Participants that a process sees after these events, and since when."""
+    seen = dict[str, Seconds]()
+    for each in events:
+        if each["process"] == process and each["what"] in ("sees", "misses"):
+            if each["what"] == "misses":
+                seen.pop(each["name"], None)
+            else:
+                seen.setdefault(each["name"], each["t"])
+    return seen
+
+
+def performed_at(events: Iterable[Event], control: str, at: Seconds) -> set[str]:
+    """Behaviors, by their requests, that the body performed at some time."""
+    live = set[str]()
+    for each in events:
+        is_its = each["process"] == control and each["what"] == "answer" and each["t"] <= at
+        if is_its and "|perform_behavior|" in each["whose"]:
+            (live.add if each["status"] == "Accepted" else live.discard)(each["whose"])
+    return live
+
+
+def motion(events: Sequence[Event], control: str, span: Span) -> Motion:
+    """How the body took a fault, while it lasted."""
+    its = [each for each in events if each["process"] == control and span.began <= each["t"] <= span.healed]
+    live = {whose.rpartition("/")[2] for whose in performed_at(events, control, span.began)}
+    holds = (each for each in its if each["what"] == "held" and live & set(map(_behavior, each["behaviors"])))
+    held = next((each["t"] for each in holds), None)
+    until = next((each["t"] for each in its if held and each["t"] > held and _goes_on(each)), None) or span.healed
+    quiet = [each["at"] for each in its if each["what"] == "word" and each["t"] < until]
+    still = [each["since"] for each in its if each["what"] == "still" and each["t"] < until]
+    return Motion(
+        None if held is None else held - span.began,
+        max(quiet) - span.began if quiet else None,
+        max(0.0, max(still) - span.began) if still else None,
+    )
+
+
+def _behavior(label: str) -> str:
+    return label.partition(":")[2]
+
+
+def _goes_on(event: Event) -> bool:
+    return bool(event["what"] == "held" and not event["behaviors"])
+
+
+def unheld(events: Sequence[Event], control: str, span: Span, within: Seconds) -> list[str]:
+    """Behaviors that went on although they had to be held within so many seconds of the fault."""
+    due = span.began + within
+    if span.healed < due:
+        return []
+    going_on = performed_at(events, control, span.began) & performed_at(events, control, due)
+    held = {
+        _behavior(behavior)
+        for each in events
+        if each["process"] == control and each["what"] == "held" and span.began <= each["t"] <= due
+        for behavior in each["behaviors"]
+    }
+    return [whose for whose in going_on if whose.rpartition("/")[2] not in held]
+
+
+def groundless(events: Iterable[Event], faults: Collection[tuple[Seconds, Seconds]]) -> list[str]:
+    """Holds that came while nothing was broken. faults: since when until when something was."""
+    holds = [each for each in events if each["what"] == "held" and each["behaviors"]]
+    calm = [each for each in holds if not any(since <= each["t"] <= to for since, to in faults)]
+    return [f"{', '.join(each['behaviors'])} at {each['t']:.1f}" for each in calm]
+
+
+def shares(values: Iterable[Seconds | None]) -> str:
+    """The distribution of values: least, median, 90 %, 99 %, most."""
+    known = sorted(each for each in values if each is not None)
+    if not known:
+        return "none"
+    at = [known[min(len(known) - 1, round(share * (len(known) - 1)))] for share in (0.0, 0.5, 0.9, 0.99, 1.0)]
+    return f"{len(known)}: " + " / ".join(f"{each:.2f}" for each in at) + " s"
