@@ -118,3 +118,19 @@ def test_who_is_slower_for_others_is_expected_with_them_or_as_late_as_it_can_be(
 
     assert outlook.apart(Point("w", "end"), ORIGIN) == 1.5
     assert outlook.apart(Point("s", "m"), ORIGIN) == comes
+
+
+def test_what_a_hold_has_cost_is_not_known_before_all_that_was_on_its_way_has_come() -> None:
+    made = plan(block((Speech(id="s", text="so"),)), elastic("s", ("start", "end"), 5.0, 5.0, 5.0))
+    decisions = Decisions(made, 0.0, RealizerConfig())
+    list(decisions.advance(0.0))
+    decisions.reach(Point("s", "start"), 0.0)
+    for is_held, at in ((True, 1.0), (False, 2.0)):
+        decisions.hold_up(is_held, at)
+        decisions.hold(None if is_held else (), at)
+    list(decisions.advance(2.0 + 2 * STANDING))
+    assert decisions.held_up.has_effect
+
+    decisions.reach(Point("s", "end"), 6.0)
+    list(decisions.advance(6.0))
+    assert not decisions.held_up.has_effect

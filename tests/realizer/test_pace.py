@@ -9,6 +9,7 @@ from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
+from engage_hri.services.realizer.foresee.foresight import differ_noticeably
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point
@@ -208,6 +209,24 @@ def test_only_who_can_be_faster_is_told_to_hurry() -> None:
     assert (made.dropped, decisions.advance(0.0)) == ((), [Begin("s", "end")])  # at its own pace
     assert decisions.foresight.forecast is not None
     assert [decisions.foresight.forecast.is_hurried(id) for id in "sp"] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "differ"),
+    [
+        ({}, {}, False),
+        ({}, {"end": 2.0}, True),
+        ({"end": 2.0}, {}, True),
+        ({"end": 2.0}, {"end": 2.015625}, False),
+        ({"end": 2.0}, {"end": 2.03125}, True),
+        ({"relax": 1.0}, {"relax": 1.0, "end": 2.0}, True),
+        ({"relax": 1.0, "end": 2.0}, {"end": 2.0}, False),  # that one has been
+    ],
+)
+def test_a_pace_is_told_again_if_more_than_a_fiftieth_of_a_second_is_other_than_before(
+    one: dict[str, float], other: dict[str, float], *, differ: bool
+) -> None:
+    assert differ_noticeably(tuple(one.items()), tuple(other.items())) == differ
 
 
 class OneJoint(FakeBody):

@@ -1,6 +1,7 @@
 """From block to plan: what constraints mean, what is refused with place and line, what is dropped."""
 
 import json
+from itertools import accumulate
 
 import pytest
 from msgspec.structs import replace
@@ -28,7 +29,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
-from tests.realizer.fake_body import FakeBody
+from tests.realizer.fake_body import FakeBody, natural_durations, points_of
 from tests.realizer.stage import after, before, block, together
 
 GAZE = Gaze(id="g", target="can")
@@ -161,6 +162,17 @@ def test_what_the_body_cannot_do_is_dropped() -> None:
 
     assert [(each.kind, each.behavior) for each in made.problems] == [("NO_SUCH_TARGET", "p")]
     assert at(made, "s:start") == 0.0
+
+
+@pytest.mark.parametrize(
+    "behavior", [GAZE, POINT, SPEECH, Head(id="n", lexeme="NOD"), FaceLexeme(id="f", lexeme="SMILE")]
+)
+def test_alone_a_behavior_takes_as_long_from_point_to_point_as_the_body_says(behavior: BlockBehavior) -> None:
+    """Also where that is no time at all: the point after that comes no earlier."""
+    made = plan(block((behavior,)))
+
+    expected = list(accumulate(natural_durations(behavior), initial=0.0))
+    assert [at(made, f"{behavior.id}:{sync}") for sync in points_of(behavior)] == expected
 
 
 @pytest.mark.parametrize("behavior", [GAZE, POINT, SPEECH, Head(id="n", lexeme="NOD", repetition=2)])
