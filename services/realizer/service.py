@@ -28,7 +28,7 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
-from engage_hri.services.realizer.perform.live import Ending, Live
+from engage_hri.services.realizer.perform.live import Ending, Live, told
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance
@@ -224,7 +224,7 @@ class _Realizer:
             return await self.planning.again(plan, live.elsewhere)
         except EngageError as error:
             self._warn(live, error)
-            live.fail(live.told(error.fault))
+            live.fail(error.fault)
             return plan
 
     def _send_home(self, live: Live, replaced: list[BlockPerformance]) -> None:
@@ -240,14 +240,14 @@ class _Realizer:
         kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
         block = live.request.block
         warning = WarningFeedback(
-            block=block.id or None, kind=kind, message=str(live.told(error.fault)), character_id=block.character_id
+            block=block.id or None, kind=kind, message=str(told(error.fault)), character_id=block.character_id
         )
         self.bus.publish(keys.FEEDBACK, warning)
 
     def _refuse(self, live: Live, error: EngageError) -> None:
         self._warn(live, error)
-        live.fail(fault := live.told(error.fault))
-        self.desk.refuse(live.request.id, fault)
+        live.fail(error.fault)
+        self.desk.refuse(live.request.id, told(error.fault))
         self._forget(live)
 
     async def _end(self, live: Live, outcome: BlockOutcome) -> None:

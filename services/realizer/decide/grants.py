@@ -16,6 +16,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.foresee.foresight import Foresight
 from engage_hri.services.realizer.net.facts import Facts
+from engage_hri.services.realizer.net.petri_net import Place
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
@@ -181,8 +182,27 @@ class Grants(Observer):
         if known is None or known.state != state or any(number in instants for number in known.held):
             unfired = (each for each in enumerate(self._plan.members) if each[0] not in instants)
             first = {number for number, members in unfired if any(map(self._is_held, members))}
-            known = self._stuck_at = _Stuck(state, first, self._plan.net.later(first))
+            known = self._stuck_at = _Stuck(state, first, self._later(first))
         return known.instants
+
+    def _later(self, first: set[int]) -> set[int]:
+        """These instants and those that wait for them; what follows a behavior only if that itself waits there."""
+        net = self._plan.net
+        series = [place for place in net.places if place.after]
+        found = net.later(first, of_instants=True)
+        while more := {each.target for each in series if self._waits_before(each, found)} - found:
+            found = net.later(found | more, of_instants=True)
+        return found
+
+    def _waits_before(self, place: Place, stuck: Container[int]) -> bool:
+        """True if the behavior of whose token a place waits does not get there before what is held goes on."""
+        if (chain := self._plan.chains.get(place.after)) is None:
+            return place.source in stuck
+        at, number = self._plan.at, self._facts.next_number(place.after)
+        ahead = [point for point in chain.points[number:] if at[point] <= place.source]
+        if not ahead or self._facts.is_held(place.after):
+            return bool(ahead)
+        return any(at[point] in stuck and self._net.part_of[point].can_wait for point in ahead)
 
     def _reached_of(self, held: Collection[str] | None) -> int:
         """Number of points of these behaviors (None: of all) that are reached."""

@@ -68,8 +68,11 @@ class Forecast(LongestPaths):
             self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
         self._elsewhere: dict[int, int] = {}
         """For each instant with points of other blocks, the arc that keeps it no earlier than those blocks expect."""
+        self._awaited: dict[int, list[str]] = {}
+        """For each instant, the behaviors of other blocks that have yet to pass it."""
         for point in plan.foreign:
             transition = plan.at[point]
+            self._awaited.setdefault(transition, []).append(point.behavior)
             if transition not in self._elsewhere:
                 node = self._new_node()
                 self.times[node] = began
@@ -132,6 +135,10 @@ class Forecast(LongestPaths):
     def passed(self, behavior: str, transition: int, at: Seconds) -> None:
         """Note that the behavior has passed its point there; the others of the instant perhaps not yet."""
         self.come(behavior, transition, at)
+        if behavior in (awaited := self._awaited.get(transition, [])):
+            awaited.remove(behavior)
+            if not awaited:
+                self.foresee(transition, self._there[transition])  # All have come: it is no more what was expected.
         for each in self._after.pop((behavior, transition), ()):
             self._moved.setdefault((transition, self._arcs[each].target), []).append(each)
             self._start_from(self._new_node(), each, at)

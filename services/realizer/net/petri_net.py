@@ -80,9 +80,12 @@ class PetriNet(Struct, frozen=True, dict=True):
     places: tuple[Place, ...]
     bounds: tuple[Bound, ...] = ()
 
-    def later(self, sources: Iterable[int]) -> set[int]:
-        """Transitions that come after one of these, and these."""
-        return _reachable(self, sources, forward=True)
+    def later(self, sources: Iterable[int], *, of_instants: bool = False) -> set[int]:
+        """Transitions that come after one of these, and these.
+
+        of_instants: without what comes after a behavior that passes one, not after the instant itself.
+        """
+        return _reachable(self, sources, forward=True, is_of_instants=of_instants)
 
     @cached_property
     def initial(self) -> Marking:
@@ -189,7 +192,7 @@ def is_safe(net: PetriNet) -> bool:
     return not open_places and is_live(net)
 
 
-def _reachable(net: PetriNet, starts: Iterable[int], *, forward: bool) -> set[int]:
+def _reachable(net: PetriNet, starts: Iterable[int], *, forward: bool, is_of_instants: bool = False) -> set[int]:
     """Transitions of `starts`, and those on paths from or to them through places without a token at rest."""
     found = set(starts)
     todo = list(found)
@@ -199,7 +202,7 @@ def _reachable(net: PetriNet, starts: Iterable[int], *, forward: bool) -> set[in
             if not net.initial[number]:
                 place = net.places[number]
                 there = place.target if forward else place.source
-                if there not in found:
+                if there not in found and not (is_of_instants and place.after):
                     found.add(there)
                     todo.append(there)
     return found

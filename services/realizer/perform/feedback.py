@@ -20,6 +20,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.lateness import Late
+from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.plan.relations import at_line
@@ -156,7 +157,7 @@ class Reporter:
         warning = WarningFeedback(
             block=self._block,
             kind=kind,
-            message=message,
+            message=as_told(message),
             behavior=behavior,
             at=self._bus.stamp(self._no_earlier(self._bus.now())),
             character_id=self._character,

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
+from engage_hri.services.realizer.perform.live_blocks import as_told
 
 Status = Literal["done", "failed", "interrupted"]
 
@@ -20,6 +21,12 @@ class Ending(Struct, frozen=True):
     status: Status
     fault: Fault | None = None
     replaced_by: str = ""
+
+
+def told(fault: Fault) -> Fault:
+    """The fault with the ids of blocks for their names."""
+    texts = {"reason": fault.reason, "where": fault.where, "advice": fault.advice}
+    return replace(fault, **{field: as_told(text) for field, text in texts.items()})
 
 
 class Live:
@@ -53,11 +60,6 @@ class Live:
             if leader.ending.done():
                 self._end_with(leader)
 
-    def told(self, fault: Fault) -> Fault:
-        """The fault as the block's manager is told it: with the block's id for its name."""
-        is_named = fault.where.startswith(self.block.id)
-        return replace(fault, where=self.id + fault.where.removeprefix(self.block.id)) if is_named else fault
-
     def settle(self) -> None:
         """Let blocks that came later be planned."""
         self.is_planning = False
@@ -73,7 +75,7 @@ class Live:
         """End it now, as the first call says. Its followers end at once, before they hear what is lost."""
         if self.ending.done():
             return
-        self.ending.set_result(ending)
+        self.ending.set_result(replace(ending, fault=None if ending.fault is None else told(ending.fault)))
         todo = deque([self])
         while todo:
             leader = todo.popleft()

@@ -1,9 +1,9 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
 
+import re
 from collections import Counter, deque
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
-from itertools import chain, count
 from math import inf
 from typing import Protocol
 
@@ -18,6 +18,19 @@ from engage_hri.services.realizer.points import EPSILON, Point
 MOST_TELLINGS = 20
 """Most changes of one expected time that are told in a row. Blocks that wait for each other, by a tie and by a part
 that changes hands, may never agree on a time; they go on when something is measured."""
+
+
+LIFE = "\u2063"
+"""An invisible separator: in the name of a block, between its id and a number. No text that is told has it."""
+
+
+_LIVES = re.compile(rf"(?:{LIFE}|\\u2063)[0-9]+")
+"""The end of a name, also where the name was quoted."""
+
+
+def as_told(text: str) -> str:
+    """A text with the ids of blocks for their names."""
+    return _LIVES.sub("", text)
 
 
 class TiedBlock(Protocol):
@@ -112,9 +125,8 @@ class LiveBlocks:
                 follower.miss(f"{name}:{id}" for id in ends)
 
     def _free_name(self, id: str) -> str:
-        taken = self._tracked.keys() | self._ended.keys()
-        others = (f"{id[: LONGEST_ID - 9]}#{number}" for number in count(2))
-        return next(name for name in chain((id,), others) if name not in taken)
+        is_free = id not in self._tracked and id not in self._ended
+        return id if is_free else f"{id[: LONGEST_ID - 16]}{LIFE}{self._count}"
 
     def _free_names(self) -> None:
         """Free the names of blocks that have ended before any of the live ones came."""

@@ -5,15 +5,16 @@ from collections.abc import Mapping
 from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetTransition
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net.petri_net import Marking
+from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.points import FINISH
+from engage_hri.services.realizer.points import FINISH, Point
 
 
 def described(plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Seconds]) -> NetPlanned:
     """The net of a plan with its tokens. began: when the block started. fired: transitions, seconds after that."""
     transitions = [
         NetTransition(
-            points=tuple(NetPoint(behavior=point.behavior, sync=point.sync) for point in each.points or (FINISH,)),
+            points=tuple(map(_point, each.points or (FINISH,))),
             time=time,
         )
         for each, time in zip(plan.net.transitions, plan.schedule, strict=True)
@@ -30,6 +31,10 @@ def described(plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Se
         marked=tokens(marking),
         fired=firings(fired),
     )
+
+
+def _point(point: Point) -> NetPoint:
+    return NetPoint(behavior=as_told(point.behavior), sync=point.sync)
 
 
 def tokens(marking: Marking) -> tuple[int, ...]:

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import Block, BlockOutcome, SpokenText
 from engage_hri.schemas.faults import Fault
+from engage_hri.services.realizer.perform.live_blocks import as_told
 
 _BEHAVIORS = ("BEHAVIOR_TYPE_NOT_SUPPORTED", "CUSTOM_BEHAVIOR_NOT_SUPPORTED")
 """Kinds of the notes about behaviors without an id, which no list of a block's behaviors has."""
@@ -31,7 +32,7 @@ def completed(
         fault=nothing or ended.fault,
         spoken=spoken,
         dropped=tuple(dropped),
-        reasons=tuple(dropped.values()),
+        reasons=tuple(map(as_told, dropped.values())),
         interrupted=tuple([id for id in lost if id in interrupted]),
     )
 
@@ -48,4 +49,4 @@ def _nothing_performed(block: Block, dropped: Mapping[str, str], id: str) -> Fau
         return None
     left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
     whys = [*(f"{id}: {why.removeprefix(f'{id}: ')}" if why else id for id, why in dropped.items()), *left_out]
-    return Fault(reason=f"no behavior of it came to its end ({'; '.join(whys)})", where=id)
+    return Fault(reason=as_told(f"no behavior of it came to its end ({'; '.join(whys)})"), where=id)

@@ -361,7 +361,7 @@ class BlockPerformance:
         try:
             plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, known=self.ties.known())
         except InputRefused as error:
-            self._live.fail(self._live.told(error.fault))
+            self._live.fail(error.fault)
             return
         before = self.decisions.plan.given_up
         self.decisions.replan(plan)
