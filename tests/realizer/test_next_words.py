@@ -55,12 +55,7 @@ def test_a_look_comes_with_a_stroke_of_another_block_that_is_overdue(sync: str) 
     look = f'<gaze id="k" target="cup" stroke="b:g:{sync}"/>'
     deeds = (
         Deed(0.0, "perform", "b", f'<bml id="b" xmlns="org.mindmakers.bml"><gesture id="g" {RIGHT}/></bml>'),
-        Deed(
-            0.1,
-            "perform",
-            "c",
-            f'<bml id="c" xmlns="org.mindmakers.bml"><gaze id="k" target="cup" stroke="b:g:{sync}"/></bml>',
-        ),
+        Deed(0.1, "perform", "c", f'<bml id="c" xmlns="org.mindmakers.bml">{look}</bml>'),
     )
     late = {"stall": [{"part": "right_arm", "before": "stroke_start", "seconds": 2.0}]}
     came = times(playing.play(Story(deeds, faults=late)))
