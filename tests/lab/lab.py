@@ -36,6 +36,10 @@ def missing(*spaces: str) -> str:
     return ""
 
 
+PATHS = {"PYTHONPATH": os.pathsep.join(filter(None, (str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH"))))}
+"""Where programs on a machine find the tests' own modules: they begin in the root folder."""
+
+
 class Machine:
     """One machine: processes, a network and a boot of its own. It shares the files of the host.
 
@@ -82,7 +86,7 @@ class Machine:
         inside = ("nsenter", "--target", str(self._init), "--net", "--mount", "--uts", "--pid")
         inside += ("--time",) if self.ahead else ()
         process = await asyncio.create_subprocess_exec(
-            *inside, *command, env=dict(os.environ) | dict(env or {}), start_new_session=True, **files
+            *inside, *command, env=os.environ | PATHS | dict(env or {}), start_new_session=True, **files
         )
         self.processes.append(process)
         return process
