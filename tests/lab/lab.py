@@ -36,7 +36,8 @@ def missing(*spaces: str) -> str:
     return ""
 
 
-PATHS = {"PYTHONPATH": os.pathsep.join(filter(None, (str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH"))))}
+_ROOT = str(Path(__file__).parents[2])
+PATHS = {"PYTHONPATH": os.pathsep.join(filter(None, (_ROOT, os.environ.get("PYTHONPATH"))))}
 """Where programs on a machine find the tests' own modules: they begin in the root folder."""
 
 
