@@ -186,7 +186,7 @@ class Grants(Observer):
         return known.instants
 
     def _later(self, first: set[int]) -> set[int]:
-        """Instants of `first`, and those that wait for them; what follows a behavior only if that waits there itself."""
+        """Instants of `first`, and those that wait for them; what follows a behavior that goes on does not."""
         net = self._plan.net
         series = [place for place in net.places if place.after]
         found = net.later(first, of_instants=True)
