@@ -98,37 +98,30 @@ class Do(Name):
 Row = tuple[State, tuple[Do, ...]]
 
 S, E = State, Event
+
+
+def undecided(state: State, reborn: tuple[State, *tuple[Do, ...]]) -> Mapping[Event, Row]:
+    """Rows of a request that is on its way and not decided. reborn: what another life of the server changes."""
+    return rows(state, {
+        E.ASKED: (state, Do.SEND, Do.AWAIT_ANSWER),
+        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
+        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
+        E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
+        E.OUTDATED: (state, Do.SEND, Do.AWAIT_ANSWER),
+        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
+        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
+        E.GONE: (state, Do.WAIT_GRACE),
+        E.BACK: (state, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
+        E.REBORN: reborn,
+        E.RESEND_DUE: (state, Do.SEND_AGAIN),
+        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
+    }, E.SWALLOW_OVER)  # fmt: skip
+
+
 TABLE: Mapping[State, Mapping[Event, Row]] = {
-    S.SENT: rows(S.SENT, {
-        E.ASKED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
-        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
-        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
-        E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
-        E.OUTDATED: (S.SENT, Do.SEND, Do.AWAIT_ANSWER),
-        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
-        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
-        E.GONE: (S.SENT, Do.WAIT_GRACE),
-        E.BACK: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
-        E.REBORN: (S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
-        E.RESEND_DUE: (S.SENT, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
-    }, E.SWALLOW_OVER),
-    S.HEARD: rows(S.HEARD, {
-        E.ASKED: (S.HEARD, Do.SEND, Do.AWAIT_ANSWER),
-        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
-        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
-        E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
-        E.OUTDATED: (S.HEARD, Do.SEND, Do.AWAIT_ANSWER),
-        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
-        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
-        E.GONE: (S.HEARD, Do.WAIT_GRACE),
-        E.BACK: (S.HEARD, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
-        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
-        E.RESEND_DUE: (S.HEARD, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
-    }, E.SWALLOW_OVER),
+    S.SENT: undecided(S.SENT, reborn=(S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER)),
+    S.HEARD: undecided(S.HEARD, reborn=(S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW)),
     S.ACCEPTED: rows(S.ACCEPTED, {
         E.ASKED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
         E.CANCELLED: (S.STOPPING, Do.LET_GO, Do.SEND, Do.AWAIT_END),

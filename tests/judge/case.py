@@ -42,7 +42,7 @@ class Done(Struct, frozen=True):
 
 
 PART_OF = {
-    "speech": "voice", "gesture": "arm", "pointing": "arm", "gaze": "eyes", "gazeShift": "eyes",
+    "speech": "voice", "gesture": "arm", "pointing": "arm", "head": "nodding", "gaze": "eyes", "gazeShift": "eyes",
     "headDirectionShift": "eyes", "face": "face", "faceLexeme": "face", "faceFacs": "face", "faceShift": "face",
     "posture": "torso", "postureShift": "torso",
 }  # fmt: skip

@@ -12,7 +12,7 @@ from itertools import combinations
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
-from tests.judge.case import Case, Done, Finding
+from tests.judge.case import PART_OF, Case, Done, Finding
 from tests.judge.reading import SHIFTS, WITH_STROKE
 
 POINTING_RADIUS = 0.05
@@ -242,14 +242,7 @@ def _parts(done: Done) -> set[str]:
     type, hand = done.asked.type, done.asked.hand
     if type in ("pointing", "gesture"):
         return {f"{side} arm" for side in ARMS if hand in (side, "both")}
-    return {_PART[type]} if type in _PART else set()
-
-
-_PART = {
-    "speech": "voice", "head": "nodding", "gaze": "eyes", "gazeShift": "eyes", "headDirectionShift": "eyes",
-    "face": "face", "faceLexeme": "face", "faceFacs": "face", "faceShift": "face", "posture": "torso",
-    "postureShift": "torso",
-}  # fmt: skip
+    return {PART_OF[type]} if type in PART_OF else set()
 
 
 def _is_beneath(case: Case, span: Span) -> bool:

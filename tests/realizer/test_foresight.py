@@ -131,24 +131,28 @@ async def test_nobody_is_late_for_a_look_that_another_block_has_ended() -> None:
     assert seen.warnings() == []
 
 
+class Link:
+    """A block that expects its own end a second after that of the block it is tied to."""
+
+    def __init__(self, block: str, live_blocks: LiveBlocks) -> None:
+        self.block = block
+        self.live_blocks = live_blocks
+        self.told: list[float] = []
+
+    def foresee(self, point: Point, at: float) -> None:
+        self.told.append(at)
+        self.live_blocks.foresee(self.block, {Point("s", "end"): at + 1.0})
+
+    def hear(self, point: Point, at: float) -> None:
+        raise AssertionError
+
+    def miss(self, behaviors: object) -> None:
+        """The end of the test."""
+
+
 def test_foresight_goes_through_a_chain_of_any_length() -> None:
-    class Link:
-        def __init__(self, block: str) -> None:
-            self.block = block
-            self.told: list[float] = []
-
-        def foresee(self, point: Point, at: float) -> None:
-            self.told.append(at)
-            live_blocks.foresee(self.block, {Point("s", "end"): at + 1.0})
-
-        def hear(self, point: Point, at: float) -> None:
-            raise AssertionError
-
-        def miss(self, behaviors: object) -> None:
-            """The end of the test."""
-
     live_blocks = LiveBlocks()
-    links = [Link(f"b{number}") for number in range(2000)]
+    links = [Link(f"b{number}", live_blocks) for number in range(2000)]
     with ExitStack() as live:
         for number, link in enumerate(links):
             live.enter_context(live_blocks.opened(block((WORDS,), id=link.block)))
@@ -163,23 +167,8 @@ def test_foresight_goes_through_a_chain_of_any_length() -> None:
 def test_blocks_that_never_agree_on_a_time_are_told_twenty_times_and_go_on_with_what_is_measured() -> None:
     """Each expects its end a second after the other's. The next news from outside starts them anew."""
 
-    class Rival:
-        def __init__(self, block: str) -> None:
-            self.block = block
-            self.told: list[float] = []
-
-        def foresee(self, point: Point, at: float) -> None:
-            self.told.append(at)
-            live_blocks.foresee(self.block, {Point("s", "end"): at + 1.0})
-
-        def hear(self, point: Point, at: float) -> None:
-            raise AssertionError
-
-        def miss(self, behaviors: object) -> None:
-            """The end of the test."""
-
     live_blocks = LiveBlocks()
-    one, two = Rival("one"), Rival("two")
+    one, two = Link("one", live_blocks), Link("two", live_blocks)
     with ExitStack() as live:
         for rival in (one, two):
             live.enter_context(live_blocks.opened(block((WORDS,), id=rival.block)))

@@ -10,9 +10,10 @@ from engage_hri.schemas.behaviors import Gesture, Head, Speech
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.schemas.nets import NetPlanned
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.requests.ends import Pending
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
-from tests.realizer.puppet import bml, puppet
+from tests.realizer.puppet import Puppet, bml, puppet
 from tests.realizer.stage import Stage, block, stage
 from tests.realizer.test_sharing import instants, mispredicted
 
@@ -74,6 +75,16 @@ async def test_who_is_told_the_same_takeover_again_is_not_planned_again() -> Non
 ARM = '<gesture id="q" lexeme="BEAT" mode="RIGHT_HAND"/>'
 
 
+async def second_while_first_is_being_ended(body: Puppet, first: Pending, second: Pending) -> None:
+    """Perform the second block while the first still has its behavior, and then let that end."""
+    async with asyncio.timeout(5.0):
+        await body.do("q", "start", "end", every=1.0, block="two")
+    assert not first.outcome.done()
+    await second.outcome
+    body.end("q", "aborted", block="one")
+    await first.outcome
+
+
 @pytest.mark.parametrize(
     "document",
     [ARM, ARM.replace("/>", ' start="0"/>'), '<speech id="q"><text>so</text></speech>'],
@@ -88,12 +99,7 @@ async def test_what_a_block_that_is_being_ended_had_planned_counts_no_more(docum
         body.requests.cancel("r-one")
         await body.until(lambda: body.aborted)
         second = body.ask(bml(document, id="two"))
-        async with asyncio.timeout(5.0):
-            await body.do("q", "start", "end", every=1.0, block="two")
-        assert not first.outcome.done()
-        await second.outcome
-        body.end("q", "aborted", block="one")
-        await first.outcome
+        await second_while_first_is_being_ended(body, first, second)
 
     assert body.time("q:start", "two") == 0.0
     assert body.warnings() == []
@@ -109,12 +115,7 @@ async def test_who_is_to_begin_while_another_block_is_being_ended_is_not_planned
         second = body.ask(bml(ARM.replace("/>", ' start="3"/>'), id="two"))
         await second.accepted
         body.requests.cancel("r-one")
-        async with asyncio.timeout(5.0):
-            await body.do("q", "start", "end", every=1.0, block="two")
-        assert not first.outcome.done()
-        await second.outcome
-        body.end("q", "aborted", block="one")
-        await first.outcome
+        await second_while_first_is_being_ended(body, first, second)
 
     assert body.time("q:start", "two") == 3.0
     assert body.warnings() == []
