@@ -251,11 +251,14 @@ class _Realizer:
         self._forget(live)
 
     async def _end(self, live: Live, outcome: BlockOutcome) -> None:
-        """Send the outcome; if the block ended with one that it follows, after that: its outcome is the cause."""
+        """Send the outcome, as the last word about the block: that it is no longer held comes before.
+
+        If the block ended with one that it follows, after that one's: its outcome is the cause.
+        """
         if live.ended_by is not None:
             await asyncio.wait([live.ended_by.ended])
-        self.desk.end(outcome)
         self._forget(live)
+        self.desk.end(outcome)
 
     def _forget(self, live: Live) -> None:
         del self.live[live.request.id]

@@ -5,7 +5,6 @@ import os
 import select
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from itertools import count
@@ -24,6 +23,8 @@ from engage_hri.services.commandline.certificates import initialize
 from tests.bus.places import OWN_ADDRESS, PATIENCE, free_endpoint
 
 PEM = serialization.Encoding.PEM
+AGAIN = 2.0
+"""Seconds after which a command without an answer is sent again."""
 
 
 class Told:
@@ -127,19 +128,34 @@ class Fortress:
     def settle(self, session: zenoh.Session | None = None) -> None:
         """Wait until both servers of a manager have had all that was sent so far: they answer what comes after it."""
         for server in ("generation", "realizer"):
-            id = f"settle-{next(self._numbers)}"
-            self.command(self.alice, f"{server}/manager/alice/cancel", type="cancel", id=id)
-            self.wait(lambda id=id: any(getattr(message, "id", "") == id for _, message, _ in self.seen), id)
+            self.ask(f"{server}/manager/alice/cancel", type="cancel", id=f"settle-{next(self._numbers)}")
+
+    def ask(self, where: str, **content: object) -> None:
+        """Command as alice, again and again until there is an answer, as a program of others should."""
+        for _ in range(int(PATIENCE / AGAIN)):
+            self.command(self.alice, where, **content)
+            if self.holds(lambda: self.answers(str(content["id"])), AGAIN):
+                return
+        raise AssertionError(f"{content} was not answered: {[message for _, message, _ in self.seen[-20:]]}")
 
     def command(self, session: zenoh.Session, where: str, **content: object) -> None:
-        session.put(f"{keys.PREFIX}/cmd/{where}", json.dumps(content), encoding="application/json")
+        # Else Zenoh drops what cannot leave within a millisecond, as on a busy machine.
+        block = zenoh.CongestionControl.BLOCK
+        key = f"{keys.PREFIX}/cmd/{where}"
+        session.put(key, json.dumps(content), encoding="application/json", congestion_control=block)
 
     def wait(self, holds: Any, what: str) -> None:
         """Wait until this is true of what was seen; the witness hears on another thread."""
-        for _ in _moments():
+        if not self.holds(holds, PATIENCE):
+            raise AssertionError(f"{what} did not come: {[message for _, message, _ in self.seen[-20:]]}")
+
+    def holds(self, holds: Any, patience: float) -> bool:
+        """Tell whether this comes true within some seconds. Looks every 20 ms."""
+        for _ in range(int(patience / 0.02)):
             if holds():
-                return
-        raise AssertionError(f"{what} did not come: {[message for _, message, _ in self.seen[-20:]]}")
+                return True
+            select.select([], [], [], 0.02)
+        return False
 
     def logged(self, *words: str) -> None:
         """Wait for a line in the log of the services with all these words."""
@@ -184,10 +200,3 @@ _OWN = (("certificate", "certificate.pem"), ("private_key", "private.pem"))
 
 def _block(message: Message) -> str:
     return str(getattr(message, "block", "") or getattr(message, "fragment", ""))
-
-
-def _moments() -> Iterator[None]:
-    """Look again every 20 ms, until it is too late."""
-    for _ in range(int(PATIENCE / 0.02)):
-        yield
-        select.select([], [], [], 0.02)

@@ -49,7 +49,7 @@ def _unharmed(robot: Fortress, request: pytest.FixtureRequest) -> Iterator[None]
     """After each attack the robot does what a manager asks."""
     yield
     id = f"after-{request.node.name}"
-    robot.command(robot.alice, "generation/manager/alice/fragment", **fragment(id, "well"))
+    robot.ask("generation/manager/alice/fragment", **fragment(id, "well"))
     robot.wait(lambda: ended(robot, id), id)
     assert ended(robot, id) == "done"
 
@@ -195,7 +195,7 @@ def test_a_manager_who_deletes(robot: Fortress) -> None:
 def test_a_manager_who_cancels_anothers_fragment(robot: Fortress) -> None:
     """A manager cancels the fragment of another, on the other's key and on the own one."""
     bob = robot.session("bob")
-    robot.command(robot.alice, "generation/manager/alice/fragment", **fragment("precious", "one two three four five"))
+    robot.ask("generation/manager/alice/fragment", **fragment("precious", "one two three four five"))
     robot.wait(lambda: any(isinstance(each, Accepted) for each in robot.answers("precious")), "accepted")
     cancel = {"type": "cancel", "id": "precious", "life": "1", "of": "perform_fragment", "requester": "alice"}
     robot.command(bob, "generation/manager/alice/cancel", **cancel)
@@ -222,7 +222,7 @@ def test_a_manager_in_anothers_name(robot: Fortress) -> None:
 def test_a_manager_who_plays_back_anothers_command(robot: Fortress) -> None:
     """A manager plays back a command of another, as it was recorded."""
     bob, id, key = robot.session("bob"), "played-back", keys.command(keys.FRAGMENT, "manager", "alice")
-    robot.command(robot.alice, "generation/manager/alice/fragment", **fragment(id))
+    robot.ask("generation/manager/alice/fragment", **fragment(id))
     robot.wait(lambda: ended(robot, id), "the end")
     bob.put(key, pack(fragment(id)), encoding="application/msgpack")
     robot.router.expect(f"denied: robot/manager/bob may not put robot/{key}")
@@ -273,7 +273,7 @@ def test_a_manager_who_answers_for_control(robot: Fortress) -> None:
     bob = robot.session("bob")
     bob.declare_queryable(keys.ESTIMATE, zenoh.handlers.Callback(asked.append, indirect=False))
     robot.router.expect(f"denied: robot/manager/bob may not declare queryable robot/{keys.ESTIMATE}")
-    robot.command(robot.alice, "generation/manager/alice/fragment", **fragment("estimated"))
+    robot.ask("generation/manager/alice/fragment", **fragment("estimated"))
     robot.wait(lambda: ended(robot, "estimated"), "the end")
     assert not asked
 
@@ -287,7 +287,7 @@ def test_a_viewer_who_overhears_commands(robot: Fortress) -> None:
     viewer.get(everything, zenoh.handlers.Callback(heard.append, indirect=False))
     for what in ("declare subscriber", "query"):
         robot.router.expect(f"denied: robot/observer/viewer may not {what} robot/{everything}")
-    robot.command(robot.alice, "generation/manager/alice/fragment", **fragment("secret"))
+    robot.ask("generation/manager/alice/fragment", **fragment("secret"))
     robot.wait(lambda: ended(robot, "secret"), "the end")
     assert not [each for each in heard if isinstance(each, zenoh.Sample) or each.ok]  # type: ignore[attr-defined]
 

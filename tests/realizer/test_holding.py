@@ -18,6 +18,7 @@ from engage_hri.schemas.blocks import (
     PerformBlock,
     Steer,
 )  # fmt: skip
+from engage_hri.schemas.holds import Held
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import steering
 from engage_hri.services.realizer.perform.holding import Holds
@@ -126,6 +127,20 @@ async def test_stopped_is_interrupted_and_tells_what_was_said() -> None:
     assert isinstance(outcomes[1], BlockOutcome)
     assert [(each.text, each.complete) for each in outcomes[1].spoken] == [("one", False)]
     assert after_that.status == "done"
+
+
+async def test_that_a_stopped_block_is_no_longer_held_is_told_before_its_outcome() -> None:
+    async with stage() as seen:
+        with seen.hub.join("watcher").subscribe(keys.HELD, keys.request_state("realizer")) as inbox:
+            seen.ask(block((STORY,)))
+            await asyncio.sleep(1.2)
+            await steered(seen, "hold", "b")
+            await steered(seen, "stop", "b")
+            told = [received.message for _ in range(len(inbox)) if (received := await inbox.next())]
+
+    of_it = [each for each in told if isinstance(each, Held | BlockOutcome)]
+    assert [type(each) for each in of_it[-3:]] == [Held, Held, BlockOutcome]
+    assert [bool(each.holds) for each in of_it[-3:] if isinstance(each, Held)] == [True, False]
 
 
 async def test_a_behavior_that_is_stopped_is_interrupted_and_its_block_is_done() -> None:
