@@ -2,7 +2,6 @@
 
 import asyncio
 import random
-from itertools import count
 
 import pytest
 from hypothesis import given, settings
@@ -14,11 +13,8 @@ from engage_hri.schemas.blocks import (
     Block,
     BlockOutcome,
     InterruptBehavior,
-    PerformanceSteered,
     PerformBlock,
-    Steer,
 )  # fmt: skip
-from engage_hri.schemas.holds import Held
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import steering
 from engage_hri.services.realizer.perform.holding import Holds
@@ -26,21 +22,14 @@ from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
-from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
-from tests.realizer.steering import steer
+from tests.realizer.stage import FakeRecognition, after, block, stage, together
+from tests.realizer.steering import steered
 from tests.realizer.test_properties import blocks
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
 """Takes 2.25 s: 0.5, 0.25, 0.5, 0.25, 0.25, 0.5."""
 STORY = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)))
 """A second to each mark."""
-NUMBERS = count()
-
-
-async def steered(seen: Stage, to: Steer, block: str = "", behavior: str = "") -> tuple[str, ...]:
-    outcome = await seen.requests.send(*steer(f"steer-{next(NUMBERS)}", to, block, behavior)).outcome
-    assert isinstance(outcome, PerformanceSteered)
-    return outcome.blocks
 
 
 @pytest.mark.parametrize("name", ["", "b"])
@@ -111,47 +100,6 @@ async def test_to_continue_the_robot_lets_everything_go_and_to_continue_a_block_
         await asyncio.gather(one.outcome, two.outcome)
 
     assert seen.warnings() == []
-
-
-async def test_stopped_is_interrupted_and_tells_what_was_said() -> None:
-    async with stage() as seen:
-        one, two = seen.ask(block((BEAT,), id="one")), seen.ask(block((STORY,), id="two"))
-        await asyncio.sleep(1.2)
-        await steered(seen, "hold")
-        await asyncio.sleep(1.0)
-        assert await steered(seen, "stop") == ("one", "two")
-        outcomes = [await one.outcome, await two.outcome]
-        after_that = await seen.perform(block((BEAT,), id="three"))
-
-    assert [getattr(each, "status", "") for each in outcomes] == ["interrupted", "interrupted"]
-    assert isinstance(outcomes[1], BlockOutcome)
-    assert [(each.text, each.complete) for each in outcomes[1].spoken] == [("one", False)]
-    assert after_that.status == "done"
-
-
-async def test_that_a_stopped_block_is_no_longer_held_is_told_before_its_outcome() -> None:
-    async with stage() as seen:
-        with seen.hub.join("watcher").subscribe(keys.HELD, keys.request_state("realizer")) as inbox:
-            seen.ask(block((STORY,)))
-            await asyncio.sleep(1.2)
-            await steered(seen, "hold", "b")
-            await steered(seen, "stop", "b")
-            told = [received.message for _ in range(len(inbox)) if (received := await inbox.next())]
-
-    of_it = [each for each in told if isinstance(each, Held | BlockOutcome)]
-    assert [type(each) for each in of_it[-3:]] == [Held, Held, BlockOutcome]
-    assert [bool(each.holds) for each in of_it[-3:] if isinstance(each, Held)] == [True, False]
-
-
-async def test_a_behavior_that_is_stopped_is_interrupted_and_its_block_is_done() -> None:
-    async with stage() as seen:
-        performing = seen.ask(block((BEAT, STORY)))
-        await asyncio.sleep(0.2)
-        assert await steered(seen, "stop", "b", "beat") == ("b",)
-        outcome = await performing.outcome
-
-    assert isinstance(outcome, BlockOutcome)
-    assert (outcome.status, outcome.interrupted) == ("done", ("beat",))
 
 
 async def test_what_is_held_for_too_long_is_stopped() -> None:
