@@ -5,6 +5,7 @@ Property tests try the same examples each time. To search for new ones: `pytest 
 
 import asyncio
 import logging
+import os
 import signal
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 
@@ -30,6 +31,11 @@ LONGEST_TEST = 24 * 3600.0
 
 def virtual_loop() -> asyncio.AbstractEventLoop:
     return VirtualTimeLoop(limit=LONGEST_TEST)
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One worker more than processors: many tests wait for processes of their own."""
+    return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1) + 1
 
 
 def pytest_configure(config: pytest.Config) -> None:
