@@ -33,6 +33,7 @@ def virtual_loop() -> asyncio.AbstractEventLoop:
     return VirtualTimeLoop(limit=LONGEST_TEST)
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One worker more than processors: many tests wait for processes of their own."""
     return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1) + 1
