@@ -324,7 +324,7 @@ async def test_futures_outlive_the_net_and_are_resolved_once() -> None:
     other.start(5.0)
     for point, at in ((start, 5.0), (end, 6.0), (Point("w", "start"), 6.0)):
         other.reach(point, at)
-    other.observers = (futures,)
+    other.observe((futures,))
     futures.adopt(other)
     assert early.result() == 6.0
     assert waiting.result() == 2.0

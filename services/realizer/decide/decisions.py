@@ -45,6 +45,8 @@ class Decisions:
         self.foresight = Foresight(plan, self.facts)
         self.grants = Grants(self.facts, self.foresight, config, is_free)
         self.lateness_watch = LatenessWatch(config)
+        self._unwatched: set[str] = set()
+        """Behaviors about which there is news, so that another report of theirs is to be expected than before."""
         self.held_up = HeldUp()
         self._observers = observers
         self.replan(plan)
@@ -61,7 +63,7 @@ class Decisions:
         self.grants.adopt(plan, net)
         self.facts.adopt(net, {id: chain.points for id, chain in plan.chains.items()})
         self.foresight.prolong()
-        net.observers += tuple(self._observers(plan, net, self.began))
+        net.observe(self._observers(plan, net, self.began))
         for behavior in self.facts.begun:
             if behavior not in plan.chains:
                 self.lateness_watch.forget(behavior)
@@ -77,7 +79,7 @@ class Decisions:
         if isfinite(at) and self.facts.is_ahead(point) and point not in self.facts.arrived:
             self.foresight.learn(point, self.facts.bounded(point, at))
             self.facts.arrive(point, at)
-            self._watch(point.behavior, at)
+            self._unwatched.add(point.behavior)
 
     def reach(self, point: Point, at: Seconds) -> tuple[Point, ...]:
         """Note that the behavior has passed `point`, and earlier ones that were not reported; returns what is news.
@@ -89,7 +91,7 @@ class Decisions:
         if not self.facts.holds(point):
             self.foresight.learn(point, self.facts.bounded(point, at))
         news = self.facts.reach(point, at)
-        self._watch(point.behavior, at)
+        self._unwatched.add(point.behavior)
         self.grants.look_again(point.behavior)
         self.foresight.expect_next(point.behavior)
         return news
@@ -132,7 +134,7 @@ class Decisions:
         effects: list[Effect] = []
         for behavior in changed:
             effects.append(self._command(behavior, self.grants.through(behavior), now))
-            self._watch(behavior, now)
+            self._unwatched.add(behavior)
         for transition in range(len(self.plan.members)):
             self.grants.on_opened(transition)
         return effects
@@ -174,6 +176,9 @@ class Decisions:
         effects = self._effects(self._decide(now, only_measured=False), now)
         if self.held_up.has_effect and self.held_up.is_settled(now, self._under_way()):
             self.held_up.settle(self.foresight.outlook(now))
+        for behavior in sorted(self._unwatched):
+            self._watch(behavior, now)
+        self._unwatched.clear()
         return [*effects, *self.lateness_watch.overdue(now)]
 
     def _conclude(self, now: Seconds) -> None:
@@ -205,7 +210,7 @@ class Decisions:
             through = self.grants.extend(behavior, now)
             pace = self.foresight.paces[behavior] = self.foresight.pace(behavior, now, self.grants.may_pass)
             effects.append(Begin(behavior, self.plan.chains[behavior].points[through].sync, pace))
-            self._watch(behavior, now)
+            self._unwatched.add(behavior)
         return effects
 
     def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
@@ -215,7 +220,7 @@ class Decisions:
         after = self.foresight.pace(behavior, now, self.grants.may_pass)
         if through > known or differ_noticeably(before, after):
             self.foresight.paces[behavior] = after
-            self._watch(behavior, now)
+            self._unwatched.add(behavior)
             yield self._command(behavior, through, now)
 
     def _command(self, behavior: str, through: int, now: Seconds) -> Extend:

@@ -117,6 +117,8 @@ class Grants(Observer):
 
     def take(self, *, only_measured: bool) -> list[int]:
         """The instants to be decided. only_measured: without those that it takes a forecast to decide."""
+        if not self._dirty:
+            return []
         taken = {each for each in self._dirty if not (only_measured and self._foresight.minds(each))}
         self._dirty -= taken
         return sorted(taken)

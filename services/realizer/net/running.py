@@ -11,7 +11,7 @@ ripe when the behavior holds at the end of the phase. A `handover` place is not 
 has gone home by itself, and a token that comes too late is taken at once.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
 
 from engage_hri.schemas.units import Seconds
@@ -63,7 +63,12 @@ class RunningNet:
         self.passed: dict[int, Seconds] = {}
         self.at = at
         self._members = members
-        self.observers = tuple(observers)
+        self._on_began: list[Callable[[str, Seconds], None]] = []
+        self._on_arrived: list[Callable[[Point, Seconds], None]] = []
+        self._on_reached: list[Callable[[Point, Seconds], None]] = []
+        self._on_opened: list[Callable[[int], None]] = []
+        self._on_fired: list[Callable[[int, Seconds], None]] = []
+        self.observe(observers)
         self._tokens = bytearray(RIPE * count for count in net.initial)
         self._before: dict[int, int] = {}
         """Places whose token was put or taken since `changes` was asked last, with what was there then."""
@@ -125,6 +130,21 @@ class RunningNet:
         self.end = size - 1
         self._before_end = self._leading_to_end()
         self._lacking[self.end] = self._missing[self.end] = len(self._before_end)
+
+    def observe(self, observers: Iterable[Observer]) -> None:
+        """Tell these, too, what happens from now on."""
+        for each in observers:
+            kind = type(each)  # Most are told of two or three events: no time is spent on the others.
+            if kind.on_began is not Observer.on_began:
+                self._on_began.append(each.on_began)
+            if kind.on_arrived is not Observer.on_arrived:
+                self._on_arrived.append(each.on_arrived)
+            if kind.on_reached is not Observer.on_reached:
+                self._on_reached.append(each.on_reached)
+            if kind.on_opened is not Observer.on_opened:
+                self._on_opened.append(each.on_opened)
+            if kind.on_fired is not Observer.on_fired:
+                self._on_fired.append(each.on_fired)
 
     def _leading_to_end(self) -> set[int]:
         """The transitions that the end of the block waits for: all but ends of events that may outlast it."""
@@ -191,8 +211,8 @@ class RunningNet:
 
     def begin(self, behavior: str, at: Seconds) -> None:
         """Note that a behavior was told to begin."""
-        for observer in self.observers:
-            observer.on_began(behavior, at)
+        for tell in self._on_began:
+            tell(behavior, at)
         for transition in self._stations.get(behavior, ()):
             self._lack_less(transition)
 
@@ -202,15 +222,15 @@ class RunningNet:
             return
         if (place := self._into.get((point.behavior, transition))) is not None and self._tokens[place]:
             self._set(place, RIPE)
-        for observer in self.observers:
-            observer.on_arrived(point, at)
+        for tell in self._on_arrived:
+            tell(point, at)
 
     def reach(self, point: Point, at: Seconds) -> None:
         """Move the token of a behavior that has passed `point`, and fire what has everything then."""
         if (transition := self.at.get(point)) is None:
             return
-        for observer in self.observers:
-            observer.on_reached(point, at)
+        for tell in self._on_reached:
+            tell(point, at)
         if self.part_of[point].point == point:
             here = (point.behavior, transition)
             if (place := self._into.get(here)) is not None:
@@ -254,8 +274,8 @@ class RunningNet:
     def _lack_less(self, transition: int) -> None:
         self._lacking[transition] -= 1
         if not self._lacking[transition]:
-            for observer in self.observers:
-                observer.on_opened(transition)
+            for tell in self._on_opened:
+                tell(transition)
 
     def _miss_less(self, transition: int, at: Seconds) -> None:
         """Note that something has come to `transition`; fire it, and all that follows, if that was the last."""
@@ -276,8 +296,8 @@ class RunningNet:
         for place in self._inputs[transition]:
             if self.net.places[place].source not in self.instants or self.net.places[place].kind != "idle":
                 self._set(place, EMPTY)
-        for observer in self.observers:
-            observer.on_fired(transition, at)
+        for tell in self._on_fired:
+            tell(transition, at)
         for place in self._outputs[transition]:
             self._put(place, at)
         if transition in self._before_end:
