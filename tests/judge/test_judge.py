@@ -17,6 +17,7 @@ from tests.judge.laws_time import EXACT, misses
 from tests.judge.reading import Place, Term, read, term
 from tests.judge.shrinking import shrink
 from tests.judge.story import Deed, Story
+from tests.judge.story import read as story_of
 
 ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
@@ -91,6 +92,13 @@ def test_these_stories_break_no_law(kind: Kind) -> None:
         found += [f"{story.seed}: {each}" for each in judge(story, playing.play(story, asks=kind == "sentences"))]
 
     assert found == []
+
+
+@pytest.mark.parametrize("folder", sorted((Path(__file__).parent / "stories").iterdir()), ids=lambda each: each.name)
+def test_what_once_broke_a_law_breaks_none(folder: Path) -> None:
+    story = story_of(folder)
+
+    assert [each for each in judge(story, playing.play(story)) if each.law in ENFORCED] == []
 
 
 def test_the_list_of_laws_that_are_enforced_names_laws() -> None:

@@ -366,7 +366,8 @@ class BlockPerformance:
         before = self.decisions.plan.given_up
         self.decisions.replan(plan)
         self.ties.renew()
-        for id in self._dropped:  # Told only now that the block goes on: its followers would end with it.
+        # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.
+        for id in tuple(self._dropped):
             self._shared.live_blocks.lose(self.plan.block.id, id)
         self.report.unkept(plan)
         for id, given_up in plan.given_up.items():
