@@ -14,16 +14,18 @@ from engage_hri.services.runtime.service import Ready, Service, running
 async def play_tangram(config: Config, sinks: Iterable[Sink]) -> None:
     """Run all services until the task is over. sinks: get all messages, with instants of this loop."""
     finished = asyncio.Event()
-
-    def ending(service: Service) -> Service:
-        async def collaborate(bus: Bus, ready: Ready) -> None:
-            await service(bus, ready)
-            finished.set()
-
-        return collaborate
-
     async with MemoryHub(config.robot, decodes=False) as hub:
         services = {name: roster.service(name, config) for name in roster.NAMES}
-        services["collaboration"] = ending(services["collaboration"])
+        services["collaboration"] = ending(services["collaboration"], finished)
         async with following(hub.join("console"), sinks), running(hub, services):
             await finished.wait()
+
+
+def ending(service: Service, finished: asyncio.Event) -> Service:
+    """Make the service set `finished` when it ends by itself."""
+
+    async def serve(bus: Bus, ready: Ready) -> None:
+        await service(bus, ready)
+        finished.set()
+
+    return serve

@@ -1,41 +1,56 @@
-"""Command `engage up`: run the services as processes on this machine, supervised until Ctrl-C."""
+"""Command `engage up`: run the services on this machine until Ctrl-C, as processes or all in this one."""
 
 import asyncio
 import sys
-from collections.abc import Iterable
+from collections.abc import AsyncIterator, Iterable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 from rich.console import Console
 from rich.text import Text
 
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import mode_of
+from engage_hri.services.bus.interface import Hub
+from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, scene_view
 from engage_hri.services.commandline.options import Listening, Simulated, Written
 from engage_hri.services.commandline.outputs import Outputs
-from engage_hri.services.commandline.process import DONE, forever, run_until_signal
+from engage_hri.services.commandline.process import DONE, run_until_signal
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.commandline.run import ready_line
 from engage_hri.services.commandline.supervisor import Child, supervised
+from engage_hri.services.commandline.tangram import ending
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import following
+from engage_hri.services.runtime.service import Service, running
 
 WITHOUT_TASK = ("simulation.human=attentive",)
 """Setting without the task: a person who reacts to the robot."""
+TASK = "collaboration"
+"""Service that ends by itself, with the task."""
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Written, Simulated, Listening):
     task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False
+    in_one: Annotated[
+        bool,
+        typer.Option("--in-one", help="All services in this process: lighter, but one that crashes ends all."),
+    ] = False
 
 
 def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
     config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
+    if options.in_one and config.bus.keys:
+        reason = "one process has the keys of one holder, and may do what that one may"
+        raise InputRefused(Fault(reason=reason, where="--in-one", advice="leave it out, or the keys"))
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         run_until_signal(_up(options, config, outputs, console))
@@ -43,6 +58,8 @@ def main(options: Options) -> int:
 
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
+    # Loaded before there is a bus: messages would wait for that.
+    services = {name: roster.service(name, config) for name in _names(options)} if options.in_one else {}
     # Our own session comes first and stays, for children find one another through it, and may crash.
     async with await options.open(config.bus, "up", options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
@@ -50,27 +67,33 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
         bus = claim.bus
         tallying = Tallying(bus.now())
         live = options.task and console.is_terminal and not options.quiet
-        arrivals = Arrivals(_names(options), console)
-        children = _children(options, config, console, arrivals)
         with scene_view(console, config.robot, bus.now(), live) as show:
             sinks = (show, tallying, outputs) if options.task else (outputs,)
-            async with following(bus, sinks), supervised(children), asyncio.TaskGroup() as group:
-                holding = group.create_task(claim.held_until(arrivals.complete), name="claim")
-                if options.task:
-                    await children["collaboration"].ended.wait()
-                else:
-                    await forever()
+            serving = in_one(services, hub, console) if services else _each(options, config, console)
+            async with following(bus, sinks), serving as life, asyncio.TaskGroup() as group:
+                holding = group.create_task(claim.held_until(life.up), name="claim")
+                await life.over.wait()
                 holding.cancel()
     if options.task:
         console.print(tally.render(tallying.tally, config.robot, console.width))
 
 
 def _names(options: Options) -> tuple[str, ...]:
-    return (*ROBOT, "simulation", "collaboration") if options.task else (*ROBOT, "simulation")
+    return (*ROBOT, "simulation", TASK) if options.task else (*ROBOT, "simulation")
 
 
-def _children(options: Options, config: Config, console: Console, arrivals: "Arrivals") -> dict[str, Child]:
+class Life(NamedTuple):
+    """Events in the life of the services. up: all of them are ready. over: the task has ended; never without one."""
+
+    up: asyncio.Event
+    over: asyncio.Event
+
+
+@asynccontextmanager
+async def _each(options: Options, config: Config, console: Console) -> AsyncIterator[Life]:
+    """Run each service in a process of its own."""
     names = _names(options)
+    arrivals = Arrivals(names, console)
     width = max(map(len, names))
     styles = dict(zip(names, STYLES, strict=False))
 
@@ -79,7 +102,20 @@ def _children(options: Options, config: Config, console: Console, arrivals: "Arr
         if line == ready_line(name):
             arrivals(name)
 
-    return {name: Child(name, command(name, options, config), tell, once=name == "collaboration") for name in names}
+    children = {name: Child(name, command(name, options, config), tell, once=name == TASK) for name in names}
+    async with supervised(children):
+        yield Life(arrivals.complete, children[TASK].ended if options.task else asyncio.Event())
+
+
+@asynccontextmanager
+async def in_one(services: Mapping[str, Service], hub: Hub, console: Console) -> AsyncIterator[Life]:
+    """Run the services in this process, on this hub. The error that ends one of them is raised."""
+    arrivals, over = Arrivals(services, console), asyncio.Event()
+    task = {TASK: ending(services[TASK], over)} if TASK in services else {}
+    async with running(hub, {**services, **task}):
+        for name in services:
+            arrivals(name)
+        yield Life(arrivals.complete, over)
 
 
 def command(name: str, options: Options, config: Config) -> list[str]:
