@@ -119,3 +119,19 @@ async def test_who_is_to_begin_while_another_block_is_being_ended_is_not_planned
 
     assert body.time("q:start", "two") == 3.0
     assert body.warnings() == []
+
+
+async def test_a_part_that_a_new_plan_takes_is_handed_over_by_plan() -> None:
+    """The other's gesture was to come long after this one's. What its words wait for is lost: it comes at once."""
+    words = timed(Speech(id="t", text="five"), start="n:end + 5")
+    later = (Head(id="n", lexeme="NOD"), words, timed(RIGHT, start="t:start"))
+    async with stage(FakeBody({"n": Script(fail="stroke_start")})) as seen:
+        first = seen.ask(block((RIGHT,), id="one"))
+        await seen.seen("q:ready", "one")
+        second = seen.ask(block(later, id="two"))
+        await first.outcome
+        await second.outcome
+
+    times = instants(seen)
+    assert times["one:q:end"] == times["two:q:start"] == 1.5
+    assert mispredicted(seen) == []

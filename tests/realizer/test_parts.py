@@ -94,6 +94,20 @@ def test_who_has_begun_waits_for_nobody_any_more(tie: dict[str, str]) -> None:
     assert (made.dropped, made.problems) == ((), ())
 
 
+def test_who_has_begun_uses_the_arm_that_it_has() -> None:
+    """The other is for the right arm only. Had the first not begun, it would take the left one."""
+    one, other = Gesture(id="p", lexeme="BEAT"), timed(Gesture(id="q", lexeme="BEAT", mode="RIGHT_HAND"), start="0.3")
+    estimates = [FakeBody().estimate(each) for each in (one, other)]
+    points = {Point("p", "start"): 0.0}
+
+    free, bound = (
+        plan_block(block((one, other)), estimates, known=Known(points=points, begun=begun))
+        for begun in (frozenset(), frozenset({"p"}))
+    )
+
+    assert [each.chains["p"].parts for each in (free, bound)] == [("left_arm",), ("right_arm",)]
+
+
 def test_who_keeps_the_part_of_a_lost_one_may_be_without_its_points() -> None:
     """A shift has no stroke, which the third was to wait for."""
     smile = FaceLexeme(id="g", lexeme="SMILE")
