@@ -125,7 +125,7 @@ TABLE: tuple[Row, ...] = (
                keys.ROBOT_STATE),
     ),
     *_service(
-        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.BODY_HELD,
+        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.BODY_HELD,
         heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
     *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, *_RAW)),
@@ -133,14 +133,17 @@ TABLE: tuple[Row, ...] = (
     *(
         Row("perception", "subscribes", key)
         for key in (keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
-                    keys.ROBOT_STATE)
+                    keys.ROBOT_MOTION)
     ),
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
     *_manages("manager"),
     *_watches("observer"),
     Row("observer", "subscribes", keys.NET),
-    *(Row("observer", "subscribes", key, _NO_PROGRAM) for key in (keys.ROBOT_STATE, keys.TURN_CLOSED)),
+    *(
+        Row("observer", "subscribes", key, _NO_PROGRAM)
+        for key in (keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.TURN_CLOSED)
+    ),
     Row("observer", "subscribes", keys.WORLD, "looked at by `engage doctor`"),
     *_watches("operator", "what an operator sees"),
     Row("operator", "subscribes", keys.NET, "what an operator sees"),

@@ -300,7 +300,7 @@ class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_d
 
 
 class RobotState(Struct, frozen=True, kw_only=True, tag="robot_state", omit_defaults=True):
-    """stream: control, at a fixed rate: the present state of the body.
+    """state and stream: control, the present state of the body, seldom and often.
 
     left_arm, right_arm: the forearms. looking_at: entity id; empty: nothing.
     speaking: the words that are being said; empty: silence.

@@ -77,7 +77,7 @@ async def play(hub: MemoryHub) -> AsyncIterator[Play]:
     async with connect(hub=hub) as robot:
         playing = Play(hub, robot)
         watcher = hub.join("watcher")
-        inbox = watcher.subscribe(keys.BODY_HELD, keys.SYNC_POINT, keys.ROBOT_STATE, keys.ANY_FAULT)
+        inbox = watcher.subscribe(keys.BODY_HELD, keys.SYNC_POINT, keys.ROBOT_MOTION, keys.ANY_FAULT)
 
         async def listen() -> None:
             async for received in inbox:

@@ -263,6 +263,10 @@ class Bus(ABC):
         """Publish the message; does nothing after the participant has left."""
 
     @abstractmethod
+    def is_heard(self, key: str) -> bool:
+        """Tell whether anybody has subscribed to `key`, in any process. For streams that cost something."""
+
+    @abstractmethod
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         """Queue all messages of these key expressions. Past ones come first, as the class of each key says.
 

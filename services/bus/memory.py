@@ -98,6 +98,10 @@ class MemoryHub(Hub):
         payload = encode(message)
         return decode(payload) if self._decodes else message
 
+    def wants(self, key: str) -> bool:
+        """Tell whether any participant has subscribed to `key`."""
+        return any(bus.wants(key) for bus in self._buses.values())
+
     def inject(self, key: str, payload: bytes, encoding: str, life: str = "") -> None:
         """Send a payload from outside, as another program would. A bad one is answered with a Fault.
 
@@ -213,6 +217,9 @@ class MemoryBus(Bus):
     def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.send(self.name, key, message)
+
+    def is_heard(self, key: str) -> bool:
+        return self._hub.wants(key)
 
     def wants(self, key: str) -> bool:
         return any(subscription.wants(key) for subscription in self._subscriptions)

@@ -76,7 +76,7 @@ class Variability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The section `control`.
 
-    state_rate: `RobotState` messages per second while anything moves; once a second else.
+    state_rate: looks at the body per second while anything moves, and `RobotState` messages for who asks for all.
     dead_man: seconds without a message of the requester after which its behaviors end, unless the request names a
         lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
     no_point_zones: spheres that are never pointed into.

@@ -2,7 +2,6 @@
 
 import asyncio
 from contextlib import aclosing
-from math import inf
 from pathlib import Path
 
 from engage_hri.schemas import keys
@@ -18,7 +17,6 @@ from engage_hri.schemas.body import (
     GoHome,
     HomeReached,
     PerformBehavior,
-    RobotState,
     SyncPointArrived,
     SyncPointReached,
     WordSpoken,
@@ -34,7 +32,7 @@ from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
-from engage_hri.services.control.actions import ActionMessage, ActionReporter
+from engage_hri.services.control.actions import ActionReporter
 from engage_hri.services.control.body import (
     AbortMode,
     Arrived,
@@ -48,13 +46,10 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.live import LiveBehavior
+from engage_hri.services.control.shown import Shown
 from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.service import Ready
-
-IDLE: Seconds = 1.0
-"""Interval of `RobotState` messages while nothing moves."""
 
 
 async def embody(
@@ -70,7 +65,7 @@ async def embody(
             ready()
             try:
                 control.tell_held()
-                control.publish_state()
+                control.shown.look()
                 async for received in inbox:
                     with bus.containing(received):
                         control.take(received)
@@ -116,8 +111,7 @@ class _Control:
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
-        self._next_state = Timer(self.publish_state)
-        self._published: Seconds = -inf
+        self.shown = Shown(bus, body, self._actions, config.state_rate)
 
     # -- reads --------------------------------------------------------------------------------------------------
 
@@ -148,7 +142,7 @@ class _Control:
         self._body.see(self._world)
         self.note_look()
         if self._body.state().moving:
-            self._keep_publishing()
+            self.shown.look_soon()
 
     def serve(self, request: Request) -> None:
         """Serve a request that is new, or that changes a live one."""
@@ -255,9 +249,9 @@ class _Control:
 
     def _end(self, live: LiveBehavior) -> None:
         request, at = live.request, self._bus.now()
-        self._publish(self._actions.ended(request.id, at))
+        self.shown.tell(self._actions.ended(request.id, at))
         self.note_look()
-        self._keep_publishing()
+        self.shown.look_soon()
         outcome = BehaviorOutcome(
             id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
             at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=live.fault,
@@ -285,7 +279,7 @@ class _Control:
                 await self._body.home()
 
         self._tasks.create_task(go(), name=f"home {name}")
-        self._keep_publishing()
+        self.shown.look_soon()
 
     # -- reports ------------------------------------------------------------------------------------------------
 
@@ -307,54 +301,23 @@ class _Control:
                 self._tell(reached)
                 live.passed = sync
                 live.status = "done" if sync == "end" else live.status
-                self._publish(self._actions.reached(request.id, live.label, request.behavior, progress))
+                self.shown.tell(self._actions.reached(request.id, live.label, request.behavior, progress))
                 self.note_look(live, progress.at)
             case Spoke(word=word, position=position):
                 live.position = int(position)  # a driver's number, of whatever type
                 self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=at))
-        self._keep_publishing()
+        self.shown.look_soon()
 
     def _tell(self, message: SyncPointArrived | SyncPointReached | WordSpoken) -> None:
         self._sent += 1
         if not variability.is_lost(self._config.variability, self._sent, message.at.seconds):
             self._bus.publish(keys.SYNC_POINT, message)
 
-    def _publish(self, actions: list[ActionMessage]) -> None:
-        for action in actions:
-            self._bus.publish(keys.ROBOT_ACTION, action)
-
     def note_look(self, live: LiveBehavior | None = None, at: Seconds | None = None) -> None:
         """Publish what the eyes rest on, if that has changed."""
         of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
         label = live.label if live is not None and of_head else ""
-        with self._bus.containing("what the body looks at"):
-            entity = self._body.state().looking_at
-            self._publish(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
-
-    def publish_state(self) -> None:
-        """Publish the state of the body, and set the timer for the next time: soon if the body moves."""
-        self._next_state.set(self._bus.now() + IDLE)
-        with self._bus.containing("the state of the body"):
-            self._publish_state()
-
-    def _publish_state(self) -> None:
-        now, state = self._bus.now(), self._body.state()
-        self._publish(self._actions.looks_at(state.looking_at, "", now))
-        self._published = now
-        self._bus.publish(
-            keys.ROBOT_STATE,
-            RobotState(
-                at=self._bus.stamp(now), pose=state.pose, gaze=state.gaze, left_arm=state.left_arm,
-                right_arm=state.right_arm, looking_at=state.looking_at, speaking=state.speaking,
-            ),
-        )  # fmt: skip
-        self._next_state.set(now + (1.0 / self._config.state_rate if state.moving else IDLE))
-
-    def _keep_publishing(self) -> None:
-        """Bring the next `RobotState` forward, as something has begun to move."""
-        due = self._published + 1.0 / self._config.state_rate
-        if self._next_state.at is None or self._next_state.at > due:
-            self._next_state.set(due)
+        self.shown.note_look(label, at)
 
     # -- dead man -----------------------------------------------------------------------------------------------
 
@@ -387,7 +350,7 @@ class _Control:
 
     def close(self) -> None:
         self.desk.close()
-        self._next_state.set(None)
+        self.shown.close()
 
 
 def _refused(behavior: BlockBehavior) -> Estimate | None:

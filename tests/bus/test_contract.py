@@ -148,17 +148,32 @@ async def test_a_full_queue_drops_the_oldest_and_counts(place: Place):
     assert here.health.overflowed == 7
 
 
+async def test_one_can_ask_whether_anybody_listens(place: Place):
+    there, here = (await place.process()).join("there"), (await place.process()).join("here")
+    assert not there.is_heard(keys.ROBOT_MOTION)
+    for bus in (here, there):  # in another process, and in this one
+        inbox = bus.subscribe(keys.ANY_HEAD_POSE, "engage/v1/stream/control/*")
+        async with asyncio.timeout(10.0):
+            while not there.is_heard(keys.ROBOT_MOTION):  # noqa: ASYNC110 - nothing tells when
+                await asyncio.sleep(0.01)
+        assert not there.is_heard(keys.NET)
+        inbox.close()
+        async with asyncio.timeout(10.0):
+            while there.is_heard(keys.ROBOT_MOTION):  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+
+
 async def test_a_stream_reaches_those_who_listen_and_nobody_later(place: Place):
     there, here = (await place.process()).join("there"), (await place.process()).join("here")
-    inbox = here.subscribe(keys.ROBOT_STATE, keep=Keep.LATEST)
-    await heard(there, keys.ROBOT_STATE, state(0), inbox)
+    inbox = here.subscribe(keys.ROBOT_MOTION, keep=Keep.LATEST)
+    await heard(there, keys.ROBOT_MOTION, state(0), inbox)
     for number in range(20):
-        there.publish(keys.ROBOT_STATE, state(number))
+        there.publish(keys.ROBOT_MOTION, state(number))
     last = -1
     while last < 19:
         [last] = numbers(await messages(inbox))
 
-    late = here.subscribe(keys.ROBOT_STATE, keys.FEEDBACK)
+    late = here.subscribe(keys.ROBOT_MOTION, keys.FEEDBACK)
     there.publish(keys.FEEDBACK, state(20))
 
     assert numbers(await messages(late)) == [20]

@@ -123,7 +123,7 @@ async def test_a_bus_logs_what_it_publishes_and_no_streams(caplog: pytest.LogCap
     bus = await joined("realizer", "realizer")
     with caplog.at_level(logging.DEBUG, "engage"):
         bus.publish(keys.FEEDBACK, BlockProgress(block="b", progress="start", at=AT))
-        bus.publish(keys.ROBOT_STATE, PerformBlock(id="b", block=Block(id="b")))
+        bus.publish(keys.ROBOT_MOTION, PerformBlock(id="b", block=Block(id="b")))
         bus.declare_alive()
         await bus.leave()
 

@@ -56,16 +56,16 @@ class Client:
 
 
 @asynccontextmanager
-async def robot(hub: MemoryHub, world: World = WORLD, **settings: object) -> AsyncIterator[Client]:
-    """Control, and a client called realizer that hears everything it says."""
+async def robot(
+    hub: MemoryHub, world: World = WORLD, hears: tuple[str, ...] = (keys.ROBOT_MOTION,), **settings: object
+) -> AsyncIterator[Client]:
+    """Control, and a client called realizer that hears everything it says; of its state on the keys `hears`."""
     config = ControlConfig(**settings)  # type: ignore[arg-type]
     eyes, bus = hub.join("simulation"), hub.join("realizer")
     bus.declare_alive()
     eyes.publish(keys.WORLD, world)
     async with running(hub, {"control": partial(embody, config=config)}):
-        inbox = bus.subscribe(
-            keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.fault("control"), *Requester.PATTERNS
-        )
+        inbox = bus.subscribe(keys.SYNC_POINT, keys.ROBOT_ACTION, *hears, keys.fault("control"), *Requester.PATTERNS)
         client = Client(bus, Requester(bus))
 
         async def listen() -> None:

@@ -1,7 +1,6 @@
 """Control on the bus: requests in, sync points, actions and states out, and home by itself when nobody directs it."""
 
 import asyncio
-from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -234,23 +233,6 @@ async def test_an_action_ends_with_an_aborted_behavior(hub: MemoryHub):
     assert client.actions()[-1][3] == 3.0
 
 
-async def test_states_come_at_a_steady_rate_while_it_moves_and_once_a_second_else(hub: MemoryHub):
-    async with robot(hub, state_rate=20.0) as client:
-        await asyncio.sleep(3.5)
-        resting = [item.at.seconds for item in client.of(RobotState)]
-        client.heard.clear()
-        await client.outcome(client.perform(POINT))
-        moving = [item.at.seconds for item in client.of(RobotState)]
-        await asyncio.sleep(1.5)
-        last = client.of(RobotState)[-1]
-
-    assert resting == pytest.approx([1.0, 2.0, 3.0])  # the first came before anybody listened
-    gaps = [later - one for one, later in pairwise(moving)]
-    assert gaps == pytest.approx([0.05] * len(gaps))
-    assert len(moving) >= 25
-    assert last.right_arm.tip == pytest.approx((0.194, -0.2, 0.8), abs=1e-3)  # type: ignore[attr-defined]
-
-
 async def test_it_tells_what_it_can_do(hub: MemoryHub):
     async with robot(hub) as client:
         answer = await client.bus.query(keys.DESCRIBE, DescribeBody())
@@ -278,7 +260,7 @@ async def test_it_goes_home_on_request(hub: MemoryHub):
 async def test_it_goes_home_by_itself_when_the_realizer_dies(hub: MemoryHub):
     async with robot(hub) as client:
         watcher = hub.join("watcher")
-        states = watcher.subscribe(keys.ROBOT_STATE)
+        states = watcher.subscribe(keys.ROBOT_MOTION)
         client.perform(POINT, "stroke")
         await asyncio.sleep(3.0)
         hub.kill("realizer")

@@ -5,11 +5,9 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 """
 
 import asyncio
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -26,6 +24,7 @@ from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.history import History, finish, form_asked, in_form, pack, refuse
 from engage_hri.services.bus.zenoh.order import Envelope, SentLog
+from engage_hri.services.bus.zenoh.own_clock import own_clock
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.readers import Readers
 from engage_hri.services.bus.zenoh.rights import Rights
@@ -50,9 +49,6 @@ VACANCY: Seconds = 4.0
 """Time that a dead participant may seem to be there: the lease of a silent link, and as long again."""
 QUIET: Seconds = 0.25
 """Time without a change after which all peers are known, also those found through others."""
-
-FIRST_TIME_SPACE = 0xEFFFFFFA
-"""Number of the time namespace that Linux begins with."""
 
 
 async def open_hub(
@@ -115,7 +111,7 @@ class ZenohHub(Hub):
         self.bridge = LoopBridge(self.failed)
         self.life_numbers = count(1)
         self._loop = asyncio.get_running_loop()
-        self.clocks = Clocks(*_clock(self._loop, self.run))
+        self.clocks = Clocks(*own_clock(self._loop, self.run))
         self._sent = SentLog(self.run)
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._source = zenoh.SourceInfo(session.id, 0)
@@ -210,6 +206,11 @@ class ZenohHub(Hub):
         )
         self.readers.offer(Received(key, message, bus.name, now, life=self.run))
 
+    def is_heard(self, key: str) -> bool:
+        """Tell whether anybody has subscribed to `key`, as far as Zenoh knows."""
+        status: Any = self._publisher(key, keys.key_class(key) != "stream").matching_status  # its stub says bool
+        return status.matching or self.readers.want(key)
+
     def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
         publisher = self._publishers.get(key)
         if publisher is None:
@@ -254,6 +255,9 @@ class ZenohBus(Bus):
     def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.publish(self, key, message)
+
+    def is_heard(self, key: str) -> bool:
+        return self._hub.is_heard(key)
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         if self._hub.rights is not None:
@@ -381,17 +385,3 @@ def _fault(payload: bytes, encoding: str) -> Fault:
     except EngageError as error:
         return error.fault
     return fault if isinstance(fault, Fault) else Fault(reason=f"answered with {type(fault).__name__}")
-
-
-def _clock(loop: asyncio.AbstractEventLoop, run: str) -> tuple[str, Callable[[], Seconds]]:
-    """Name of the clock that loop time is, and how to read it: the machine's, one since boot, or the loop's own.
-
-    uvloop tells time in whole milliseconds, as of when its turn began: too coarse to measure by. A machine has more
-    than one such clock if its containers have time namespaces.
-    """
-    boot, space = Path("/proc/sys/kernel/random/boot_id"), Path("/proc/self/ns/time")
-    if abs(loop.time() - time.monotonic()) < 0.1 and boot.exists():
-        number = space.stat().st_ino if space.exists() else FIRST_TIME_SPACE
-        more = "" if number == FIRST_TIME_SPACE else f"-{number}"
-        return f"boot-{boot.read_text()[:8]}{more}", time.monotonic
-    return f"loop-{run[:8]}", loop.time

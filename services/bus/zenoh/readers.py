@@ -100,6 +100,10 @@ class Readers:
             if reader.subscription.wants(received.key):
                 reader.subscription.offer(received)
 
+    def want(self, key: str) -> bool:
+        """Tell whether any subscription of this process wants `key`."""
+        return any(reader.subscription.wants(key) for reader in self._readers)
+
     def attach(self, bus: Bus, subscription: Subscription) -> None:
         reader = _Reader(bus, subscription)
         self._readers.append(reader)

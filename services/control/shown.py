@@ -1,0 +1,78 @@
+"""What the body shows, published as it moves: its state, and what its eyes rest on."""
+
+from math import inf
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.control.actions import ActionMessage, ActionReporter
+from engage_hri.services.control.body import Body
+from engage_hri.services.runtime.alarm import Timer
+
+IDLE: Seconds = 1.0
+"""Interval of `RobotState` messages while nothing moves."""
+MOVING: Seconds = 0.25
+"""Longest interval while anything moves. Whoever needs more listens to `keys.ROBOT_MOTION`."""
+EPSILON: Seconds = 1e-6
+
+
+class Shown:
+    """Looks at the body many times a second while it moves, and tells what has changed.
+
+    Whether somebody listens to `keys.ROBOT_MOTION` changes nothing else: the eyes are watched as often in any case.
+    """
+
+    def __init__(self, bus: Bus, body: Body, actions: ActionReporter, rate: float) -> None:
+        """rate: looks a second while anything moves."""
+        self._bus = bus
+        self._body = body
+        self._actions = actions
+        self._interval = 1.0 / rate
+        self._next = Timer(self.look)
+        self._looked: Seconds = -inf
+        self._told: tuple[Seconds, tuple[str, str, bool]] = (-inf, ("", "", False))
+        """Time of the last message on `keys.ROBOT_STATE`; what it looked at and said, and whether it moved."""
+
+    def look(self) -> None:
+        """Publish the state of the body, and set the timer for the next time: soon if the body moves."""
+        self._next.set(self._bus.now() + IDLE)
+        with self._bus.containing("the state of the body"):
+            self._look()
+
+    def _look(self) -> None:
+        now, state = self._bus.now(), self._body.state()
+        self._looked = now
+        self.tell(self._actions.looks_at(state.looking_at, "", now))
+        message = RobotState(
+            at=self._bus.stamp(now), pose=state.pose, gaze=state.gaze, left_arm=state.left_arm,
+            right_arm=state.right_arm, looking_at=state.looking_at, speaking=state.speaking,
+        )  # fmt: skip
+        (at, before), news = self._told, (state.looking_at, state.speaking, state.moving)
+        if news != before or now >= at + (MOVING if state.moving else IDLE) - EPSILON:
+            self._told = now, news
+            self._bus.publish(keys.ROBOT_STATE, message)
+        if self._bus.is_heard(keys.ROBOT_MOTION):
+            self._bus.publish(keys.ROBOT_MOTION, message)
+        self._next.set(now + (self._interval if state.moving else IDLE))
+
+    def look_soon(self) -> None:
+        """Bring the next look forward, as something has begun to move."""
+        due = self._looked + self._interval
+        if self._next.at is None or self._next.at > due:
+            self._next.set(due)
+
+    def note_look(self, label: str, at: Seconds | None = None) -> None:
+        """Publish what the eyes rest on, if that has changed. label: `block:behavior` that moved them, if known."""
+        with self._bus.containing("what the body looks at"):
+            entity = self._body.state().looking_at
+            self.tell(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
+
+    def tell(self, actions: list[ActionMessage]) -> None:
+        """Publish actions of the robot."""
+        for action in actions:
+            self._bus.publish(keys.ROBOT_ACTION, action)
+
+    def close(self) -> None:
+        """Look no more."""
+        self._next.set(None)
