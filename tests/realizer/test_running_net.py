@@ -41,7 +41,10 @@ def fired_by(plan: Plan, began: float, reached: Mapping[Point, float], now: floa
             return reached.get(gates[place.after, place.source], inf)
         return fired.get(place.source, inf)
 
-    leading, arcs = {end}, [(each.source, each.target) for each in plan.net.places if each.kind != "idle"]
+    leading, arcs = (
+        {end},
+        [(each.source, each.target) for each in plan.net.places if each.kind not in ("idle", "handover")],
+    )
     while more := {source for source, target in arcs if target in leading} - leading:
         leading |= more
     changed = True

@@ -147,10 +147,14 @@ class RunningNet:
                 self._on_fired.append(each.on_fired)
 
     def _leading_to_end(self) -> set[int]:
-        """The transitions that the end of the block waits for: all but ends of events that may outlast it."""
+        """The transitions that the end of the block waits for.
+
+        Not among them are ends of events that may outlast it, and who takes a part by plan: a behavior that was early
+        has gone home by itself.
+        """
         sources: list[list[int]] = [[] for _ in self.net.transitions]
         for place in self.net.places:
-            if place.kind != "idle":
+            if place.kind not in ("idle", "handover"):
                 sources[place.target].append(place.source)
         found: set[int] = set()
         todo = [self.end]
@@ -330,7 +334,14 @@ class RunningNet:
         self._miss_less(self.net.places[number].target, at)
 
     def let_go(self) -> None:
-        """Let events go that outlast the block: recognition follows them. For a block that is over."""
+        """Take the tokens away that wait for what the block does not wait for. For a block that is over.
+
+        These are before the ends of events that outlast it, which recognition follows, and before starts of other
+        blocks' behaviors that were to take a part.
+        """
+        for number, place in enumerate(self.net.places):
+            if self._tokens[number] and place.kind != "idle" and place.target not in self.instants:
+                self._set(number, EMPTY)
         left = [each for each, place in enumerate(self.net.places) if place.kind == "idle" and not self._tokens[each]]
         outlasting = {self.net.places[each].behavior for each in left}
         for number in left:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import Gesture, Hand, Pointing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
@@ -199,6 +200,12 @@ def least(chain: Chain, successor: Chain | None = None) -> int:
     if chain.type in ON_TARGET:
         return _STROKE
     return 0 if successor is not None and is_overlaid(chain, successor) else len(chain.points) - 1
+
+
+def leaving(chain: Chain) -> int:
+    """Number of the first point of the instant in which a behavior leaves its target; of a gaze, `stroke_end`."""
+    together = next((group for group in TYPES[chain.type].one_instant if "relax" in group), ("relax",))
+    return next(number for number, point in enumerate(chain.points) if point.sync in together)
 
 
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:

@@ -19,6 +19,7 @@ from engage_hri.services.realizer.plan.handover import (
     is_overlaid,
     last_kept,
     least,
+    leaving,
     window,
 )
 from engage_hri.services.realizer.plan.known import Holder, Known, is_foreign
@@ -145,7 +146,7 @@ class _Sharing:
             chain, kept = self.chains[id], self.held | self.known.kept
             first = self._first_after(chain, self.times[taker])
             least_kept = max([least(chain), *(number for number, point in enumerate(chain.points) if point in kept)])
-            is_awaited = id in self.natural and least_kept >= RELAX
+            is_awaited = id in self.natural and least_kept >= leaving(chain)
             if first is not None and least_kept + 1 < len(chain.points) and not is_awaited:
                 self._hand_over(id, taker.behavior, max(first, least_kept + 1))
 
