@@ -148,8 +148,8 @@ class _Realizer:
         live.stop(Ending("failed", fault))
         performance = self.performances.get(live.request.id)
         if live.request.id in self.live:
-            self.desk.end(replace(live.outcome, status="failed", fault=fault))
             self._forget(live)
+            self.desk.end(replace(live.outcome, status="failed", fault=fault))
         if performance is not None:
             with self.bus.containing(f"the rest of {live}"):
                 performance.abandon()
@@ -247,8 +247,8 @@ class _Realizer:
     def _refuse(self, live: Live, error: EngageError) -> None:
         self._warn(live, error)
         live.fail(error.fault)
-        self.desk.refuse(live.request.id, told(error.fault))
         self._forget(live)
+        self.desk.refuse(live.request.id, told(error.fault))
 
     async def _end(self, live: Live, outcome: BlockOutcome) -> None:
         """Send the outcome, as the last word about the block: that it is no longer held comes before.

@@ -78,9 +78,12 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         names = {id: f"{block}:{id}" for id in plan.chains}
         for point, at in decisions.foresight.times(asker.now).items():
             if not is_foreign(point.behavior):
-                if point not in decisions.facts.reached and names.get(point.behavior) in asker.met:
+                keeps = names.get(point.behavior) in asker.met or decisions.facts.is_held(point.behavior)
+                if point not in decisions.facts.reached and keeps:
                     at = max(at, asker.now + MOMENT)
                 points[qualified(block, point)] = at - asker.since
+        for point, at in live_blocks.reached(block).items():  # of what was dropped since, too
+            points.setdefault(qualified(block, point), at - asker.since)
         if not each.is_ending:
             over = {id for id, name in names.items() if decisions.facts.has_ended(id) or name in dependent}
             over |= {id for id, name in names.items() if block in asker.later and name not in asker.met}

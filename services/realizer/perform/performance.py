@@ -68,7 +68,7 @@ class BlockPerformance:
         why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
         self._dropped = {id: why.get(id, "") for id in plan.dropped}
         """Behaviors that were dropped, each with the reason."""
-        self._interrupted: dict[str, str] = {}
+        self.interrupted: dict[str, str] = {}
         """Behaviors that are ended on request, each with the reason if one was given."""
         self.ties = Ties(self, shared.others, shared.live_blocks, live.elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
@@ -128,7 +128,7 @@ class BlockPerformance:
 
     @property
     def _outcome(self) -> BlockOutcome:
-        return completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self._interrupted)
+        return completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self.interrupted)
 
     def _observers(self, plan: Plan, net: RunningNet, began: Seconds) -> tuple[Observer, ...]:
         self._net.planned(plan, net, began)
@@ -146,7 +146,7 @@ class BlockPerformance:
     async def interrupt(self, behavior: str, reason: str = "") -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
         task, run = self._tasks[behavior], self._runs[behavior]
-        self._interrupted[behavior] = reason
+        self.interrupted[behavior] = reason
         if run.pending is not None and run.is_by_body:
             self.body.abort(behavior)
             await asyncio.wait([task])
@@ -330,9 +330,9 @@ class BlockPerformance:
             return
         self._tell()
         self._dropped[id] = str(fault)
-        if id in self._interrupted:
+        if id in self.interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
-            self.report.interrupted(id, self.spoken.of(id), self._interrupted[id])
+            self.report.interrupted(id, self.spoken.of(id), self.interrupted[id])
         else:
             self.report.warn(kind, str(fault), id)
             if id in self.decisions.facts.begun and not at_rest:

@@ -20,9 +20,10 @@ from engage_hri.services.realizer.points import EPSILON, Point
 
 
 class Tied(Performed, Protocol):
-    """A performance, as its ties need it. plan: the one that it began with."""
+    """A performance, as its ties need it. plan: the one that it began with. interrupted: ended on request."""
 
     plan: Plan
+    interrupted: dict[str, str]
     decisions: Decisions
     report: Reporter
     ties: "Ties"
@@ -104,7 +105,8 @@ class Ties:
         owner = self._owner
         needed = needing(owner.plan.block, self._blocks, missed)
         for id, point in needed:
-            if id in owner.decisions.plan.chains and not owner.decisions.facts.has_ended(id):
+            is_needed = id in owner.decisions.plan.chains and id not in owner.interrupted
+            if is_needed and not owner.decisions.facts.has_ended(id):
                 owner.fail(id, Fault(reason=f"{point}, which it is tied to, does not come, and the tie is required"))
                 return
         owner.replan()
