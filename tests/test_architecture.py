@@ -36,6 +36,7 @@ SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
+    "services/control/shown.py",  # publishes what the body shows
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points

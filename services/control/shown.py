@@ -1,4 +1,4 @@
-"""What the body shows, published as it moves: its state, and what its eyes rest on."""
+"""Publisher of what the body shows as it moves: its state, and what its eyes rest on."""
 
 from math import inf
 

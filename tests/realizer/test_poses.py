@@ -162,6 +162,20 @@ def test_who_follows_a_behavior_of_another_block_starts_from_its_pose() -> None:
     assert angles(planned(block((Gaze(id="g", target="b"),)), blind), blind) == {}
 
 
+def test_who_comes_after_a_behavior_of_another_block_that_went_home_starts_from_there() -> None:
+    """Now that one may still be elsewhere, and the body does not know that it goes home by then."""
+    theirs = Gaze(id="g", target="a")  # ids count in one block only
+    parts = chain(theirs, estimated(theirs))
+    renamed = replace(parts, points=tuple(qualified("other", point) for point in parts.points))
+    times = {qualified("other", point): at for point, at in zip(parts.points, (-2.0,) * 5 + (0.5, 1.0), strict=True)}
+    home = replace(estimated(theirs, 7.0), pose_end=pose(5.0))
+    holder = Holder(renamed, is_natural=False, kept=frozenset(), estimate=home, reached=5)
+    known = Known(blocks={"other": None}, points=times, holders={"other:g": holder})
+
+    for start, begins in (("2", 5.0), ("0.75", 7.0)):
+        assert angles(planned(block((timed(Gaze(id="g", target="b"), start=start),)), known), known) == {"g": begins}
+
+
 def test_only_who_shares_a_part_with_the_one_before_starts_from_there() -> None:
     left = timed(Pointing(id="left", target="a", mode="LEFT_HAND"), start="0")
     right = timed(Pointing(id="right", target="a", mode="RIGHT_HAND"), start="1")

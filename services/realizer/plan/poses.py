@@ -48,6 +48,8 @@ def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
                     poses[id] = before.pose_after
                 elif base is not None and family(chain.type) == "gaze":
                     poses[id] = base
+                elif is_foreign(earlier.points[0].behavior) and before.pose_end is not None:
+                    poses[id] = before.pose_end  # Now it may still be elsewhere: the body rehearses this block only.
             if estimate is not None and not (is_shift and is_ours and _is_overlaid(plan, id)):
                 latest[part] = chain, estimate
         if is_shift and is_ours and estimate is not None:
