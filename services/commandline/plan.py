@@ -1,5 +1,6 @@
 """Command `engage plan FILE`: check a block, or the block that a fragment becomes, and print its net."""
 
+import asyncio
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +8,12 @@ from typing import Annotated, Literal
 
 import typer
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
@@ -20,6 +23,7 @@ from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 HIGHEST = 40
@@ -45,8 +49,7 @@ def main(options: Options) -> int:
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
         for plan in generated(source.things, around, config, str(options.file)):
-            estimates = run_virtual(estimated(plan.block, around, config))
-            planned = export.plan_block(plan.block, estimates)
+            planned = run_virtual(rehearsed(plan.block, around, config))
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
@@ -72,11 +75,12 @@ def _as_text(plan: Plan) -> str:
     return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend((net,))))
 
 
-async def estimated(block: Block, world: World, config: Config) -> tuple[Estimate, ...]:
-    """Estimates of the simulated body for a block, from its home position."""
-    from engage_hri.services.control.service import simulated_body
-    from engage_hri.services.realizer.points import performer
+async def rehearsed(block: Block, world: World, config: Config) -> Plan:
+    """Plan a block as a realizer does that has nothing else to perform, with the simulated body at home."""
+    from engage_hri.services.realizer import export
 
-    body = simulated_body(config.control)
-    asked = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
-    return tuple(body.estimate(behavior, None, world) for behavior in asked)
+    async with MemoryHub(config.robot, decodes=False) as hub:
+        hub.join("simulation").publish(keys.WORLD, world)
+        async with running(hub, {"control": roster.service("control", config)}):
+            await asyncio.sleep(0.1)  # control has seen the world by then
+            return await export.planned(hub.join("plan"), block, config.realizer)

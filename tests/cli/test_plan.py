@@ -112,3 +112,29 @@ def test_a_strict_plan_of_which_nothing_is_left_ends_as_that(engage: Engage, tmp
     path.write_text(f'<bml id="b">{LOST}</bml>')
 
     assert engage("plan", path, "--strict").code == 3
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        '<gaze id="a" target="blue-square" start="0"/><gaze id="b" target="red-square" start="1"/>',
+        '<pointing id="a" target="blue-square" mode="RIGHT_HAND" start="0"/>'
+        '<pointing id="b" target="red-square" mode="RIGHT_HAND" start="1.2"/>',
+        '<speech id="s"><text>One, <sync id="m"/>two and three.</text></speech>'
+        '<pointing id="a" target="red-square" stroke="s:m"/><head id="n" lexeme="NOD" start="s:end"/>',
+    ],
+)
+def test_what_is_planned_is_what_is_performed(engage: Engage, content: str, tmp_path: Path) -> None:
+    """The plan is rehearsed as the realizer has it rehearsed: a part that changes hands is where it is left."""
+    block, feedback = tmp_path / "b.xml", tmp_path / "feedback.jsonl"
+    block.write_text(f'<bml id="b">{content}</bml>')
+
+    behaviors = json.loads(engage("plan", "--format", "json", block).out)["behaviors"]
+    engage("play", "--embedded", "--virtual-time", "--feedback", feedback, block)
+
+    told = [json.loads(line) for line in feedback.read_text().splitlines()]
+    came = {(each["behavior"], each["sync"]): each["time"] for each in told if each["type"] == "sync_point_progress"}
+    planned = {(id, sync): time for id, times in behaviors.items() for sync, time in times.items()}
+    both = came.keys() & planned.keys()
+    assert len(both) >= 10
+    assert {each: planned[each] for each in both} == pytest.approx({each: came[each] for each in both}, abs=0.01)

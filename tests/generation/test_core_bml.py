@@ -22,11 +22,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.generating import generated
-from engage_hri.services.commandline.plan import estimated
+from engage_hri.services.commandline.plan import rehearsed
 from engage_hri.services.commandline.roster import service
 from engage_hri.services.commandline.sources import still
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, running
@@ -116,10 +115,9 @@ def as_core_bml(block: Block) -> Block:
 
 
 def plan_of(block: Block) -> Plan:
-    """Estimated by the simulated body at home. Discards what cannot be done as it stands."""
-    estimates = run_virtual(estimated(block, WORLD, Config()))
+    """Rehearsed by the simulated body at home. Discards what cannot be done as it stands."""
     try:
-        plan = plan_block(block, estimates)
+        plan = run_virtual(rehearsed(block, WORLD, Config()))
     except InputRefused:
         reject()
     assume(not plan.problems)

@@ -19,9 +19,8 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.commandline.config import load
 from engage_hri.services.commandline.generating import generated
-from engage_hri.services.commandline.plan import estimated
+from engage_hri.services.commandline.plan import rehearsed
 from engage_hri.services.generation.block.rewriting import Operator
-from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
@@ -156,6 +155,6 @@ def test_whatever_is_tied_to_a_reference_can_be_performed(profile: str, minimum:
         )
         (plan,) = generated([made], WORLD, config, "")
 
-        planned = plan_block(plan.block, run_virtual(estimated(plan.block, WORLD, config)))
+        planned = run_virtual(rehearsed(plan.block, WORLD, config))
 
         assert not planned.dropped
