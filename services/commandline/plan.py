@@ -77,10 +77,10 @@ def _as_text(plan: Plan) -> str:
 
 async def rehearsed(block: Block, world: World, config: Config) -> Plan:
     """Plan a block as a realizer does that has nothing else to perform, with the simulated body at home."""
-    from engage_hri.services.realizer import export
+    from engage_hri.services.realizer.perform.planning import planned_alone
 
     async with MemoryHub(config.robot, decodes=False) as hub:
         hub.join("simulation").publish(keys.WORLD, world)
         async with running(hub, {"control": roster.service("control", config)}):
             await asyncio.sleep(0.1)  # control has seen the world by then
-            return await export.planned(hub.join("plan"), block, config.realizer)
+            return await planned_alone(hub.join("plan"), block, config.realizer)

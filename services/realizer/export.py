@@ -5,24 +5,12 @@ from collections.abc import Iterable, Iterator
 
 from msgspec.structs import asdict
 
-from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.nets import NetPlanned
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import is_live, is_safe
-from engage_hri.services.realizer.perform.live import Live
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.net_message import described
-from engage_hri.services.realizer.perform.planning import Planning
 from engage_hri.services.realizer.plan.plan import Plan
-
-
-async def planned(bus: Bus, block: Block, config: RealizerConfig) -> Plan:
-    """Plan a block as the realizer does, with the body on this bus and no other block. Raises BlockRefused."""
-    live = Live(PerformBlock(id="plan", block=block), ())
-    return await Planning(bus, config, LiveBlocks(), list).plan(live)
 
 
 def as_text(plan: Plan) -> str:

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Hand, Speech
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateBehaviors, EstimateItem, Estimates, PlannedTime
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
@@ -156,6 +156,11 @@ class Planning:
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
         asked = {item.behavior.id for item in question.items}
         return tuple([each for each in answer.items if each.behavior in asked])  # bodies err
+
+
+async def planned_alone(bus: Bus, block: Block, config: RealizerConfig) -> Plan:
+    """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
+    return await Planning(bus, config, LiveBlocks(), list).plan(Live(PerformBlock(id="plan", block=block), ()))
 
 
 def question_about(
