@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import Gesture, Wait
 from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior
 from engage_hri.schemas.holds import Held
 from engage_hri.schemas.requests import Outcome, Refused
-from engage_hri.services.requests.ends import Pending, Requester
+from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from tests.realizer.puppet import bml, puppet
 from tests.realizer.stage import after, block, stage
 from tests.realizer.steering import steer, steered
@@ -118,6 +118,24 @@ async def test_a_point_that_was_reached_counts_though_its_behavior_was_dropped()
 
     assert seen.times("b1")["h1:stroke_end"] + 0.25 == pytest.approx(seen.times("b3")["h0:start"] + 0.95)
     assert [(each.block, each.kind) for each in seen.warnings()] == [("b0", "INTERRUPTED"), ("b3", "LATE")]
+
+
+@pytest.mark.parametrize("required", ["true", "false"])
+async def test_words_give_up_a_time_for_those_of_another_block_unless_they_are_required(required: str) -> None:
+    async with stage() as seen:
+        one = seen.ask(bml('<speech id="s">one two three</speech>', "one"))
+        await asyncio.sleep(0.25)
+        two = seen.ask(bml(f'<speech id="t" start="0.25" required="{required}">four</speech>', "two"))
+        await all_ended(one)
+        (outcome,) = await asyncio.gather(two.outcome, return_exceptions=True)
+
+    if required == "true":
+        assert isinstance(outcome, RequestRefused)
+        assert str(outcome).startswith("two: t: cannot be on time: one:s has the voice until one:s:end")
+    else:
+        assert isinstance(outcome, BlockOutcome)
+        assert [each.text for each in outcome.spoken] == ["four"]
+    assert [(each.block, each.kind) for each in seen.warnings()] == [("two", "IMPOSSIBLE_TO_SCHEDULE")]
 
 
 async def test_that_a_refused_block_is_no_longer_held_is_told_before_its_refusal() -> None:

@@ -65,7 +65,7 @@ class Times:
             order = self._orders[number]
             return [] if order is None else [end.point for end in (order.earlier, order.later) if end.point != point]
         equal = self._equals[number]
-        if equal is None or (equal.behavior != point.behavior and equal.behavior in self._relations.required):
+        if equal is None or equal.behavior in self._relations.required:
             return []
         named = [term.point for term in equal.terms]
         return [each for each in named if each != point] if point in named else []
