@@ -131,7 +131,7 @@ async def test_words_give_up_a_time_for_those_of_another_block_unless_they_are_r
 
     if required == "true":
         assert isinstance(outcome, RequestRefused)
-        assert str(outcome).startswith("two: t: cannot be on time: one:s has the voice until one:s:end")
+        assert str(outcome).startswith("two: t, line 1: cannot be on time: one:s has the voice until one:s:end")
     else:
         assert isinstance(outcome, BlockOutcome)
         assert [each.text for each in outcome.spoken] == ["four"]
