@@ -2,7 +2,8 @@
 
 A line for each block, fragment and turn that has ended, each connection event that is decided, each person and peer
 that comes or goes, each warning and refusal, and for what is held; at level DEBUG one for every message but the
-streams. Loggers are named `engage.<service>`, or `engage.<role>` for a participant that is no service.
+streams and the state of the body. Loggers are named `engage.<service>`, or `engage.<role>` for a participant that is
+no service.
 """
 
 import logging
@@ -133,8 +134,13 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
 
 def note(log: logging.Logger, key: str, message: Message) -> None:
     """Write the line of a message that is published under the key. Most messages have none, which is seen at once."""
-    if type(message) in _TOLD or (log.isEnabledFor(DEBUG) and keys.key_class(key) != "stream"):
+    if type(message) in _TOLD or (log.isEnabledFor(DEBUG) and not _is_measured(key)):
         log.log(*entry(message))
+
+
+def _is_measured(key: str) -> bool:
+    """True for what comes many times a second and says nothing new by itself."""
+    return keys.key_class(key) == "stream" or key == keys.ROBOT_STATE
 
 
 def note_presence(message: PeerAlive | PeerGone, viewer: str = "") -> None:

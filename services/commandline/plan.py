@@ -10,7 +10,7 @@ import typer
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
@@ -83,4 +83,8 @@ async def rehearsed(block: Block, world: World, config: Config) -> Plan:
         hub.join("simulation").publish(keys.WORLD, world)
         async with running(hub, {"control": roster.service("control", config)}):
             await asyncio.sleep(0.1)  # control has seen the world by then
-            return await planned_alone(hub.join("plan"), block, config.realizer)
+            try:
+                return await planned_alone(hub.join("plan"), block, config.realizer)
+            except InputRefused as error:
+                refused = error  # raised in there it would be one of a group
+    raise refused

@@ -42,7 +42,6 @@ EXCUSED = {
     ".venv/bin/engage up": "is what all pages are run against",
     ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
     ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",
-    ".venv/bin/python -m pip install -e '.[speed]'": "the same",
 }
 """Commands that do not run here, and why."""
 ELSEWHERE = {
