@@ -4,7 +4,7 @@ Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `dea
 decided comes from the marking of the net (grants.py) and from what is expected (foresee/foresight.py).
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence, Set
 from math import isfinite
 
 from msgspec.structs import replace
@@ -112,16 +112,16 @@ class Decisions:
         going = {id: facts.next_number(id) for id in facts.under_way}
         return {id: number for id, number in going.items() if not facts.holds(self.plan.chains[id].points[number])}
 
-    def hold(self, behaviors: Collection[str] | None, now: Seconds) -> list[Effect]:
+    def hold(self, behaviors: Collection[str] | None, now: Seconds, stuck: Collection[Point] = ()) -> list[Effect]:
         """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
 
-        The marking stays, and clocks before their instants stop. Those that were held and are not go on from there.
+        stuck: points of other blocks that do not come before what is held goes on. The marking stays, and clocks
+        before their instants stop. Those that were held and are not go on from there.
         """
         facts = self.facts
         under_way = sorted(facts.under_way)
         before = {each for each in under_way if facts.is_held(each)}
-        facts.hold(behaviors, now)
-        self.net.hold(behaviors, now)
+        facts.hold(behaviors, now, stuck)
         self.foresight.prolong()
         self.foresight.none_before(now)
         changed = [each for each in under_way if facts.is_held(each) != (each in before)]
@@ -254,6 +254,13 @@ class Decisions:
         self.lateness_watch.expect(behavior, points[number].sync, expected, natural)
 
     # -- other blocks --------------------------------------------------------------------------------------------
+
+    def stuck(self, elsewhere: Set[Point]) -> Set[Point]:
+        """Points that other blocks are tied to and that do not come before what is held goes on.
+
+        elsewhere: points of other blocks of which the same is true.
+        """
+        return self.grants.stuck(elsewhere).among(self.foresight.followed)
 
     def follow(self, points: Iterable[Point]) -> None:
         """Expect these points from now on: other blocks are tied to them (see `Foresight.ahead`)."""

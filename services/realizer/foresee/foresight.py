@@ -34,7 +34,8 @@ class Foresight(Observer):
 
     paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
     call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
-    times of points of other blocks that this one is tied to. forecast: None if nothing in the block needs one.
+    times of points of other blocks that this one is tied to. followed: points that others are tied to. forecast:
+    None if nothing in the block needs one.
     """
 
     forecast: Forecast | None
@@ -52,8 +53,7 @@ class Foresight(Observer):
         self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
         self._facts = facts
-        self._followed: set[Point] = set()
-        """Points of this block that other blocks are tied to."""
+        self.followed: set[Point] = set()
         self._expected = {point: facts.began + plan.predicted(point) for point in plan.at}
 
     def look_ahead(self, plan: Plan, net: RunningNet) -> None:
@@ -67,7 +67,7 @@ class Foresight(Observer):
         """Behaviors and numbers of their next points: until when, and since when, each is expected there."""
         self._minded: frozenset[str] = frozenset()
         self.forecast = None
-        if is_predictive(plan) or self._followed:
+        if is_predictive(plan) or self.followed:
             self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
             for transition in self._transitions_followed():
                 forecast.require(transition)
@@ -142,23 +142,23 @@ class Foresight(Observer):
 
     def follow(self, points: Iterable[Point]) -> bool:
         """Expect these points from now on, for other blocks (see `ahead`). False: look ahead again for that."""
-        self._followed.update(points)
+        self.followed.update(points)
         if (forecast := self.forecast) is None:
-            return not self._followed
+            return not self.followed
         self._news += [(forecast.require, transition) for transition in self._transitions_followed()]
         return True
 
     @property
     def ahead(self) -> Mapping[Point, Seconds]:
         """Expected times of the points that other blocks are tied to and that are still to come."""
-        if not self._followed or self.forecast is None:
+        if not self.followed or self.forecast is None:
             return {}
         times, reached = self.forecast.times, self._facts.reached
-        coming = {point: self.plan.transition(point) for point in self._followed if point not in reached}
+        coming = {point: self.plan.transition(point) for point in self.followed if point not in reached}
         return {point: times[transition] for point, transition in coming.items() if transition is not None}
 
     def _transitions_followed(self) -> list[int]:
-        found = [self.plan.transition(point) for point in self._followed]
+        found = [self.plan.transition(point) for point in self.followed]
         return [transition for transition in found if transition is not None]
 
     # -- behaviors under way -------------------------------------------------------------------------------------
@@ -232,7 +232,7 @@ class Foresight(Observer):
         """Next time to look for delays that only other blocks depend on; None: there is no need."""
         while self._arrivals and self._facts.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
             heapq.heappop(self._arrivals)  # The behavior has arrived there.
-        return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
+        return self._arrivals[0][0] + SURPRISE if self.followed and self._arrivals else None
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
         """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.

@@ -55,6 +55,15 @@ class FollowedBlock(Protocol):
     def times(self) -> Mapping[Point, Seconds]:
         """Time of each point, measured or expected, by the loop's clock."""
 
+    def stuck(self, elsewhere: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that do not come before what is held goes on.
+
+        elsewhere: points of other blocks of which the same is true.
+        """
+
+    def stick(self, elsewhere: Set[Point]) -> None:
+        """Take the news which points of other blocks do not come before what is held goes on."""
+
     @property
     def leaders(self) -> Collection[str]:
         """Blocks that have to end before it begins."""
@@ -103,6 +112,9 @@ class LiveBlocks:
         self._untold: deque[tuple[_Tracked, Point, Seconds]] = deque()
         """Expected times that followers have yet to be told. What these expect because of them is told after that."""
         self._is_telling = False
+        self._is_finding = False
+        self._may_be_stuck = False
+        """True if what is stuck has to be found again."""
 
     @contextmanager
     def opened(self, block: Block) -> Iterator[Block]:
@@ -212,6 +224,36 @@ class LiveBlocks:
                     follower.foresee(qualified(tracked.block.id, point), at)
         finally:
             self._is_telling = False
+
+    def tell_stuck(self) -> None:
+        """Tell each block which points of the others do not come before what is held goes on.
+
+        To be called whenever something is held, or not any more, and at news of any block while something is. It is
+        found from the beginning each time: two blocks do not wait for each other once nothing is held.
+        """
+        self._may_be_stuck = True
+        if self._is_finding:
+            return  # The call below finds and tells it.
+        self._is_finding = True
+        try:
+            while self._may_be_stuck:
+                self._may_be_stuck = False
+                stuck = self._stuck()
+                for tracked in list(self._tracked.values()):
+                    if tracked.performance is not None:
+                        tracked.performance.stick(stuck)
+        finally:
+            self._is_finding = False
+
+    def _stuck(self) -> Set[Point]:
+        found: set[Point] = set()
+        before = -1
+        while len(found) > before:
+            before = len(found)
+            for name, tracked in self._tracked.items():
+                if tracked.performance is not None:
+                    found |= {qualified(name, point) for point in tracked.performance.stuck(found)}
+        return found
 
     def lose(self, block: str, behavior: str) -> None:
         """Tell followers that a behavior of a live block is dropped; once for each behavior."""
