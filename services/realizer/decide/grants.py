@@ -176,6 +176,20 @@ class Grants(Observer):
     def _wake(self, transition: int, at: Seconds) -> None:
         heapq.heappush(self._wakes, (at, transition))
 
+    # -- what was granted too early ------------------------------------------------------------------------------
+
+    def revoke(self, behavior: str) -> Point | None:
+        """Let a behavior under way ask again where it next can wait, if it was told to pass; returns that point."""
+        points = self._plan.chains[behavior].points
+        ahead = (self._net.part_of[point] for point in points[self._facts.next_number(behavior) :])
+        member = next((member for member in ahead if member.can_wait), None)
+        if member is None or (granted := (self._plan.at[member.point], behavior)) not in self._granted:
+            return None
+        self._granted.discard(granted)
+        first = next(number for number, point in enumerate(points) if self._plan.at[point] == granted[0])
+        self._through[behavior] = min(self.through(behavior), first - 1)
+        return member.point
+
     # -- how far -------------------------------------------------------------------------------------------------
 
     def through(self, behavior: str) -> int:

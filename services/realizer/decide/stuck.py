@@ -99,7 +99,9 @@ class Stuck:
         return is_to_begin or member.can_wait or member.point in self._pauses
 
     def _is_stuck(self, member: Member) -> bool:
-        """True if the next point of a behavior is held, or comes after one that is."""
+        """True if a behavior has yet to pass its part, and its next point is held, or comes after one that is."""
+        if member.point in self._facts.reached:
+            return False
         if self._is_held(member):
             return True
         if (chain := self._plan.chains.get(member.behavior)) is None:
