@@ -126,6 +126,9 @@ class Decisions:
         facts = self.facts
         under_way = sorted(facts.under_way)
         before = {each for each in under_way if facts.is_held(each)}
+        goes_on = any(facts.is_held(id) and behaviors is not None and id not in behaviors for id in self.plan.chains)
+        if goes_on or facts.stuck.difference(stuck):
+            self.foresight.is_surprised = True  # How much later all is, nobody knew before.
         for behavior in under_way:
             if performer(self.plan.chains[behavior].behavior) == "body" and (point := self.grants.revoke(behavior)):
                 self._asking[behavior] = point

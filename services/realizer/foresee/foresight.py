@@ -10,6 +10,7 @@ from itertools import pairwise
 from math import inf
 from typing import Any
 
+from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
@@ -116,14 +117,21 @@ class Foresight(Observer):
             self._news += [(forecast.overdue, each, now) for each in coming]
 
     def go_on(self, behavior: str, now: Seconds) -> None:
-        """Expect a behavior that was held, and is not any more, at its next point as much later, at most."""
+        """Expect a behavior that was held, and is not any more, at its next point: later, if it may have stood."""
+        if (forecast := self.forecast) is not None and self._facts.next_number(behavior):
+            self._news.append((forecast.overdue, *self._after_hold(behavior, now)))
+
+    def _after_hold(self, behavior: str, now: Seconds) -> tuple[int, Seconds]:
+        """The instant of the next point of a behavior under way, and when it comes there if it was held since.
+
+        A voice may have stood between two words, a clock has stopped; a movement goes on to where it can wait.
+        """
         number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
-        if (forecast := self.forecast) is None or not number:
-            return
         before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
-        at = before + self._phase(behavior, number) + self._facts.held_between(before, now, behavior)
-        at = now if self._facts.holds(point) else max(now, at)
-        self._news.append((forecast.overdue, self.plan.at[point], at))
+        stands = isinstance(chain.behavior, Speech) or performer(chain.behavior) != "body"
+        stood = self._facts.held_between(before, now, behavior) if stands else 0.0
+        at = before + self._phase(behavior, number) + stood
+        return self.plan.at[point], now if self._facts.holds(point) else max(now, at)
 
     @property
     def _prolonged(self) -> list[tuple[int, int, Seconds]]:
@@ -350,9 +358,14 @@ class Foresight(Observer):
 
         now: what has not come is expected no earlier.
         """
-        facts = (self.foreseen, self._facts.reached, self._facts.arrived, self._net.instants)
-        forecast = full_forecast(self.plan, self._facts.began, self.experience.factor, *facts, self._prolonged)
+        facts = self._facts
+        known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
+        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged)
         if now is not None:
+            for behavior in facts.under_way:
+                points, number = self.plan.chains[behavior].points, facts.next_number(behavior)
+                if number and facts.held_between(facts.reached[points[number - 1]], now, behavior):
+                    forecast.overdue(*self._after_hold(behavior, now))
             for transition in range(len(self.plan.members)):
                 forecast.overdue(transition, now)
             forecast.update()
