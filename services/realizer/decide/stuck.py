@@ -74,7 +74,7 @@ class Stuck:
         return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
 
     def among(self, points: Iterable[Point]) -> Set[Point]:
-        """Those of these points of the block that are stuck."""
+        """Points of the block that are stuck, of these."""
         at = {point: self._plan.transition(point) for point in points if point not in self._facts.reached}
         here = [(point, transition) for point, transition in at.items() if transition in self.instants]
         return {

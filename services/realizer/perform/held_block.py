@@ -4,12 +4,13 @@ A point is stuck if it does not come before what is held goes on.
 """
 
 from collections.abc import Callable, Collection, Set
+from contextlib import AbstractContextManager
 from typing import Protocol
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Effect
+from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.points import Point
@@ -18,7 +19,7 @@ from engage_hri.services.realizer.points import Point
 class Holdable(Protocol):
     """A performance, as far as it can be held."""
 
-    bus: Bus
+    report: Reporter
     decisions: Decisions
     ties: Ties
 
@@ -33,7 +34,7 @@ class Holdable(Protocol):
     def take_in(self, news: Callable[[], object]) -> None:
         """Take in news and do what follows from it, unless the block is ending."""
 
-    def containing(self) -> Containing:
+    def containing(self) -> AbstractContextManager[object]:
         """Contain exceptions in the body of `with`: they end this block, and no other."""
 
     def apply(self, effect: Effect) -> bool:
@@ -56,7 +57,7 @@ class HeldBlock:
 
     @property
     def _now(self) -> Seconds:
-        return self._owner.bus.now()
+        return self._owner.report.now()
 
     def begin(self) -> None:
         """Hold what is held as the block begins."""
