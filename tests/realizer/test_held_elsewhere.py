@@ -248,3 +248,42 @@ async def test_who_was_told_to_pass_before_the_other_was_held_waits_for_it_all_t
     times = instants(seen)
     assert times["h:stroke"] == pytest.approx(times["beat:stroke"], abs=0.02)
     assert seen.warnings() == []
+
+
+@pytest.mark.parametrize("held", ["", "w"])
+async def test_nobody_sets_out_for_what_is_held_to_wait_with_a_raised_arm(held: str) -> None:
+    words, wait = timed(Speech(id="s", text="one"), start="w:end"), Wait(id="w", duration=3.0)
+    tied = timed(OTHER, stroke="b:s:start")
+    async with stage() as seen:
+        asked = [seen.ask(block((wait, words))), seen.ask(block((tied,), id="c"))]
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold", "b", held)
+        await asyncio.sleep(9.0)
+        assert "h:start" not in instants(seen)
+        await steered(seen, "continue", "b", held)
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["s:start"] == pytest.approx(12.0)
+    assert times["h:stroke"] == pytest.approx(12.0)
+    assert times["h:start"] == pytest.approx(12.0 - 1.25)
+    assert seen.warnings() == []
+
+
+async def test_who_sets_out_for_a_word_before_the_voice_stands_is_in_time_for_it() -> None:
+    """The voice is held within a word, goes on to its end, and would say the next at once."""
+    words = Speech(id="s", text="one two three", marks=(Mark("m", 3), Mark("l", 7)))
+    async with stage(FakeBody(pauses=True)) as seen:
+        asked = [
+            seen.ask(block((words,))),
+            seen.ask(block((timed(OTHER, stroke="b:s:l+0.6"),), id="c")),
+        ]
+        await asyncio.sleep(1.2)
+        await steered(seen, "hold", "b", "s")
+        await asyncio.sleep(9.0)
+        await steered(seen, "continue", "b", "s")
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["h:start"] == pytest.approx(2.6 - 1.25)
+    assert times["h:stroke"] == pytest.approx(times["s:l"] + 0.6, abs=0.02)

@@ -116,10 +116,17 @@ class Decisions:
         going = {id: facts.next_number(id) for id in facts.under_way}
         return {id: number for id, number in going.items() if not facts.holds(self.plan.chains[id].points[number])}
 
-    def hold(self, behaviors: Collection[str] | None, now: Seconds, stuck: Collection[Point] = ()) -> list[Effect]:
+    def hold(
+        self,
+        behaviors: Collection[str] | None,
+        now: Seconds,
+        stuck: Collection[Point] = (),
+        standing: Collection[Point] = (),
+    ) -> list[Effect]:
         """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
 
-        stuck: points of other blocks that do not come before what is held goes on. The marking stays, and clocks
+        stuck: points of other blocks that do not come before what is held goes on. standing: those of them that come
+        no nearer either. The marking stays, and clocks
         before their instants stop. Those that were held and are not go on from there. Who was told to pass a point
         asks again: what it is tied to may come later now.
         """
@@ -132,7 +139,7 @@ class Decisions:
         for behavior in under_way:
             if performer(self.plan.chains[behavior].behavior) == "body" and (point := self.grants.revoke(behavior)):
                 self._asking[behavior] = point
-        facts.hold(behaviors, now, stuck)
+        facts.hold(behaviors, now, stuck, standing)
         self.foresight.prolong()
         self.foresight.none_before(now)
         changed = [each for each in under_way if facts.is_held(each) != (each in before)]
@@ -283,12 +290,16 @@ class Decisions:
 
     # -- other blocks --------------------------------------------------------------------------------------------
 
-    def stuck(self, elsewhere: Set[Point]) -> Set[Point]:
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
         """Points that other blocks are tied to and that do not come before what is held goes on.
 
-        elsewhere: points of other blocks of which the same is true.
+        elsewhere: points of other blocks of which the same is true. standing: see `hold`.
         """
-        return self.grants.stuck(elsewhere).among(self.foresight.followed)
+        return self.grants.stuck(elsewhere, standing).among(self.foresight.followed)
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that other blocks are tied to and that come nearer. running: those of others that do."""
+        return self.grants.stuck(elsewhere, frozenset()).running(self.foresight.followed, running)
 
     def follow(self, points: Iterable[Point]) -> None:
         """Expect these points from now on: other blocks are tied to them (see `Foresight.ahead`)."""

@@ -112,7 +112,7 @@ class Grants(Observer):
         if not self._net.is_open(transition):
             return []
         members = self._plan.members[transition]
-        if self._facts.is_holding and self.stuck(self._facts.stuck).keeps(transition):
+        if self._facts.is_holding and self.stuck(self._facts.stuck, self._facts.standing).keeps(transition):
             return []
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
         may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
@@ -146,12 +146,15 @@ class Grants(Observer):
             self._grant(transition, member)
         return beginning
 
-    def stuck(self, elsewhere: Set[Point]) -> Stuck:
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Stuck:
         """Find what is stuck now, if these points of other blocks are; anew when anything has happened."""
-        facts, theirs = self._facts, frozenset(point for point in self._plan.foreign if point in elsewhere)
-        state = (facts.held, theirs, len(facts.reached), len(facts.begun), len(self._net.instants))
+        net, facts = self._net, self._facts
+        theirs = frozenset(point for point in self._plan.foreign if point in elsewhere)
+        firm = theirs & standing
+        known = (len(facts.reached), len(facts.arrived), len(facts.begun), len(net.instants))
+        state = (facts.held, theirs, firm, known)
         if self._known_stuck is None or self._known_stuck[0] != state:
-            self._known_stuck = (state, Stuck(self._plan, self._net, facts, theirs, self._pauses, self._tied))
+            self._known_stuck = (state, Stuck(self._plan, net, facts, theirs, firm, self._pauses, self._tied))
         return self._known_stuck[1]
 
     def _is_there(self, member: Member) -> bool:

@@ -14,7 +14,7 @@ from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, is_foreign
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.points import EPSILON, Member, Point
+from engage_hri.services.realizer.points import EPSILON, Member, Point, performer
 
 
 def fixed_times(net: PetriNet) -> Mapping[int, Sequence[int]]:
@@ -30,7 +30,8 @@ def fixed_times(net: PetriNet) -> Mapping[int, Sequence[int]]:
 class Stuck:
     """Instants that are stuck, given what is held, and what is stuck elsewhere.
 
-    instants: they, and what comes after them. elsewhere: points of other blocks that are stuck.
+    instants: they, and what comes after them. elsewhere: points of other blocks that are stuck. standing: those of
+    them that come no nearer either: they will take as long as now once what is held goes on.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class Stuck:
         net: RunningNet,
         facts: Facts,
         elsewhere: Set[Point],
+        standing: Set[Point],
         pauses: Container[Point],
         tied: Mapping[int, Sequence[int]],
     ) -> None:
@@ -47,8 +49,11 @@ class Stuck:
         self._net = net
         self._facts = facts
         self._elsewhere = elsewhere
+        self._standing = standing
         self._pauses = pauses
         self._tied = tied
+        self._running = self._later_than_moving(elsewhere - standing)
+        """Instants that come nearer, since something that leads to them is on its way."""
         unfired = {each for each in range(len(plan.members)) if each not in net.instants}
         first = {each for each in unfired if any(map(self._is_held, plan.members[each]))}
         self.instants: Set[int] = frozenset()
@@ -66,7 +71,7 @@ class Stuck:
         if any(map(self._is_held, members)):
             return True
         kept = [member for member in members if self._can_be_kept(member)]
-        if any(map(self._goes_to_held, kept)):
+        if any(self._goes_to_held(each) or self._sets_out_in_vain(each) for each in kept):
             return True
         own = {member.behavior for member in members}
         tied = (other for each in self._tied.get(transition, ()) for other in self._plan.members[each])
@@ -82,6 +87,30 @@ class Stuck:
             for point, transition in here
             if point == BLOCK_END or (transition is not None and self._waits_before(point.behavior, transition))
         }
+
+    def running(self, points: Iterable[Point], running: Set[Point]) -> Set[Point]:
+        """Points that come nearer, of these. running: those of other blocks that do."""
+        at = {point: self._plan.transition(point) for point in points}
+        later = self._later_than_moving(running)
+        return {point for point, transition in at.items() if transition in later}
+
+    def _later_than_moving(self, running: Set[Point]) -> Set[int]:
+        """Instants after which something is on its way, in this block or in another."""
+        facts, at = self._facts, self._plan.at
+        moving = {at[each] for each in self._plan.foreign if not (each in facts.reached or each in self._elsewhere)}
+        moving |= {at[each] for each in self._plan.foreign if each in running and each not in facts.reached}
+        for behavior in facts.under_way:
+            chain, number = self._plan.chains[behavior], facts.next_number(behavior)
+            has_stopped = facts.is_held(behavior) and performer(chain.behavior) != "body"
+            if not has_stopped and not facts.holds(chain.points[number]):
+                moving.add(at[chain.points[number]])
+        fired = self._net.instants
+        clocks = (each for each in self._plan.net.places if each.lag > 0.0 and each.kind != "phase")
+        begun = {each.target for each in clocks if each.source in fired and each.target not in fired}
+        found = self._plan.net.later(moving | {each for each in begun if self._net.ripe_at(each) < inf})
+        while more := {each for here in found for each in self._tied.get(here, ())} - found:
+            found = self._plan.net.later(found | more)
+        return found
 
     # -- members of instants -------------------------------------------------------------------------------------
 
@@ -126,6 +155,26 @@ class Stuck:
             if self._net.part_of[point].can_wait or point in self._pauses:
                 return False
         return False
+
+    def _sets_out_in_vain(self, member: Member) -> bool:
+        """True if a movement that begins would only wait before its stroke, for nobody knows how long."""
+        chain = self._plan.chains[member.behavior]
+        strokes = [number for number, point in enumerate(chain.points) if point.sync == "stroke"]
+        if member.kind != "start" or not strokes or performer(chain.behavior) != "body":
+            return False
+        waits = [number for number in range(1, strokes[0]) if self._net.part_of[chain.points[number]].can_wait]
+        for point in chain.points[waits[0] : strokes[0] + 1] if waits else ():
+            here = self._plan.at[point]
+            for each in (here, *self._tied.get(here, ())):
+                others = (other for other in self._plan.members[each] if other.behavior != member.behavior)
+                if any(self._is_standing(other, each) for other in others):
+                    return True
+        return False
+
+    def _is_standing(self, member: Member, transition: int) -> bool:
+        if is_foreign(member.behavior):
+            return member.point in self._standing and member.point not in self._facts.reached
+        return self._is_stuck(member) and transition not in self._running
 
     # -- what follows --------------------------------------------------------------------------------------------
 

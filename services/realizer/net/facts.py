@@ -18,7 +18,7 @@ class Facts:
 
     began: when the block started. begun: when each behavior was told to begin. reached, arrived: when each point was
     passed, and held at. held: behaviors that are to wait where they next can (`hold`); None: all of them. stuck:
-    points of other blocks that do not come before what is held goes on.
+    points of other blocks that do not come before what is held goes on. standing: those that come no nearer either.
     """
 
     def __init__(self, began: Seconds) -> None:
@@ -33,6 +33,7 @@ class Facts:
         """Time of the latest report of each behavior."""
         self.held: Collection[str] | None = ()
         self.stuck: frozenset[Point] = frozenset()
+        self.standing: frozenset[Point] = frozenset()
         self._holds: list[tuple[Seconds, Collection[str] | None]] = []
         """The times at which other behaviors were held than before, and which."""
 
@@ -88,12 +89,18 @@ class Facts:
             self.reached[point] = at
             self._net.reach(point, at)
 
-    def hold(self, behaviors: Collection[str] | None, now: Seconds, stuck: Collection[Point] = ()) -> None:
+    def hold(
+        self,
+        behaviors: Collection[str] | None,
+        now: Seconds,
+        stuck: Collection[Point] = (),
+        standing: Collection[Point] = (),
+    ) -> None:
         """Note that these behaviors, and no others, are held from now on (None: all of them), and what is stuck.
 
         Clocks before their instants stop, and those before points of other blocks that are stuck.
         """
-        self.held, self.stuck = behaviors, frozenset(stuck)
+        self.held, self.stuck, self.standing = behaviors, frozenset(stuck), frozenset(standing)
         stopped = None if behaviors is None else {*behaviors, *(point.behavior for point in stuck)}
         self._holds.append((now, stopped))
         self._net.hold(stopped, now)

@@ -53,6 +53,8 @@ class HeldBlock:
         self._behaviors = behaviors
         self._stuck: Set[Point] = frozenset()
         """Points of other blocks that do not come before what is held goes on."""
+        self._standing: Set[Point] = frozenset()
+        """Those of them that come no nearer either."""
         self.is_holding = is_holding
 
     @property
@@ -82,18 +84,26 @@ class HeldBlock:
             self._behaviors = behaviors
             self._renew()
 
-    def stick(self, elsewhere: Set[Point]) -> None:
+    def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
         """Take the news which points of other blocks are stuck; those that it is tied to count."""
-        if (stuck := elsewhere & self._owner.ties.foreign) != self._stuck:
-            self._stuck = stuck
+        named = self._owner.ties.foreign
+        if (elsewhere & named, standing & named) != (self._stuck, self._standing):
+            self._stuck, self._standing = elsewhere & named, standing & named
             self._renew()
 
-    def stuck(self, elsewhere: Set[Point]) -> Set[Point]:
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
         """Points that others are tied to and that are stuck. elsewhere: points of other blocks that are."""
+        return self._found(lambda: self._owner.decisions.stuck(elsewhere, standing))
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that come nearer. running: those of others that do."""
+        return self._found(lambda: self._owner.decisions.running(elsewhere, running))
+
+    def _found(self, points: Callable[[], Set[Point]]) -> Set[Point]:
         found = set[Point]()
         if not self._owner.is_ending:
             with self._owner.containing():
-                found.update(self._owner.decisions.stuck(elsewhere))
+                found.update(points())
         return found
 
     def tell(self) -> None:
@@ -106,5 +116,5 @@ class HeldBlock:
             self._owner.take_in(self._carry_out)
 
     def _carry_out(self) -> None:
-        for effect in self._owner.decisions.hold(self._behaviors, self._now, self._stuck):
+        for effect in self._owner.decisions.hold(self._behaviors, self._now, self._stuck, self._standing):
             self._owner.apply(effect)

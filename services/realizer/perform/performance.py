@@ -5,7 +5,7 @@ releases is commanded first; predictions, feedback and news for other blocks com
 """
 
 import asyncio
-from collections.abc import Callable, Collection, Iterable, Mapping, Set
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 
 from engage_hri.schemas.blocks import BlockOutcome
@@ -188,14 +188,6 @@ class BlockPerformance:
     def times(self) -> Mapping[Point, Seconds]:
         """Time of each point, measured or expected, by the loop's clock."""
         return self.decisions.foresight.times(self.bus.now())
-
-    def stuck(self, elsewhere: Set[Point]) -> Set[Point]:
-        """Points that others are tied to and that are stuck. elsewhere: points of other blocks that are."""
-        return self.held.stuck(elsewhere)
-
-    def stick(self, elsewhere: Set[Point]) -> None:
-        """Take the news which points of other blocks are stuck."""
-        self.held.stick(elsewhere)
 
     @property
     def newest_plan(self) -> Plan:

@@ -27,6 +27,7 @@ class WaitingBlock:
         """leaders: blocks that have to end first. is_held: whether it is held itself."""
         self.leaders = leaders
         self._is_held = is_held
+        self.held = self
         self._plan = plan
         self._live_blocks = live_blocks
         self._now = now
@@ -52,12 +53,18 @@ class WaitingBlock:
             self._ends[block_of(point)] = at
             self._tell()
 
-    def stuck(self, elsewhere: Set[Point]) -> Set[Point]:
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
         """Points that others are tied to and that do not come before what is held goes on."""
         waits = not elsewhere.isdisjoint(qualified(block, BLOCK_END) for block in self.leaders)
         return self._followed if waits or self._is_held() else frozenset()
 
-    def stick(self, elsewhere: Set[Point]) -> None:
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that come nearer: others that have to end first go on."""
+        standing = elsewhere - running
+        goes_on = any(qualified(block, BLOCK_END) not in standing for block in self.leaders)
+        return self._followed if goes_on else frozenset()
+
+    def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
         """Take the news which points of other blocks do not come before what is held goes on."""
 
     def miss(self, behaviors: Iterable[str]) -> None:
