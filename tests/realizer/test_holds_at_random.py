@@ -7,7 +7,7 @@ import asyncio
 import random
 from collections.abc import Sequence
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec import Struct
 
@@ -121,6 +121,8 @@ HELD: Sequence[tuple[str, str]] = [
     st.sampled_from((0.1, 0.3, 0.6, 1.0, 1.4, 1.9, 2.3, 3.1)),
     st.sampled_from((0.2, 1.0, 8.0)),
 )
+@example(40756, ("a", "s"), 0.58, 8.0)  # who is on its way, and will have to wait before the point of another
+@example(72674, ("a", "w"), 0.49, 1.0)
 def test_whatever_is_held_what_is_tied_to_another_block_comes_neither_before_it_nor_long_after(
     seed: int, held: tuple[str, str], since: float, lasts: float
 ) -> None:

@@ -128,15 +128,16 @@ class Stuck:
         return is_to_begin or member.can_wait or member.point in self._pauses
 
     def _is_stuck(self, member: Member) -> bool:
-        """True if a behavior has yet to pass its part, and its next point is held, or comes after one that is."""
+        """True if a behavior has yet to pass its part, and its next point is stuck, or it waits for one before."""
         if member.point in self._facts.reached:
             return False
         if self._is_held(member):
             return True
         if (chain := self._plan.chains.get(member.behavior)) is None:
             return False  # It comes by itself: another block would have told.
-        number = self._facts.next_number(member.behavior)
-        return number < len(chain.points) and self._plan.at[chain.points[number]] in self.instants
+        number, at = self._facts.next_number(member.behavior), self._plan.at
+        is_next = number < len(chain.points) and at[chain.points[number]] in self.instants
+        return is_next or self._waits_before(member.behavior, at[member.point])
 
     def _sets_out(self, member: Member) -> Seconds:
         """Planned time of the next point of a behavior that is stuck; of another block, that may be now."""
