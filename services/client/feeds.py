@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus, Reading, Subscription
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
 
 M = TypeVar("M")
@@ -30,13 +30,31 @@ class Feed(Reading[M]):
         """
         deadline = None if timeout is None else self._now() + timeout
         while (received := await self._subscription.next(deadline)) is not None:
-            if isinstance(received.message, self._kinds):
+            if self._is_wanted(received):
                 return received.message  # type: ignore[return-value]
         return None
+
+    def _is_wanted(self, received: Received) -> bool:
+        return isinstance(received.message, self._kinds)
 
     def close(self) -> None:
         """End the feed: nothing more comes, and a task that waits in `next` gets None."""
         self._subscription.close()
+
+
+class NewFeed(Feed[M]):
+    """Messages of one kind that are no older than the feed, whatever the bus gives to who comes late."""
+
+    def __init__(self, bus: Bus, kinds: tuple[type, ...], patterns: Iterable[str]) -> None:
+        super().__init__(bus.subscribe(*patterns), kinds, bus.now)
+        self._bus = bus
+        self._began = bus.now()
+
+    def _is_wanted(self, received: Received) -> bool:
+        """True for all but the past. What is sent while the bus still looks for that may come with it."""
+        at = getattr(received.message, "at", None)
+        is_new = not received.past or (isinstance(at, Stamp) and self._bus.local(at) > self._began)
+        return is_new and super()._is_wanted(received)
 
 
 class EventFeed(Feed[ConnectionEvent]):

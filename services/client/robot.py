@@ -38,7 +38,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.feeds import EventFeed, Feed
+from engage_hri.services.client.feeds import EventFeed, Feed, NewFeed
 from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in
 from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.client.steering import Steering
@@ -255,9 +255,15 @@ class Robot(Steering):
         """Follow the robot's turns: each once it is over and answered, or it is too late for an answer."""
         return self._feed((TurnClosed,), keys.TURN_CLOSED)
 
-    def feedback(self) -> Feed[Feedback]:
-        """Follow blocks: their progress, sync points as realised, warnings."""
-        return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
+    def feedback(self, *, past: bool = False) -> Feed[Feedback]:
+        """Follow blocks: their progress, sync points as realised, warnings.
+
+        past: begin with what was told in the last 2 s; otherwise from now on.
+        """
+        if past:
+            return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
+        self._requests.check()
+        return NewFeed(self._bus, Feedback.__args__, (keys.ANY_FEEDBACK,))
 
     def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
         """Follow the actions of the robot and of people as they are seen, and the coming and going of people."""

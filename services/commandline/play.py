@@ -2,7 +2,7 @@
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -204,22 +204,22 @@ async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
 
     sinks: tuple[Sink, ...] = (job.played, tell, job.outputs)
     async with following(bus, sinks, past=False), connect(hub=hub) as robot:
-        code = await _perform_each(job, robot, patience)
+        code = await _perform_each(job, robot, patience, lambda line: log.say(line, bus.now()))
         await job.played.settle()
     job.prose.finish()
     job.warnings.finish()
     return code
 
 
-async def _perform_each(job: Job, robot: Robot, patience: Seconds | None) -> int:
+async def _perform_each(job: Job, robot: Robot, patience: Seconds | None, say: Callable[[str], None]) -> int:
     if job.times is None:
-        return max([await _perform(job, source, robot, patience) for source in job.sources])
+        return max([await _perform(job, source, robot, patience, say) for source in job.sources])
     loop = asyncio.get_running_loop()
     began = loop.time()
 
     async def later(source: InputFile, time: Seconds) -> int:
         await asyncio.sleep(began + time - loop.time())
-        return await _perform(job, source, robot, patience)
+        return await _perform(job, source, robot, patience, say)
 
     async with asyncio.TaskGroup() as group:
         pairs = zip(job.sources, job.times, strict=True)
@@ -227,8 +227,10 @@ async def _perform_each(job: Job, robot: Robot, patience: Seconds | None) -> int
     return max(task.result() for task in tasks)
 
 
-async def _perform(job: Job, source: InputFile, robot: Robot, patience: Seconds | None) -> int:
-    """Perform the content of a file, in order.
+async def _perform(
+    job: Job, source: InputFile, robot: Robot, patience: Seconds | None, say: Callable[[str], None]
+) -> int:
+    """Perform the content of a file, in order. say: prints a line of the log.
 
     Returns the worst exit code; a failure is told and ends nothing else.
     """
@@ -249,6 +251,8 @@ async def _perform(job: Job, source: InputFile, robot: Robot, patience: Seconds 
         elif outcome.dropped:
             left_out = ", ".join(outcome.dropped)
             print(f"{source.path}: {thing.id} was {outcome.status} without {left_out}", file=sys.stderr)
+        if end := job.played.end_before_turn(outcome):
+            say(end)
         code = job.played.exit_code(outcome)
         if code != DONE:
             why = f": {outcome.fault.reason}" if outcome.fault is not None else ""

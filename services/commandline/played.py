@@ -36,10 +36,15 @@ class Played:
         """Events that have not ended, by block and behavior; None until recognition has told of the start."""
         fragments = [thing for thing in things if isinstance(thing, TurnFragment)]
         self._holds_turn = bool(fragments) and fragments[-1].turn_status in ("beginning", "middle")
+        self._begun: set[str] = set()
+        """Blocks that have begun."""
         self._changed = asyncio.Event()
 
     def __call__(self, message: Message, at: Seconds) -> None:
         match message:
+            case BlockProgress(block=str() as block, progress="start"):
+                self._begun.add(block)
+                return
             case SyncPointProgress(block=block, behavior=behavior, sync="start"):
                 # A block may end before recognition has said that the event has started.
                 if (block, behavior) in self._announced:
@@ -91,6 +96,13 @@ class Played:
             if not (self._holds_turn and event and event.kind == "adjacency_pair")
         ]
         return max(limits, default=None)
+
+    def end_before_turn(self, outcome: FragmentOutcome | BlockOutcome) -> str:
+        """Tell how a block has ended that never began: no feedback says so. Empty: of another."""
+        if not isinstance(outcome, BlockOutcome) or outcome.block in self._begun or outcome.status == "done":
+            return ""
+        cause = f", replaced by {outcome.replaced_by}" if outcome.replaced_by else ""
+        return f"block {outcome.block}: {outcome.status} before its turn came{cause}"
 
     def exit_code(self, outcome: FragmentOutcome | BlockOutcome) -> int:
         """Exit code of an outcome. A block that another file's REPLACE ended counts as done."""

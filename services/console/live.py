@@ -126,6 +126,10 @@ class Log:
         if line is not None:
             _print(self._console, line)
 
+    def say(self, text: str, at: Seconds) -> None:
+        """Print a line about what no message tells."""
+        _print(self._console, log.timed(text, self.scene, at))
+
     def __enter__(self) -> Self:
         return self
 

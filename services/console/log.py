@@ -36,7 +36,12 @@ class Telling(Struct, frozen=True, kw_only=True):
 def line(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:
     """Write the line for one message; None for most. before, after: the scene around it. at: its local instant."""
     text = _text(message, before, after, at, telling)
-    return None if text is None else f"{wording.clock(at - after.began):>8}  {text}"
+    return None if text is None else timed(text, after, at)
+
+
+def timed(text: str, scene: Scene, at: Seconds) -> str:
+    """Write the line for a text, with the time since the scene began."""
+    return f"{wording.clock(at - scene.began):>8}  {text}"
 
 
 def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: Telling) -> str | None:

@@ -60,7 +60,7 @@ class _Realizer:
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
         self.planning = Planning(bus, config, self.live_blocks, self.performing)
-        self.steering = Steering(bus, self.desk, config, self.live, self.performances)
+        self.steering = Steering(bus, self.desk, config, self.live, self.performances, self.live_blocks)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,
             self.steering.forget,
@@ -204,7 +204,9 @@ class _Realizer:
             for other in earlier:
                 other.stop(Ending("interrupted", replaced_by=live.id))
         leaders = {other.block.id for other in earlier}
-        waiting = WaitingBlock(plan, self.live_blocks, self.bus.now, leaders)
+        waiting = WaitingBlock(
+            plan, self.live_blocks, self.bus.now, leaders, lambda: self.steering.held(live) is None
+        )
         self.live_blocks.perform(live.block.id, waiting, live.elsewhere)
         ends = [qualified(name, BLOCK_END) for name in leaders] if not replaces else []
         with self.live_blocks.followed(waiting, ends):

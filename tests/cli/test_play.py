@@ -155,6 +155,21 @@ def test_a_block_that_another_file_replaces_counts_as_done(engage: Engage, files
     assert result.code == 0, result.err
 
 
+def test_the_log_tells_of_a_block_that_is_replaced_while_it_waits_for_its_turn(
+    engage: Engage, files: dict[str, Path], tmp_path: Path
+) -> None:
+    (tmp_path / "waiting.xml").write_text('<bml id="waiting" composition="APPEND"><wait id="w" duration="1"/></bml>')
+    result = engage(*PLAY, "--at", "0,0.5,1", files["long"], tmp_path / "waiting.xml", files["new"])
+
+    ends = [line.split(maxsplit=1)[1] for line in result.out.splitlines() if " block " in line]
+    assert sorted(ends) == [
+        "block long: interrupted",
+        "block new: done",
+        "block waiting: interrupted before its turn came, replaced by new",
+    ]
+    assert result.code == 0, result.err
+
+
 def test_a_fragment_that_another_file_replaces_counts_as_done(engage: Engage, files: dict[str, Path]) -> None:
     result = engage(*PLAY, "--at", "0,1", "--feedback", "-", files["ask"], files["new"])
 

@@ -185,3 +185,105 @@ async def test_what_a_held_behavior_has_passed_is_waited_for_no_more() -> None:
 
     assert seen.times()["s:m1"] == 1.0
     assert seen.times()["g:relax"] == seen.times()["f:relax"] == 2.5
+
+
+@pytest.mark.parametrize("since", [0.1, 0.6])
+async def test_what_waits_for_what_is_held_is_waited_for_in_other_blocks_and_so_on(since: float) -> None:
+    """The voice waits for the gesture that is held, the nod for the voice, the beat for the nod."""
+    words = Speech(id="s", text="one two three", marks=(Mark("m", 3),))
+    wave = Gesture(id="g", lexeme="WAVE", mode="RIGHT_HAND")
+    async with stage(FakeBody(pauses=True)) as seen:
+        asked = [
+            seen.ask(block((words, timed(wave, stroke="s:m")), id="a")),
+            seen.ask(block((timed(NOD, stroke="a:s:end"),), id="b")),
+            seen.ask(block((timed(OTHER, stroke="b:nod:stroke+0.3"),), id="c")),
+        ]
+        await asyncio.sleep(since)
+        await steered(seen, "hold", "a", "g")
+        await asyncio.sleep(6.0)
+        assert not {"nod:stroke", "h:stroke"} & instants(seen).keys()
+        await steered(seen, "continue", "a", "g")
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["g:stroke"] > since + 6.0
+    assert times["nod:stroke"] == pytest.approx(times["s:end"], abs=0.02)
+    assert times["h:stroke"] == pytest.approx(times["nod:stroke"] + 0.3, abs=0.02)
+    assert seen.warnings() == []
+
+
+async def test_what_is_tied_to_a_block_that_waits_for_one_that_is_held_does_not_go_on_without_it() -> None:
+    async with stage() as seen:
+        asked = [
+            seen.ask(block((Wait(id="w", duration=2.0),))),
+            seen.ask(block((BEAT,), id="c", composition="APPEND")),
+            seen.ask(block((timed(NOD, stroke="c:beat:stroke-0.5"),), id="d")),
+        ]
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold", "b")
+        await asyncio.sleep(9.0)
+        await steered(seen, "continue", "b")
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["w:end"] == pytest.approx(11.0)
+    assert times["nod:stroke"] - times["beat:stroke"] == pytest.approx(-0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("is_one_block", [True, False])
+async def test_who_was_told_to_pass_before_the_other_was_held_waits_for_it_all_the_same(is_one_block: bool) -> None:
+    """Both set out at once, and need not stop; then one of them is held on its way."""
+    tied = timed(OTHER, stroke="b:beat:stroke" if not is_one_block else "beat:stroke")
+    async with stage() as seen:
+        asked = [seen.ask(block((BEAT, tied) if is_one_block else (BEAT,)))]
+        if not is_one_block:
+            asked.append(seen.ask(block((tied,), id="c")))
+        await asyncio.sleep(0.1)
+        await steered(seen, "hold", "b", "beat")
+        await asyncio.sleep(5.0)
+        assert "h:stroke" not in instants(seen)
+        await steered(seen, "continue", "b", "beat")
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["h:stroke"] == pytest.approx(times["beat:stroke"], abs=0.02)
+    assert seen.warnings() == []
+
+
+@pytest.mark.parametrize("held", ["", "w"])
+async def test_nobody_sets_out_for_what_is_held_to_wait_with_a_raised_arm(held: str) -> None:
+    words, wait = timed(Speech(id="s", text="one"), start="w:end"), Wait(id="w", duration=3.0)
+    tied = timed(OTHER, stroke="b:s:start")
+    async with stage() as seen:
+        asked = [seen.ask(block((wait, words))), seen.ask(block((tied,), id="c"))]
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold", "b", held)
+        await asyncio.sleep(9.0)
+        assert "h:start" not in instants(seen)
+        await steered(seen, "continue", "b", held)
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["s:start"] == pytest.approx(12.0)
+    assert times["h:stroke"] == pytest.approx(12.0)
+    assert times["h:start"] == pytest.approx(12.0 - 1.25)
+    assert seen.warnings() == []
+
+
+async def test_who_sets_out_for_a_word_before_the_voice_stands_is_in_time_for_it() -> None:
+    """The voice is held within a word, goes on to its end, and would say the next at once."""
+    words = Speech(id="s", text="one two three", marks=(Mark("m", 3), Mark("l", 7)))
+    async with stage(FakeBody(pauses=True)) as seen:
+        asked = [
+            seen.ask(block((words,))),
+            seen.ask(block((timed(OTHER, stroke="b:s:l+0.6"),), id="c")),
+        ]
+        await asyncio.sleep(1.2)
+        await steered(seen, "hold", "b", "s")
+        await asyncio.sleep(9.0)
+        await steered(seen, "continue", "b", "s")
+        await asyncio.gather(*(each.outcome for each in asked))
+
+    times = instants(seen)
+    assert times["h:start"] == pytest.approx(2.6 - 1.25)
+    assert times["h:stroke"] == pytest.approx(times["s:l"] + 0.6, abs=0.02)

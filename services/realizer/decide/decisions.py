@@ -4,7 +4,7 @@ Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `dea
 decided comes from the marking of the net (grants.py) and from what is expected (foresee/foresight.py).
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence, Set
 from math import isfinite
 
 from msgspec.structs import replace
@@ -47,6 +47,10 @@ class Decisions:
         self.lateness_watch = LatenessWatch(config)
         self._unwatched: set[str] = set()
         """Behaviors about which there is news, so that another report of theirs is to be expected than before."""
+        self._asking: dict[str, Point] = {}
+        """Behaviors that were told to pass a point, and are to ask again: something was held since."""
+        self._kept_back: set[str] = set()
+        """Those that were told to wait until they are told to pass."""
         self.held_up = HeldUp()
         self._observers = observers
         self.replan(plan)
@@ -112,16 +116,30 @@ class Decisions:
         going = {id: facts.next_number(id) for id in facts.under_way}
         return {id: number for id, number in going.items() if not facts.holds(self.plan.chains[id].points[number])}
 
-    def hold(self, behaviors: Collection[str] | None, now: Seconds) -> list[Effect]:
+    def hold(
+        self,
+        behaviors: Collection[str] | None,
+        now: Seconds,
+        stuck: Collection[Point] = (),
+        standing: Collection[Point] = (),
+    ) -> list[Effect]:
         """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
 
-        The marking stays, and clocks before their instants stop. Those that were held and are not go on from there.
+        stuck: points of other blocks that do not come before what is held goes on. standing: those of them that come
+        no nearer either. The marking stays, and clocks
+        before their instants stop. Those that were held and are not go on from there. Who was told to pass a point
+        asks again: what it is tied to may come later now.
         """
         facts = self.facts
         under_way = sorted(facts.under_way)
         before = {each for each in under_way if facts.is_held(each)}
-        facts.hold(behaviors, now)
-        self.net.hold(behaviors, now)
+        goes_on = any(facts.is_held(id) and behaviors is not None and id not in behaviors for id in self.plan.chains)
+        if goes_on or facts.stuck.difference(stuck):
+            self.foresight.is_surprised = True  # How much later all is, nobody knew before.
+        for behavior in under_way:
+            if performer(self.plan.chains[behavior].behavior) == "body" and (point := self.grants.revoke(behavior)):
+                self._asking[behavior] = point
+        facts.hold(behaviors, now, stuck, standing)
         self.foresight.prolong()
         self.foresight.none_before(now)
         changed = [each for each in under_way if facts.is_held(each) != (each in before)]
@@ -133,7 +151,8 @@ class Decisions:
             self.foresight.paces[behavior] = self.foresight.pace(behavior, now, self.grants.may_pass)
         effects: list[Effect] = []
         for behavior in changed:
-            effects.append(self._command(behavior, self.grants.through(behavior), now))
+            effects.append(self._command(behavior, max(0, self.grants.through(behavior)), now))
+            self._kept_back |= {behavior} & self._asking.keys()
             self._unwatched.add(behavior)
         for transition in range(len(self.plan.members)):
             self.grants.on_opened(transition)
@@ -201,7 +220,7 @@ class Decisions:
         return beginning
 
     def _effects(self, beginning: list[str], now: Seconds) -> list[Effect]:
-        effects: list[Effect] = []
+        effects = self._keep_back(now)
         touched, self.grants.touched = self.grants.touched, set()
         for behavior in sorted(touched.difference(beginning)):
             if behavior in self.facts.begun and not self.facts.has_ended(behavior):
@@ -213,19 +232,35 @@ class Decisions:
             self._unwatched.add(behavior)
         return effects
 
+    def _keep_back(self, now: Seconds) -> list[Effect]:
+        """Keep back those that ask again before they pass a point (see `hold`), until they are told to pass."""
+        commands: list[Effect] = []
+        for behavior, point in sorted(self._asking.items()):
+            is_over = self.facts.has_ended(behavior) or point not in self.plan.at
+            if is_over or self.grants.may_pass(point):
+                del self._asking[behavior]
+                self.grants.touched.add(behavior)
+            elif behavior not in self._kept_back and not self.facts.is_held(behavior):
+                self._kept_back.add(behavior)
+                commands.append(self._command(behavior, max(0, self.grants.through(behavior)), now))
+        return commands
+
     def _extension(self, behavior: str, now: Seconds) -> Iterable[Extend]:
         """The command to go on, if the behavior may go further than before or is to go at another pace."""
         known, before = self.grants.through(behavior), self.foresight.paces.get(behavior, ())
         through = self.grants.extend(behavior, now)
         after = self.foresight.pace(behavior, now, self.grants.may_pass)
-        if through > known or differ_noticeably(before, after):
+        is_free = behavior in self._kept_back and behavior not in self._asking
+        if is_free or through > known or differ_noticeably(before, after):
+            self._kept_back.discard(behavior if is_free else "")
             self.foresight.paces[behavior] = after
             self._unwatched.add(behavior)
             yield self._command(behavior, through, now)
 
     def _command(self, behavior: str, through: int, now: Seconds) -> Extend:
         sync = self.plan.chains[behavior].points[through].sync
-        return Extend(behavior, sync, self.foresight.paces.get(behavior, ()), self.facts.is_held(behavior))
+        is_held = self.facts.is_held(behavior) or behavior in self._asking
+        return Extend(behavior, sync, self.foresight.paces.get(behavior, ()), is_held)
 
     @property
     def deadline(self) -> Seconds | None:
@@ -254,6 +289,17 @@ class Decisions:
         self.lateness_watch.expect(behavior, points[number].sync, expected, natural)
 
     # -- other blocks --------------------------------------------------------------------------------------------
+
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
+        """Points that other blocks are tied to and that do not come before what is held goes on.
+
+        elsewhere: points of other blocks of which the same is true. standing: see `hold`.
+        """
+        return self.grants.stuck(elsewhere, standing).among(self.foresight.followed)
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that other blocks are tied to and that come nearer. running: those of others that do."""
+        return self.grants.stuck(elsewhere, frozenset()).running(self.foresight.followed, running)
 
     def follow(self, points: Iterable[Point]) -> None:
         """Expect these points from now on: other blocks are tied to them (see `Foresight.ahead`)."""

@@ -6,32 +6,18 @@ prediction it comes on time. Only instants that something has changed for are lo
 """
 
 import heapq
-from collections import defaultdict
-from collections.abc import Callable, Collection, Container
-from math import inf
-from typing import NamedTuple
+from collections.abc import Callable, Set
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.decide.stuck import Stuck, fixed_times
 from engage_hri.services.realizer.foresee.foresight import Foresight
 from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.net.petri_net import Place
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import EPSILON, Member, Point
-
-
-class _Stuck(NamedTuple):
-    """Instants that wait for what is held, those with a held behavior among them.
-
-    state: what is held, and how many points of it were reached by then.
-    """
-
-    state: tuple[Collection[str] | None, int]
-    held: Collection[int]
-    instants: Container[int]
 
 
 class Grants(Observer):
@@ -68,13 +54,9 @@ class Grants(Observer):
         self._dirty: set[int] = set()
         """Instants that something has changed for."""
         self._pauses = _pauses(plan)
-        self._stuck_at: _Stuck | None = None
-        self._tied: dict[int, list[int]] = defaultdict(list)
-        """For each instant, those from which it comes at a fixed time."""
-        for place in plan.net.places:
-            if place.kind == "delay" and place.source:
-                self._tied[place.target].append(place.source)
-                self._tied[place.source].append(place.target)
+        self._tied = fixed_times(plan.net)
+        self._known_stuck: tuple[object, Stuck] | None = None
+        """What was stuck when it was asked last, after what had been the case by then."""
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------
 
@@ -130,7 +112,7 @@ class Grants(Observer):
         if not self._net.is_open(transition):
             return []
         members = self._plan.members[transition]
-        if self._facts.is_holding and self._waits_for_held(transition):
+        if self._facts.is_holding and self.stuck(self._facts.stuck, self._facts.standing).keeps(transition):
             return []
         missing = [member for member in members if member.kind != "start" and not self._is_there(member)]
         may_pass = missing[0] if len(missing) == 1 and missing[0].can_wait else None
@@ -164,90 +146,16 @@ class Grants(Observer):
             self._grant(transition, member)
         return beginning
 
-    def _is_held(self, member: Member) -> bool:
-        return self._facts.is_held(member.behavior) and member.point not in self._facts.reached
-
-    def _is_stuck(self, member: Member, stuck: Container[int]) -> bool:
-        """True if the next point of a behavior is held, or comes after one that is (see `_stuck`)."""
-        if self._is_held(member):
-            return True
-        if (chain := self._plan.chains.get(member.behavior)) is None:
-            return self._plan.at[member.point] in stuck
-        number = self._facts.next_number(member.behavior)
-        return number < len(chain.points) and self._plan.at[chain.points[number]] in stuck
-
-    def _stuck(self) -> Container[int]:
-        """Instants that do not come before what is held goes on: its own, and those that wait for them."""
-        instants, held = self._net.instants, self._facts.held
-        state = (held, self._reached_of(held))
-        known = self._stuck_at
-        if known is None or known.state != state or any(number in instants for number in known.held):
-            unfired = (each for each in enumerate(self._plan.members) if each[0] not in instants)
-            first = {number for number, members in unfired if any(map(self._is_held, members))}
-            known = self._stuck_at = _Stuck(state, first, self._later(first))
-        return known.instants
-
-    def _later(self, first: set[int]) -> set[int]:
-        """Instants of `first`, and those that wait for them; what follows a behavior that goes on does not."""
-        net = self._plan.net
-        series = [place for place in net.places if place.after]
-        found = net.later(first, of_instants=True)
-        while more := {each.target for each in series if self._waits_before(each, found)} - found:
-            found = net.later(found | more, of_instants=True)
-        return found
-
-    def _waits_before(self, place: Place, stuck: Container[int]) -> bool:
-        """True if the behavior of whose token a place waits does not get there before what is held goes on."""
-        if (chain := self._plan.chains.get(place.after)) is None:
-            return place.source in stuck
-        at, number = self._plan.at, self._facts.next_number(place.after)
-        ahead = [point for point in chain.points[number:] if at[point] <= place.source]
-        if not ahead or self._facts.is_held(place.after):
-            return bool(ahead)
-        return any(at[point] in stuck and self._net.part_of[point].can_wait for point in ahead)
-
-    def _reached_of(self, held: Collection[str] | None) -> int:
-        """Number of points of these behaviors (None: of all) that are reached."""
-        facts = self._facts
-        if held is None:
-            return len(facts.reached)
-        theirs = sum(point in facts.reached for point in self._plan.foreign if point.behavior in held)
-        return theirs + sum(map(facts.next_number, held))
-
-    def _waits_for_held(self, transition: int) -> bool:
-        """True if an instant has to wait for a behavior that is held: one of its own, or one that is tied to it.
-
-        A behavior that waits for one that is held counts like that one. Of a behavior that comes at a fixed time
-        after this instant, what it has yet to do before that counts.
-        """
-        members = self._plan.members[transition]
-        if any(map(self._is_held, members)):
-            return True
-        stuck = self._stuck()
-        if any(self._goes_to_held(member, stuck) for member in members):
-            return True
-        own = {member.behavior for member in members}
-        tied = (other for each in self._tied[transition] for other in self._plan.members[each])
-        held = [other for other in tied if other.behavior not in own and self._is_stuck(other, stuck)]
-        return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
-
-    def _sets_out(self, member: Member) -> Seconds:
-        """Planned time of the next point of a behavior that is stuck; of another block, that may be now."""
-        if (chain := self._plan.chains.get(member.behavior)) is None:
-            return -inf
-        return self._plan.predicted(chain.points[self._facts.next_number(member.behavior)])
-
-    def _goes_to_held(self, member: Member, stuck: Container[int]) -> bool:
-        """True if a behavior cannot wait any more before an instant that is tied to a point of one that is held."""
-        chain = self._plan.chains.get(member.behavior)
-        for point in chain.points[chain.points.index(member.point) + 1 :] if chain is not None else ():
-            here = self._plan.at[point]
-            together = (other for each in (here, *self._tied[here]) for other in self._plan.members[each])
-            if any(other.behavior != member.behavior and self._is_stuck(other, stuck) for other in together):
-                return True
-            if self._net.part_of[point].can_wait or point in self._pauses:
-                return False
-        return False
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Stuck:
+        """Find what is stuck now, if these points of other blocks are; anew when anything has happened."""
+        net, facts = self._net, self._facts
+        theirs = frozenset(point for point in self._plan.foreign if point in elsewhere)
+        firm = theirs & standing
+        known = (len(facts.reached), len(facts.arrived), len(facts.begun), len(net.instants))
+        state = (facts.held, theirs, firm, known)
+        if self._known_stuck is None or self._known_stuck[0] != state:
+            self._known_stuck = (state, Stuck(self._plan, net, facts, theirs, firm, self._pauses, self._tied))
+        return self._known_stuck[1]
 
     def _is_there(self, member: Member) -> bool:
         can_wait = member.can_wait or member.point in self._pauses
@@ -270,6 +178,20 @@ class Grants(Observer):
 
     def _wake(self, transition: int, at: Seconds) -> None:
         heapq.heappush(self._wakes, (at, transition))
+
+    # -- what was granted too early ------------------------------------------------------------------------------
+
+    def revoke(self, behavior: str) -> Point | None:
+        """Let a behavior under way ask again where it next can wait, if it was told to pass; returns that point."""
+        points = self._plan.chains[behavior].points
+        ahead = (self._net.part_of[point] for point in points[self._facts.next_number(behavior) :])
+        member = next((member for member in ahead if member.can_wait), None)
+        if member is None or (granted := (self._plan.at[member.point], behavior)) not in self._granted:
+            return None
+        self._granted.discard(granted)
+        first = next(number for number, point in enumerate(points) if self._plan.at[point] == granted[0])
+        self._through[behavior] = min(self.through(behavior), first - 1)
+        return member.point
 
     # -- how far -------------------------------------------------------------------------------------------------
 

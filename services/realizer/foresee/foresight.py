@@ -10,6 +10,7 @@ from itertools import pairwise
 from math import inf
 from typing import Any
 
+from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
@@ -34,7 +35,8 @@ class Foresight(Observer):
 
     paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
     call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
-    times of points of other blocks that this one is tied to. forecast: None if nothing in the block needs one.
+    times of points of other blocks that this one is tied to. followed: points that others are tied to. forecast:
+    None if nothing in the block needs one.
     """
 
     forecast: Forecast | None
@@ -52,8 +54,7 @@ class Foresight(Observer):
         self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
         self._facts = facts
-        self._followed: set[Point] = set()
-        """Points of this block that other blocks are tied to."""
+        self.followed: set[Point] = set()
         self._expected = {point: facts.began + plan.predicted(point) for point in plan.at}
 
     def look_ahead(self, plan: Plan, net: RunningNet) -> None:
@@ -67,7 +68,7 @@ class Foresight(Observer):
         """Behaviors and numbers of their next points: until when, and since when, each is expected there."""
         self._minded: frozenset[str] = frozenset()
         self.forecast = None
-        if is_predictive(plan) or self._followed:
+        if is_predictive(plan) or self.followed:
             self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
             for transition in self._transitions_followed():
                 forecast.require(transition)
@@ -116,14 +117,21 @@ class Foresight(Observer):
             self._news += [(forecast.overdue, each, now) for each in coming]
 
     def go_on(self, behavior: str, now: Seconds) -> None:
-        """Expect a behavior that was held, and is not any more, at its next point as much later, at most."""
+        """Expect a behavior that was held, and is not any more, at its next point: later, if it may have stood."""
+        if (forecast := self.forecast) is not None and self._facts.next_number(behavior):
+            self._news.append((forecast.overdue, *self._after_hold(behavior, now)))
+
+    def _after_hold(self, behavior: str, now: Seconds) -> tuple[int, Seconds]:
+        """The instant of the next point of a behavior under way, and when it comes there if it was held since.
+
+        A voice may have stood between two words, a clock has stopped; a movement goes on to where it can wait.
+        """
         number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
-        if (forecast := self.forecast) is None or not number:
-            return
         before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
-        at = before + self._phase(behavior, number) + self._facts.held_between(before, now, behavior)
-        at = now if self._facts.holds(point) else max(now, at)
-        self._news.append((forecast.overdue, self.plan.at[point], at))
+        stands = isinstance(chain.behavior, Speech) or performer(chain.behavior) != "body"
+        stood = self._facts.held_between(before, now, behavior) if stands else 0.0
+        at = before + self._phase(behavior, number) + stood
+        return self.plan.at[point], now if self._facts.holds(point) else max(now, at)
 
     @property
     def _prolonged(self) -> list[tuple[int, int, Seconds]]:
@@ -142,23 +150,23 @@ class Foresight(Observer):
 
     def follow(self, points: Iterable[Point]) -> bool:
         """Expect these points from now on, for other blocks (see `ahead`). False: look ahead again for that."""
-        self._followed.update(points)
+        self.followed.update(points)
         if (forecast := self.forecast) is None:
-            return not self._followed
+            return not self.followed
         self._news += [(forecast.require, transition) for transition in self._transitions_followed()]
         return True
 
     @property
     def ahead(self) -> Mapping[Point, Seconds]:
         """Expected times of the points that other blocks are tied to and that are still to come."""
-        if not self._followed or self.forecast is None:
+        if not self.followed or self.forecast is None:
             return {}
         times, reached = self.forecast.times, self._facts.reached
-        coming = {point: self.plan.transition(point) for point in self._followed if point not in reached}
+        coming = {point: self.plan.transition(point) for point in self.followed if point not in reached}
         return {point: times[transition] for point, transition in coming.items() if transition is not None}
 
     def _transitions_followed(self) -> list[int]:
-        found = [self.plan.transition(point) for point in self._followed]
+        found = [self.plan.transition(point) for point in self.followed]
         return [transition for transition in found if transition is not None]
 
     # -- behaviors under way -------------------------------------------------------------------------------------
@@ -232,7 +240,7 @@ class Foresight(Observer):
         """Next time to look for delays that only other blocks depend on; None: there is no need."""
         while self._arrivals and self._facts.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
             heapq.heappop(self._arrivals)  # The behavior has arrived there.
-        return self._arrivals[0][0] + SURPRISE if self._followed and self._arrivals else None
+        return self._arrivals[0][0] + SURPRISE if self.followed and self._arrivals else None
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
         """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.
@@ -350,9 +358,14 @@ class Foresight(Observer):
 
         now: what has not come is expected no earlier.
         """
-        facts = (self.foreseen, self._facts.reached, self._facts.arrived, self._net.instants)
-        forecast = full_forecast(self.plan, self._facts.began, self.experience.factor, *facts, self._prolonged)
+        facts = self._facts
+        known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
+        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged)
         if now is not None:
+            for behavior in facts.under_way:
+                points, number = self.plan.chains[behavior].points, facts.next_number(behavior)
+                if number and facts.held_between(facts.reached[points[number - 1]], now, behavior):
+                    forecast.overdue(*self._after_hold(behavior, now))
             for transition in range(len(self.plan.members)):
                 forecast.overdue(transition, now)
             forecast.update()

@@ -17,7 +17,8 @@ class Facts:
     """Measured times, by the clock of the loop. They outlive the net: another plan of the block starts from them.
 
     began: when the block started. begun: when each behavior was told to begin. reached, arrived: when each point was
-    passed, and held at. held: behaviors that are to wait where they next can (`hold`); None: all of them.
+    passed, and held at. held: behaviors that are to wait where they next can (`hold`); None: all of them. stuck:
+    points of other blocks that do not come before what is held goes on. standing: those that come no nearer either.
     """
 
     def __init__(self, began: Seconds) -> None:
@@ -31,6 +32,8 @@ class Facts:
         self._heard: dict[str, Seconds] = {}
         """Time of the latest report of each behavior."""
         self.held: Collection[str] | None = ()
+        self.stuck: frozenset[Point] = frozenset()
+        self.standing: frozenset[Point] = frozenset()
         self._holds: list[tuple[Seconds, Collection[str] | None]] = []
         """The times at which other behaviors were held than before, and which."""
 
@@ -86,10 +89,21 @@ class Facts:
             self.reached[point] = at
             self._net.reach(point, at)
 
-    def hold(self, behaviors: Collection[str] | None, now: Seconds) -> None:
-        """Note that these behaviors, and no others, are held from now on. None: all of them."""
-        self.held = behaviors
-        self._holds.append((now, behaviors))
+    def hold(
+        self,
+        behaviors: Collection[str] | None,
+        now: Seconds,
+        stuck: Collection[Point] = (),
+        standing: Collection[Point] = (),
+    ) -> None:
+        """Note that these behaviors, and no others, are held from now on (None: all of them), and what is stuck.
+
+        Clocks before their instants stop, and those before points of other blocks that are stuck.
+        """
+        self.held, self.stuck, self.standing = behaviors, frozenset(stuck), frozenset(standing)
+        stopped = None if behaviors is None else {*behaviors, *(point.behavior for point in stuck)}
+        self._holds.append((now, stopped))
+        self._net.hold(stopped, now)
 
     def plausible(self, point: Point, at: Seconds, now: Seconds) -> Seconds:
         """`at`, but no later than now, and no earlier than the behavior's last report: clocks differ, bodies err."""
@@ -130,8 +144,8 @@ class Facts:
 
     @property
     def is_holding(self) -> bool:
-        """True if any behavior is held."""
-        return self.held is None or bool(self.held)
+        """True if any behavior is held, or anything stuck elsewhere."""
+        return self.held is None or bool(self.held) or bool(self.stuck)
 
     def is_held(self, behavior: str) -> bool:
         """True if the behavior is to wait where it next can."""

@@ -1,9 +1,5 @@
 """Holds that are in force: on the whole robot, on blocks, on behaviors."""
 
-from collections.abc import Mapping
-
-from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.points import EPSILON
 
@@ -26,20 +22,11 @@ class Holds:
         for held in [each for each in self._since if _is_part(each, (block, behavior))]:
             del self._since[held]
 
-    def of_block(self, block: str, live: Mapping[str, Block] = {}) -> frozenset[str] | None:
-        """Behaviors of the block that are held, and those of other live blocks, by `block:behavior`.
-
-        live: all live blocks by id, each with the name for its id that others know it by. None: all behaviors of the
-        block.
-        """
+    def of_block(self, block: str) -> frozenset[str] | None:
+        """Behaviors of the block that are held; None: all."""
         if ("", "") in self._since or (block, "") in self._since:
             return None
-        held = {behavior for name, behavior in self._since if name == block}
-        for id, other in live.items() if self._since else ():
-            whole = (BLOCK_ITSELF, *(each.id for each in other.behaviors)) if (id, "") in self._since else ()
-            parts = (behavior for name, behavior in self._since if name == id)
-            held |= {f"{other.id}:{each}" for each in (*whole, *parts) if each and id != block}
-        return frozenset(held)
+        return frozenset(behavior for name, behavior in self._since if name == block)
 
     @property
     def in_force(self) -> list[tuple[Named, Seconds]]:

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter, deque
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from math import inf
 from typing import Protocol
@@ -46,6 +46,22 @@ class TiedBlock(Protocol):
         """Take the news that no more points of these behaviors will be reached."""
 
 
+class Holding(Protocol):
+    """Points of a block that are stuck: they do not come before what is held goes on."""
+
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that are stuck.
+
+        elsewhere: points of other blocks that are. standing: those of them that come no nearer either.
+        """
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that come nearer. running: those of other blocks that do."""
+
+    def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
+        """Take the news which points of other blocks are stuck, and which come no nearer either."""
+
+
 class FollowedBlock(Protocol):
     """A block that is being performed, or waits for its turn, and that others may be tied to."""
 
@@ -54,6 +70,10 @@ class FollowedBlock(Protocol):
 
     def times(self) -> Mapping[Point, Seconds]:
         """Time of each point, measured or expected, by the loop's clock."""
+
+    @property
+    def held(self) -> "Holding":
+        """Holds of it, and what of it waits for what is held."""
 
     @property
     def leaders(self) -> Collection[str]:
@@ -103,6 +123,9 @@ class LiveBlocks:
         self._untold: deque[tuple[_Tracked, Point, Seconds]] = deque()
         """Expected times that followers have yet to be told. What these expect because of them is told after that."""
         self._is_telling = False
+        self._is_finding = False
+        self._may_be_stuck = False
+        """True if what is stuck has to be found again."""
 
     @contextmanager
     def opened(self, block: Block) -> Iterator[Block]:
@@ -212,6 +235,43 @@ class LiveBlocks:
                     follower.foresee(qualified(tracked.block.id, point), at)
         finally:
             self._is_telling = False
+
+    def tell_stuck(self) -> None:
+        """Tell each block which points of the others do not come before what is held goes on.
+
+        To be called whenever something is held, or not any more, and at news of any block while something is. It is
+        found from the beginning each time: two blocks do not wait for each other once nothing is held.
+        """
+        self._may_be_stuck = True
+        if self._is_finding:
+            return  # The call below finds and tells it.
+        self._is_finding = True
+        try:
+            while self._may_be_stuck:
+                self._may_be_stuck = False
+                stuck, standing = self._stuck()
+                for tracked in list(self._tracked.values()):
+                    if tracked.performance is not None:
+                        tracked.performance.held.stick(stuck, standing)
+        finally:
+            self._is_finding = False
+
+    def _stuck(self) -> tuple[Set[Point], Set[Point]]:
+        """Points of all blocks that are stuck, and those of them that come no nearer either."""
+        first = self._found(lambda held, found: held.stuck(found, frozenset()))
+        standing = first - self._found(lambda held, found: held.running(first, found))
+        return self._found(lambda held, found: held.stuck(found, standing)), standing
+
+    def _found(self, more: Callable[[Holding, Set[Point]], Set[Point]]) -> Set[Point]:
+        """Points of all blocks that follow from each other, and from nothing."""
+        found: set[Point] = set()
+        before = -1
+        while len(found) > before:
+            before = len(found)
+            for name, tracked in self._tracked.items():
+                if tracked.performance is not None:
+                    found |= {qualified(name, point) for point in more(tracked.performance.held, found)}
+        return found
 
     def lose(self, block: str, behavior: str) -> None:
         """Tell followers that a behavior of a live block is dropped; once for each behavior."""

@@ -23,6 +23,7 @@ from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.feedback import News, Reporter
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.held_block import HeldBlock
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.net_stream import NetStream
 from engage_hri.services.realizer.perform.outcome import completed
@@ -49,7 +50,7 @@ class BlockPerformance:
         *,
         is_held: bool = False,
     ) -> None:
-        """held, is_held: see `hold`."""
+        """held, is_held: see `HeldBlock`."""
         self._live, self.id = live, live.id
         self.plan = plan
         self._shared = shared
@@ -59,8 +60,7 @@ class BlockPerformance:
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
-        self._held = held
-        self._is_held = is_held
+        self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
         self._net = NetStream(shared.bus, live.id)
         self.report = Reporter(shared.bus, live.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
@@ -95,8 +95,7 @@ class BlockPerformance:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began, block = self.bus.now(), self.plan.block.id
         self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free)
-        if self._is_held:
-            self._hold()
+        self.held.begin()
         self.report.started(self.plan, began)
         for problem in self.plan.problems:
             self.report.warn(problem.kind, problem.message, problem.behavior)
@@ -114,6 +113,7 @@ class BlockPerformance:
                 self._shared.live_blocks.perform(block, self, self._live.elsewhere)
                 with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign)):
                     self.ties.begin()
+                    self.held.tell()
                     self.take_in()
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
@@ -138,6 +138,11 @@ class BlockPerformance:
         if not fired.cancelled():
             self._live.stop(Ending("done"))
 
+    @property
+    def has_begun(self) -> bool:
+        """True if its behaviors may begin."""
+        return bool(self._tasks)
+
     def is_going_on(self, behavior: str) -> bool:
         """True if the behavior is of this block and has neither ended nor been dropped."""
         is_left = behavior in self._tasks and behavior not in self._dropped
@@ -156,21 +161,6 @@ class BlockPerformance:
             self.lose(behavior, Fault(reason="interrupted"))
             self.take_in()
         return behavior not in self._dropped and self.decisions.facts.has_ended(behavior)
-
-    def hold(self, behaviors: Collection[str] | None, *, is_held: bool) -> None:
-        """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
-
-        is_held: something is held, perhaps of another block.
-        """
-        if (behaviors, is_held) != (self._held, self._is_held):
-            self._held, self._is_held = behaviors, is_held
-            if self._tasks:  # Otherwise it is held as it begins.
-                self.take_in(self._hold)
-
-    def _hold(self) -> None:
-        self.decisions.hold_up(self._is_held, self.bus.now())
-        for effect in self.decisions.hold(self._held, self.bus.now()):
-            self._apply(effect)
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """Take a report of the body about a behavior of this block."""
@@ -258,16 +248,17 @@ class BlockPerformance:
             self.replan()
         again = True
         while again and not self._ending.done():
-            made_news = [self._apply(effect) for effect in self.decisions.advance(self.bus.now())]
+            made_news = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
             again = any(made_news)
         foresight = self.decisions.foresight
         if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
+        self.held.tell()
         self._timer.set(None if self._ending.done() else self.decisions.deadline)
         self._net.tell_soon()
 
-    def _apply(self, effect: Effect) -> bool:
+    def apply(self, effect: Effect) -> bool:
         """Carry out one decision; True if there is more to be decided then."""
         match effect:
             case Begin(behavior=id) | Extend(behavior=id):
@@ -294,7 +285,7 @@ class BlockPerformance:
 
     def _let_go(self, behavior: str) -> None:
         """Hold a behavior no more once it has ended: nothing else is to be late for it."""
-        if self._held and behavior in self._held and not self.is_going_on(behavior):
+        if self.held.names(behavior) and not self.is_going_on(behavior):
             self._shared.over(self.id, behavior)
 
     # -- what behaviors report (see `Performing`) --------------------------------------------------------------------
@@ -321,7 +312,7 @@ class BlockPerformance:
         """Command at once what measured events alone release; all else follows soon."""
         if not self._ending.done() and not self._needs_replan:
             for effect in self.decisions.urgent(self.bus.now()):
-                self._apply(effect)
+                self.apply(effect)
         self._afterwards.set()
 
     def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:

@@ -13,6 +13,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.holding import Holds, Named
 from engage_hri.services.realizer.perform.live import Ending, Live
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.alarm import Timer
@@ -31,12 +32,14 @@ class Steering:
         config: RealizerConfig,
         live: Mapping[str, Live],
         performances: Mapping[str, BlockPerformance],
+        live_blocks: LiveBlocks,
     ) -> None:
         self._bus = bus
         self._desk = desk
         self._longest = config.longest_hold
         self._live = live
         self._performances = performances
+        self._live_blocks = live_blocks
         self._holds = Holds()
         self._told: list[tuple[Named, Seconds]] = []
         """What was told last to be held."""
@@ -84,8 +87,8 @@ class Steering:
         self._bus.publish(keys.HELD, Held(at=self._bus.stamp(), holds=holds))
 
     def held(self, live: Live) -> frozenset[str] | None:
-        """Behaviors of the block and of others that are held now (see `Holds`); None: all of the block."""
-        return self._holds.of_block(live.id, {each.id: each.block for each in self._live.values()})
+        """Behaviors of the block that are held now; None: all."""
+        return self._holds.of_block(live.id)
 
     @property
     def is_holding(self) -> bool:
@@ -111,9 +114,13 @@ class Steering:
     def _apply(self) -> None:
         # In the order in which they came: who is tied to another knows when that goes on before it decides itself.
         performed = [(live, self._performances.get(id)) for id, live in self._live.items()]
+        for _, performance in performed:
+            if performance is not None:
+                performance.held.hold_up(self.is_holding)
         for live, performance in performed:
             if performance is not None:
-                performance.hold(self.held(live), is_held=self.is_holding)
+                performance.held.hold(self.held(live))
+        self._live_blocks.tell_stuck()  # Those that wait for their turn may be held, too.
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)
         if self._holds.in_force != self._told:

@@ -1,6 +1,6 @@
 """Blocks that wait for their turn: when their points are expected, for others that are tied to them."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Set
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
@@ -17,10 +17,17 @@ class WaitingBlock:
     """
 
     def __init__(
-        self, plan: Plan, live_blocks: LiveBlocks, now: Callable[[], Seconds], leaders: Collection[str] = ()
+        self,
+        plan: Plan,
+        live_blocks: LiveBlocks,
+        now: Callable[[], Seconds],
+        leaders: Collection[str] = (),
+        is_held: Callable[[], bool] = lambda: False,
     ) -> None:
-        """leaders: blocks that have to end first."""
+        """leaders: blocks that have to end first. is_held: whether it is held itself."""
         self.leaders = leaders
+        self._is_held = is_held
+        self.held = self
         self._plan = plan
         self._live_blocks = live_blocks
         self._now = now
@@ -45,6 +52,20 @@ class WaitingBlock:
         if point == qualified(block_of(point), BLOCK_END):
             self._ends[block_of(point)] = at
             self._tell()
+
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that do not come before what is held goes on."""
+        waits = not elsewhere.isdisjoint(qualified(block, BLOCK_END) for block in self.leaders)
+        return self._followed if waits or self._is_held() else frozenset()
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that come nearer: others that have to end first go on."""
+        standing = elsewhere - running
+        goes_on = any(qualified(block, BLOCK_END) not in standing for block in self.leaders)
+        return self._followed if goes_on else frozenset()
+
+    def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
+        """Take the news which points of other blocks do not come before what is held goes on."""
 
     def miss(self, behaviors: Iterable[str]) -> None:
         """Take the news that another block is gone."""
