@@ -155,8 +155,13 @@ class _Planner:
         self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
 
     def plan(self) -> Steps[Plan]:
-        """The plan; behaviors that cannot be on time are dropped until the rest can be."""
+        """The plan; behaviors that cannot be on time are dropped until the rest can be.
+
+        It comes to an end: each time it is tried anew, something is gone for good (a behavior, a time of a speech, a
+        turn that nobody can wait for, a tie to another block), or the speeches are in an order that was not tried.
+        """
         while True:
+            self.turns = self.given - self.overlaps
             said = self.relations
             present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
@@ -165,15 +170,14 @@ class _Planner:
                     present, _ = yield from self._remaining(said)
                 return (yield from self._compared(plan, present))
             except Misordered:
-                self.turns = self.given
+                continue
             except Losses as found:
-                turns, self.turns = self.turns, self.given
                 times = yield from times_of(self.speeches, self.relations)
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
                         yield 8 * PORTION
                     turn = loss.turn
-                    if turn and turn in turns and self._may_speak_at_once(turn[1].behavior, present):
+                    if turn and turn in self.turns and self._may_speak_at_once(turn[1].behavior, present):
                         self.overlaps.add(turn)
                     elif given_up := times.give_up(loss.points, loss.among, self.dropped):
                         self._keep_words(*given_up, loss.reason)
@@ -200,13 +204,20 @@ class _Planner:
         self.given_up.setdefault(id, {})[said] = self.problems[-1]
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
-        """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
+        """The plan of the behaviors that are left. Raises Losses: those that cannot be on time.
+
+        A conflict adds a turn, or settles a hand. Between two conflicts handovers only become more, or keep more. If
+        an arrangement comes again all the same, so would all that followed it: each of these is free of conflicts, and
+        the one that came again is as good as any.
+        """
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         self.turns = frozenset(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
         arrangement = Arrangement(natural=natural, turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
+        tried: list[Arrangement] = []
+        """Arrangements since the last conflict."""
         while True:
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
@@ -231,9 +242,10 @@ class _Planner:
                 for conflict in part:
                     self._resolve(conflict)
                 yield 2 * len(part)
+            tried.append(arrangement)
             if conflicts:
-                arrangement = Arrangement(natural=natural, turns=self.turns, spoken=arrangement.spoken)
-            elif arranged == arrangement:
+                arrangement, tried = Arrangement(natural=natural, turns=self.turns, spoken=arrangement.spoken), []
+            elif arranged in tried:
                 break
             else:
                 arrangement = arranged
@@ -315,7 +327,8 @@ class _Planner:
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
-            present, turns = assembler.relations, self.turns | self.order.turns | set(arrangement.handovers.values())
+            handovers = {each for takers in arrangement.handovers.values() for each in takers}
+            present, turns = assembler.relations, self.turns | self.order.turns | handovers
             raise (
                 yield from judge(impossible, assembly, self.chains, present, classes, self.block.id, turns)
             ) from None
