@@ -54,6 +54,8 @@ class Arrangement(Struct, frozen=True):
     turns: behaviors that wait for a point of another before they take its part.
     spoken: the speeches in the order in which they are said.
     takes: behaviors of other blocks, by `block:behavior`, of which one of this block takes a part over.
+    ranked: behaviors in the order in which they take their parts. Of those that begin at one instant it is kept: by a
+    handover the later waits for one more event, which is no reason to come first or last.
     """
 
     natural: frozenset[str] = frozenset()
@@ -64,6 +66,7 @@ class Arrangement(Struct, frozen=True):
     turns: frozenset[Turn] = frozenset()
     spoken: tuple[str, ...] = ()
     takes: Mapping[str, str] = {}
+    ranked: tuple[str, ...] = ()
 
 
 class Conflict(NamedTuple):
@@ -98,7 +101,7 @@ def arrange(
     handovers: dict[str, tuple[Handover, ...]] = {}
     conflicts = []
     yield len(chains) // 4
-    ranked = entering(chains, mentioned, times, rounds)
+    ranked = entering(chains, mentioned, times, rounds, before.ranked)
     yield len(chains) // 4
     users = _users(chains, ranked)
     beneath = frozenset(_overlaid(chains, users, times))
@@ -139,7 +142,7 @@ def arrange(
             successors[id] = (successor, chain.points[first])
             cuts[id] = first - 1
     lasting = tuple(sorted(before.natural - successors.keys()))
-    arranged = replace(before, lasting=lasting, successors=successors, handovers=handovers, cuts=cuts)
+    arranged = replace(before, lasting=lasting, successors=successors, handovers=handovers, cuts=cuts, ranked=ranked)
     return arranged, conflicts
 
 
@@ -182,10 +185,15 @@ def entering(
     mentioned: Collection[str],
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
+    ranked: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Behaviors in the order in which they take parts. Of those that start together, unmentioned ones come last."""
+    """Behaviors in the order in which they take parts. Of those that start together, unmentioned ones come last.
+
+    ranked: the order so far.
+    """
+    so_far = {id: number for number, id in enumerate(ranked)}
     rank = {
-        id: (round(times[start := chain.points[0]], 6), rounds[start], id not in mentioned, number)
+        id: (round(times[start := chain.points[0]], 6), so_far.get(id, 0), rounds[start], id not in mentioned, number)
         for number, (id, chain) in enumerate(chains.items())
     }
     return tuple(sorted(chains, key=rank.__getitem__))

@@ -20,7 +20,7 @@ from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, asse
 from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
 from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
@@ -207,8 +207,8 @@ class _Planner:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time.
 
         A conflict adds a turn, or settles a hand. Between two conflicts handovers only become more, or keep more. If
-        an arrangement comes again all the same, so would all that followed it: each of these is free of conflicts, and
-        the one that came again is as good as any.
+        an arrangement comes again all the same, so would all that followed it. None of these has a conflict: the last
+        one is taken.
         """
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
@@ -249,7 +249,6 @@ class _Planner:
                 break
             else:
                 arrangement = arranged
-        mentioned = {point.behavior for point in present.constrained}
         return Plan(
             block=self._block(),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
@@ -263,7 +262,7 @@ class _Planner:
             required=present.required,
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
-            entering=entering(self.chains, mentioned, times, rounds),
+            entering=arranged.ranked,
             turns=self.turns,
             rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             relations=present,
