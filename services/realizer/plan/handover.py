@@ -88,11 +88,13 @@ def arrange(
     rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
     given: Mapping[str, Chain] = {},
+    begun: Container[str] = (),
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
     rounds: order of points that come at one time. barred: hands with which a behavior cannot be done. given:
-    behaviors of other blocks that have parts, with their `times`.
+    behaviors of other blocks that have parts, with their `times`. begun: behaviors that have begun: they wait for
+    nobody any more, and use the arm that they have.
     """
     held, awaited = relations.held, relations.awaited
     yield len(relations.orders) // 8
@@ -110,7 +112,7 @@ def arrange(
     for id, takers in _takers(chains, ranked, users).items():
         yield len(takers)
         chain, successor = chains[id], takers[0]
-        if before.successors.get(successor, ("",))[0] == id:
+        if before.successors.get(successor, ("",))[0] == id and id not in begun:
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
             continue
@@ -124,13 +126,15 @@ def arrange(
             is_asked = successor in mentioned
             last = last_kept(chain, chains[successor], first, own, is_natural=is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
-            if turn is not None and chain.type != "speech" and id not in mentioned and successor in mentioned:
+            is_anytime = id not in mentioned and id not in begun
+            if turn is not None and chain.type != "speech" and is_anytime and successor in mentioned:
                 # Nobody has said when the earlier one comes: it is what waits.
                 number = _STROKE if successor in before.natural else len(chains[successor].points) - 1
                 turn = (id, chains[successor].points[number])
             if turn is not None:
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
-                conflicts.append(Conflict(turn, free_hand((successor, id), {**chains, **given}, times, barred)))
+                rivals = tuple([each for each in (successor, id) if each not in begun])
+                conflicts.append(Conflict(turn, free_hand(rivals, {**chains, **given}, times, barred)))
                 yield 1 + len(chains) // 32  # `free_hand` has looked at all others
         if chain.type != "speech":
             handovers[id] = tuple([_handover(chain, chains[each], relations, times) for each in takers])

@@ -228,7 +228,7 @@ class _Planner:
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given
+                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
             undated = without_date(assembly, self.known) if given else ()
             arranged, others = yield from share(
@@ -278,9 +278,9 @@ class _Planner:
         )
 
     def _is_open(self, conflict: Conflict) -> bool:
-        """True if a conflict can be settled: who has begun waits no more, and uses the arm that it has."""
+        """True if a conflict can be settled: who has begun waits no more."""
         if conflict.hand:
-            return conflict.hand[0] not in self.known.begun
+            return True
         assert conflict.turn is not None
         is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
         return conflict.turn[0] not in self.known.begun and not is_settled
