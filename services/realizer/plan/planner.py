@@ -5,7 +5,7 @@ each with a warning: behaviors that the body cannot do, and those that cannot be
 between equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Collection, Container, Iterable, Mapping
 
 from msgspec.structs import replace
 
@@ -17,7 +17,7 @@ from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
-from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
@@ -97,6 +97,8 @@ class _Planner:
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)
         """Behaviors, in the order in which they were dropped; the values mean nothing."""
+        self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
+        """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}
         """Speeches without some of their times: what the block said of these, and the warnings."""
         self.given: frozenset[Turn] = frozenset()
@@ -118,6 +120,7 @@ class _Planner:
         if begun := sorted(self.known.begun & self.chains.keys(), key=self._ends):
             # Who has begun comes first; neighbors come after the last of these to end.
             self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
+        self.places = tuple(self.chains)
         self.speeches = {id for id, chain in self.chains.items() if chain.type == "speech"}
         self.order = SpeakingOrder([id for id in self.chains if id in self.speeches], len(self.chains))
 
@@ -157,8 +160,8 @@ class _Planner:
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
 
-        It comes to an end: each time it is tried anew, something is gone for good (a behavior, a time of a speech, a
-        turn that nobody can wait for, a tie to another block), or the speeches are in an order that was not tried.
+        It comes to an end: each time it is tried anew, a time of a speech is gone for good, a turn that nobody can
+        wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order not tried yet.
         """
         while True:
             self.turns = self.given - self.overlaps
@@ -173,17 +176,26 @@ class _Planner:
                 continue
             except Losses as found:
                 times = yield from times_of(self.speeches, self.relations)
+                gone, losses, given_up = {*self.dropped}, list[Loss](), set[Point]()
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
                         yield 8 * PORTION
                     turn = loss.turn
                     if turn and turn in self.turns and self._may_speak_at_once(turn[1].behavior, present):
                         self.overlaps.add(turn)
-                    elif given_up := times.give_up(loss.points, loss.among, self.dropped):
-                        self._keep_words(*given_up, loss.reason)
+                    elif said := times.give_up(loss.points, loss.among, gone):
+                        given_up.add(said[0])
+                        self._keep_words(*said, loss.reason)
                     else:
-                        self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+                        gone.add(loss.behavior)
+                        losses.append(loss)
                 self.relations = times.left
+                self._take_back(given_up)
+                for part in portions(losses):
+                    for loss in part:
+                        if given_up.isdisjoint(loss.among):
+                            self._lose(loss)
+                    yield len(part)
                 self.order.begin_anew(self.chains)
 
     def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
@@ -198,7 +210,25 @@ class _Planner:
         broken = yield from broken_by(said, times)
         return replace(plan, relations=replace(said), broken=tuple(broken))
 
-    def _keep_words(self, id: str, said: str, reason: str) -> None:
+    def _lose(self, loss: Loss) -> None:
+        id = loss.behavior
+        lost = self.chains[id]
+        self._drop(id, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+        if lost.type != "speech":
+            self.depending[id] = lost, loss, self.problems[-1]
+
+    def _take_back(self, given_up: Collection[Point]) -> None:
+        """Take back what was dropped because of times that speeches have given up by now: it may be on time."""
+        back = [id for id, (_, loss, _) in self.depending.items() if not loss.among.isdisjoint(given_up)]
+        for id in back:
+            self.chains[id], _, problem = self.depending.pop(id)
+            self.problems.remove(problem)
+            del self.dropped[id]
+        if back:
+            self.chains = {id: self.chains[id] for id in self.places if id in self.chains}
+
+    def _keep_words(self, point: Point, said: str, reason: str) -> None:
+        id = point.behavior
         reason = f"{reason}; {said} is given up, so that the words are said"
         self.problems.append(Problem("IMPOSSIBLE_TO_SCHEDULE", at_line(self.lines[id], reason), id))
         self.given_up.setdefault(id, {})[said] = self.problems[-1]
