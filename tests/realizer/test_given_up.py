@@ -1,10 +1,11 @@
 """Times of speeches that are given up: which first, where several could be; and what is kept by that."""
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gesture, Speech
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
+from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Relations, Term
 from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.planning import at, plan, timed, warnings
@@ -79,3 +80,24 @@ def test_a_time_that_can_be_kept_is_not_given_up_for_what_depends_on_it() -> Non
     made = plan(block((MORE, timed(BEAT, stroke="t:start"))))
 
     assert (made.dropped, at(made, "t:start")) == (("g",), 0.5)
+
+
+def test_of_required_words_it_is_said_that_without_that_they_give_up_their_time() -> None:
+    example = block((timed(Speech(id="x", text="one", required=True), start="0", end="0.1"),))
+    with pytest.raises(BlockRefused) as refused:
+        plan(example)
+
+    assert refused.value.fault.advice == (
+        "it is required; without `required` x:end = 0.1 would be given up, and its words said"
+    )
+    made = plan(replace(example, behaviors=(replace(example.behaviors[0], required=False),)))
+    assert (made.dropped, list(made.given_up["x"])) == ((), ["x:end = 0.1"])
+
+
+def test_of_a_required_movement_it_is_said_that_without_that_it_is_dropped() -> None:
+    example = block((timed(replace(BEAT, required=True), start="0", end="0.1"),))
+    with pytest.raises(BlockRefused) as refused:
+        plan(example)
+
+    assert refused.value.fault.advice == "it is required; without `required` it would be dropped"
+    assert plan(replace(example, behaviors=(replace(example.behaviors[0], required=False),))).dropped == ("g",)

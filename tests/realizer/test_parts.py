@@ -115,7 +115,7 @@ def test_who_has_begun_keeps_its_arm_for_its_stroke_though_nobody_says_when_it_c
 
     made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
 
-    assert (made.dropped, made.turns) == ((), {("q", Point("p", "stroke_end"))})
+    assert (made.dropped, made.turns) == ((), frozenset({("q", Point("p", "stroke_end"))}))
     assert at(made, "p:stroke_end") == at(made, "q:start") == 1.5
 
 

@@ -156,7 +156,7 @@ def _first_after(chain: Chain, taken: Seconds, times: Mapping[Point, Seconds]) -
 
 
 def _handover(chain: Chain, successor: Chain, relations: Relations, times: Mapping[Point, Seconds]) -> Handover:
-    """What a behavior leaves to one that takes a part of it in this schedule.
+    """The handover from a behavior to one that takes a part of it in this schedule.
 
     A point that is kept stays so: the successor waits for it from then on. So the handovers of a schedule settle.
     """

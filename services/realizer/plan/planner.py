@@ -161,7 +161,7 @@ class _Planner:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
 
         It comes to an end: each time it is tried anew, a time of a speech is gone for good, a turn that nobody can
-        wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order not tried yet.
+        wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order that is new.
         """
         while True:
             self.turns = self.given - self.overlaps
@@ -183,9 +183,9 @@ class _Planner:
                     turn = loss.turn
                     if turn and turn in self.turns and self._may_speak_at_once(turn[1].behavior, present):
                         self.overlaps.add(turn)
-                    elif said := times.give_up(loss.points, loss.among, gone):
-                        given_up.add(said[0])
-                        self._keep_words(*said, loss.reason)
+                    elif time := times.give_up(loss.points, loss.among, gone):
+                        given_up.add(time[0])
+                        self._keep_words(*time, loss.reason)
                     else:
                         gone.add(loss.behavior)
                         losses.append(loss)
