@@ -253,15 +253,14 @@ def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Se
 def _takers(
     chains: Mapping[str, Chain], ranked: Sequence[str], users: Mapping[str, Sequence[str]]
 ) -> dict[str, list[str]]:
-    """For each behavior, the next that takes each of its parts, in the order in which they do."""
+    """For each behavior, the next that takes each of its parts, in the order in which they do.
+
+    Of a shift, it is the next look, and the next shift: that waits for its end, also if the look brings that about.
+    """
     rank = {id: number for number, id in enumerate(ranked)}
     found: dict[str, set[str]] = {}
     for ids in users.values():
-        next_of: dict[str, str] = {}
         for earlier, later in _pairs(ids, chains):
-            if earlier not in next_of or rank[later] < rank[next_of[earlier]]:
-                next_of[earlier] = later
-        for earlier, later in next_of.items():
             found.setdefault(earlier, set()).add(later)
     return {id: sorted(takers, key=rank.__getitem__) for id, takers in found.items()}
 
