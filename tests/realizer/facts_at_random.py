@@ -87,7 +87,7 @@ class Model(Struct):
             )
             if phase and not is_bound and (each.behavior, each.target) in self.come:
                 continue
-            if phase and is_bound and (each.behavior, each.target) in self.passed:
+            if phase and is_bound and (each.behavior, each.source) in self.passed:
                 continue
             found.append(arc)
         return [arc for arc in found if not (arc.is_bound and (arc.behavior, arc.source) in self.idle)]
@@ -112,14 +112,21 @@ class Model(Struct):
                 return idle
             idle |= more
 
+    def _fixed(self, arc: Arc) -> float | None:
+        """The time from which an upper bound counts, if that has been: it moves nothing, but may be broken."""
+        if not arc.is_bound:
+            return None
+        return self.passed.get((arc.behavior, arc.target), self.facts.get(arc.target))
+
     def times(self, arcs: Iterable[Arc], *, extreme: bool = False) -> list[float] | None:
         """The earliest times; None: there are none, or a bound on a fact is broken."""
         arcs = list(arcs)
-        lags: list[tuple[float | int, int, float, bool]] = []
+        lags: list[tuple[float | int, int | None, float, bool]] = []
         for arc in arcs:
             seconds = arc.least if extreme else arc.seconds
             begun = self.passed.get((arc.after, arc.source)) if arc.after else None
-            lags.append((arc.source if begun is None else begun, arc.target, seconds, begun is not None))
+            moves = None if self._fixed(arc) is not None else arc.target
+            lags.append((arc.source if begun is None else begun, moves, seconds, begun is not None))
         times = [self.facts.get(each, max(BEGAN, self.base.get(each, BEGAN))) for each in range(self.size)]
         for each, at in self.foreseen.items():
             if each not in self.facts:
@@ -127,7 +134,7 @@ class Model(Struct):
         for _ in range(self.size + 1):
             before = list(times)
             for source, target, seconds, is_time in lags:
-                if target not in self.facts:
+                if target is not None and target not in self.facts:
                     at = source if is_time else times[int(source)]
                     times[target] = max(times[target], at + seconds)
             if all(abs(one - other) < 1e-9 for one, other in zip(times, before, strict=True)):
@@ -135,8 +142,8 @@ class Model(Struct):
         else:
             return None
         for arc, (_, _, seconds, _) in zip(arcs, lags, strict=True):
-            is_on_fact = arc.is_bound and not arc.behavior and arc.target in self.facts
-            if is_on_fact and arc.source not in self.facts and times[arc.source] + seconds > times[arc.target] + 1e-6:
+            latest = self._fixed(arc)
+            if latest is not None and arc.source not in self.facts and times[arc.source] + seconds > latest + 1e-6:
                 return None
         return times
 

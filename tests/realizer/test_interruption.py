@@ -21,7 +21,7 @@ from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.service import running
 from tests.control.suite import WORLD
 from tests.realizer.fake_body import FakeBody, Script
-from tests.realizer.stage import FakeRecognition, Stage, after, block, stage
+from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
 """Takes 2.25 s: 0.5, 0.25, 0.5, 0.25, 0.25, 0.5."""
@@ -63,6 +63,20 @@ async def test_what_waited_for_it_waits_no_longer() -> None:
         await performing.outcome
 
     assert seen.times()["p:start"] == seen.times()["beat:ready"] == 0.5
+
+
+async def test_a_stroke_under_way_is_not_cut_though_nothing_is_tied_to_it_any_more() -> None:
+    one, other = (Gesture(id=id, lexeme="BEAT", mode="RIGHT_HAND") for id in ("g", "h"))
+    waits = [Wait(id="w", duration=3.0), Wait(id="v", duration=0.25)]
+    async with stage() as seen:
+        pending = seen.ask(block((*waits, one, other), together("w:end", "g:relax"), after("v:end", "h:start")))
+        await asyncio.sleep(0.8)
+        await interrupted(seen, "w")
+        outcome = await pending.outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.dropped == ()
+    assert seen.times()["g:stroke_end"] == seen.times()["h:start"] == 1.5
 
 
 async def test_a_required_behavior_may_be_interrupted_and_its_block_does_not_fail() -> None:

@@ -373,11 +373,11 @@ def test_a_time_of_a_speech_is_given_up_the_nearest_of_the_last_point_first(
         if is_order:
             order, orders[number] = orders[number], None
             assert order is not None
-            assert found == (point.behavior, f"{order.earlier.text} <= {order.later.text}")
+            assert found == (point, f"{order.earlier.text} <= {order.later.text}")
         else:
             equal = equals[number]
             assert equal is not None
-            assert found == (point.behavior, " = ".join(each.text for each in equal.terms))
+            assert found == (point, " = ".join(each.text for each in equal.terms))
             rest = tuple(each for each in equal.terms if each.point != point)
             equals[number] = Equal(rest) if len(rest) > 1 and not equal.behavior else None
     left = times.left

@@ -37,7 +37,10 @@ def test_a_held_arm_that_is_tied_to_the_end_of_a_sentence_does_not_hold_the_next
 
 @pytest.mark.parametrize("tied", TIED)
 def test_who_is_tied_to_them_in_another_block_comes_when_they_do_and_not_when_they_were_expected(tied: str) -> None:
-    """They were expected with an arm that was late; that they came is news that overrules this."""
+    """They were expected with an arm that was late, at 3.7 s; that they came is news that overrules this.
+
+    The arm of the other block is in the middle of its stroke then, slowed down for the time that was expected.
+    """
     deeds = (
         Deed(0.0, "perform", "b", f'<bml id="b" xmlns="org.mindmakers.bml">{FIRST}</bml>'),
         Deed(0.3, "perform", "c", f'<bml id="c" xmlns="org.mindmakers.bml">{TIED[tied].format("b:")}</bml>'),
@@ -47,7 +50,7 @@ def test_who_is_tied_to_them_in_another_block_comes_when_they_do_and_not_when_th
 
     assert came["b:s2:start"] == pytest.approx(came["b:s1:end"], abs=0.02)
     assert came["b:g:stroke"] > came["b:s2:start"] + 1.0
-    assert came["c:k:stroke"] <= came["b:s2:start"] + 0.3
+    assert came["c:k:stroke"] <= came["b:s2:start"] + 0.45
 
 
 @pytest.mark.parametrize("sync", ["stroke_start", "stroke"])

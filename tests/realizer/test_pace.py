@@ -3,9 +3,10 @@
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Mark, Pointing, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Head, Mark, Pointing, Speech
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.feedback import PredictionFeedback
+from engage_hri.services.control.config import Variability
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
@@ -14,8 +15,9 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import SEVEN, FakeBody, Script
-from tests.realizer.planning import elastic
+from tests.realizer.planning import elastic, timed
 from tests.realizer.stage import after, block, stage, together
+from tests.realizer.test_simulated_body import robot
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
 """Takes 2.25 s: 0.5, 0.25, 0.5, 0.25, 0.25, 0.5."""
@@ -52,6 +54,19 @@ async def test_shorter_than_natural_is_faster_in_all_its_phases() -> None:
     assert times["beat:end"] == pytest.approx(2.5)
     assert seen.warnings() == []
     assert seen.body.stops == []
+
+
+@pytest.mark.parametrize("end", ["s:end", "s:end-0.1"])
+async def test_who_meets_the_end_of_words_is_faster_though_they_have_begun(end: str) -> None:
+    """The words take 0.79 s, the nod 1.07; words under way do not wait for it."""
+    words = Speech(id="s", text="Third listed.")
+    nod = timed(Head(id="n", lexeme="NOD"), start="s:start", end=end)
+    async with robot(Variability(seed=0, noise=0.0)) as seen:
+        await seen.ask(block((words, nod))).outcome
+
+    meeting = seen.times()["s:end"].time - (0.1 if "-" in end else 0.0)
+    assert seen.times()["n:end"].time == pytest.approx(meeting, abs=0.005)
+    assert seen.kinds() == []
 
 
 async def test_a_body_that_turns_out_slow_hurries_to_be_on_time() -> None:

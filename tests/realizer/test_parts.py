@@ -108,6 +108,28 @@ def test_who_has_begun_uses_the_arm_that_it_has() -> None:
     assert [each.chains["p"].parts for each in (free, bound)] == [("left_arm",), ("right_arm",)]
 
 
+def test_who_has_begun_keeps_its_arm_for_its_stroke_though_nobody_says_when_it_comes() -> None:
+    """The other has a time, so it would come first, had the first not begun."""
+    example = block((LEFT, LEFT_TOO, timed(SPEECH, start="0.25")), after("s:end", "q:start"))
+    known = Known(points={Point("p", "start"): 0.0, Point("q", "start"): 0.5}, begun=frozenset({"p"}))
+
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], known=known)
+
+    assert (made.dropped, made.turns) == ((), frozenset({("q", Point("p", "stroke_end"))}))
+    assert at(made, "p:stroke_end") == at(made, "q:start") == 1.5
+
+
+def test_who_has_begun_loses_no_stroke_because_its_other_arm_would_have_been_free() -> None:
+    """It names no hand, and cannot change by now; the other, which names one, has no time to wait."""
+    one, other = Gesture(id="p", lexeme="BEAT"), timed(Gesture(id="q", lexeme="BEAT", mode="RIGHT_HAND"), start="0.3")
+    known = Known(points={Point("p", "start"): 0.0}, begun=frozenset({"p"}))
+
+    made = plan_block(block((one, other)), [FakeBody().estimate(each) for each in (one, other)], known=known)
+
+    assert warnings(made) == [("IMPOSSIBLE_TO_SCHEDULE", "q")]
+    assert at(made, "p:end") == 2.25
+
+
 def test_who_keeps_the_part_of_a_lost_one_may_be_without_its_points() -> None:
     """A shift has no stroke, which the third was to wait for."""
     smile = FaceLexeme(id="g", lexeme="SMILE")

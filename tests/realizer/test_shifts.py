@@ -94,3 +94,16 @@ async def test_looks_before_and_after_shifts_take_as_long_as_planned(behaviors: 
         {name: each.predicted for name, each in times.items()}, abs=1e-6
     )
     assert seen.kinds() == []
+
+
+@pytest.mark.parametrize(("one", "other"), [(SHIFT, OTHER), (OTHER, SHIFT)])
+async def test_a_shift_a_look_and_another_shift_at_one_time(one: BlockBehavior, other: BlockBehavior) -> None:
+    """The look ends the first shift, the second is beneath the look: nobody waits, and nothing is lost."""
+    one, other, look = (timed(each, start="0") for each in (one, other, LOOK))
+    async with robot(Variability(seed=0, noise=0.0)) as seen:
+        outcome = await seen.perform(block((one, look, other)))
+
+    assert outcome is not None
+    assert outcome.dropped == ()
+    assert [seen.times()[name].time for name in (f"{one.id}:end", "z:start", f"{other.id}:end")] == [0.0, 0.0, 0.0]
+    assert seen.kinds() == []

@@ -142,15 +142,19 @@ class Forecast(LongestPaths):
         for each in self._after.pop((behavior, transition), ()):
             self._moved.setdefault((transition, self._arcs[each].target), []).append(each)
             self._start_from(self._new_node(), each, at)
-        if (number := self._phase_from.get((behavior, transition))) is None:
+        number = self._phase_from.get((behavior, transition))
+        if (node := self._node_of.get(behavior)) is not None:
+            if number is not None and self._arcs[number].source == node:
+                return
+            for bound in self._in[node]:
+                self._switch_off(bound)  # that phase is over
+            self._in[node].clear()
+        if number is None:
             return
-        if self._arcs[number].source == (node := self._whereabouts(behavior)):
-            return
-        self._start_from(node, number, at)
+        self._start_from(node := self._whereabouts(behavior), number, at)
         for other in self._of_behavior[behavior]:
-            # A phase that has begun can no longer keep its own beginning back.
             if self._arcs[other].target == transition:
-                self._switch_off(other)
+                self._end_at(node, other)
 
     def _start_from(self, node: int, number: int, at: Seconds) -> None:
         """Let an arc count from `at`, the time of a node of its own."""
@@ -166,6 +170,23 @@ class Forecast(LongestPaths):
         if not as_expected:
             self._loosen(number)
             self._touch(node)
+
+    def _end_at(self, node: int, number: int) -> None:
+        """Let an upper bound count from the time of a node: the phase has begun, its beginning waits for nothing.
+
+        What cannot be slower from there on does not wait: who is to meet it at its end has to hurry.
+        """
+        arc = self._arcs[number]
+        if not arc.is_bound or not (arc.is_on or number in self._broken):
+            self._switch_off(number)
+            return
+        self._in[before := arc.target].remove(number)
+        self._in[node].append(number)
+        arc.target = node
+        if self._cause[before] == number:
+            self._invalidate(before)
+        self.require(arc.source)
+        self._touch(arc.source)
 
     def _see_reasons_again(self, node: int) -> None:
         """Let `update` see anew what has to give way, if anything does: a fact that moves nothing may free it."""

@@ -88,7 +88,7 @@ class LongestPaths:
                 if not arc.is_on or at <= self.times[arc.target] + FINEST:
                     continue
                 if self._is_fact[arc.target]:
-                    is_late = arc.is_bound and not self._is_fact[here] and not arc.behavior
+                    is_late = arc.is_bound and not self._is_fact[here]
                     if is_late and at > self.times[arc.target] + EPSILON:
                         violated.append(number)
                     continue

@@ -277,8 +277,9 @@ class Assembler:
     def _arranged(self) -> None:
         for later, earlier in self.arrangement.turns:
             self._follow(earlier, Point(later, "start"), behavior=later)
-        for successor, kept in self.arrangement.handovers.values():
-            self._follow(kept, Point(successor, "start"), behavior=successor)
+        for handovers in self.arrangement.handovers.values():
+            for successor, kept in handovers:
+                self._follow(kept, Point(successor, "start"), behavior=successor)
         for id, (successor, point) in self.arrangement.successors.items():
             kind: PlaceKind = "series" if id in self.arrangement.natural else "handover"
             self._follow(Point(successor, "start"), point, behavior=id, kind=kind)

@@ -4,10 +4,13 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import accumulate, groupby
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
@@ -106,7 +109,13 @@ def judge(
         return Losses(tuple(losses.values()))
     everybody = {id: number for number, id in enumerate(chains)}
     if (loss := _loss(impossible.circles[0], net, everybody, chains, ends)) is not None:
-        advice = "it is required; without `required` it would be dropped"
+        times = yield from times_of(
+            {loss.behavior}, replace(relations, required=relations.required - {loss.behavior})
+        )
+        own = [point for point in loss.points if point.behavior == loss.behavior]
+        given_up = times.give_up(own, loss.among, ())
+        otherwise = f"{given_up[1]} would be given up, and its words said" if given_up else "it would be dropped"
+        advice = f"it is required; without `required` {otherwise}"
         where, line = f"{block}: {loss.behavior}", chains[loss.behavior].behavior.line
         return BlockRefused(
             Fault(reason=loss.reason, where=where, line=line, advice=advice), "IMPOSSIBLE_TO_SCHEDULE"

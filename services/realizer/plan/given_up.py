@@ -34,8 +34,8 @@ class Times:
 
     def give_up(
         self, points: Sequence[Point], among: Container[Point], dropped: Container[str]
-    ) -> tuple[str, str] | None:
-        """Give up one relation of a speech; returns the id and what the relation said: `s:end = 2`.
+    ) -> tuple[Point, str] | None:
+        """Give up one relation of a speech; returns the point and what the relation said of it: `s:end = 2`.
 
         It is one of the last point that has any, the speech's own timing before what others say; what a required
         behavior says is never given up. None: there is none left.
@@ -52,7 +52,7 @@ class Times:
                 naming = self._naming.get(point, ())
                 for number in sorted(naming, key=lambda each: (each < 0, not self._is_own(each, point))):
                     if is_enough(self._others(number, point)):
-                        return point.behavior, self._without(number, point)
+                        return point, self._without(number, point)
         return None
 
     def _is_own(self, number: int, point: Point) -> bool:

@@ -49,21 +49,25 @@ class Arrangement(Struct, frozen=True):
 
     natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
     successors: for a behavior, the one that takes its part, and the first of its points that this brings about.
-    handovers: for each behavior whose part another takes some time, that one, and what it has to leave to it.
+    handovers: for each behavior whose parts others take some time, the next on each part, and what it leaves to it.
+    The first of these ends it; the others wait for it, too, or a slow one would lose its stroke to them.
     cuts: number of the first segment that is not given its time, because a successor has the part by then.
     turns: behaviors that wait for a point of another before they take its part.
     spoken: the speeches in the order in which they are said.
     takes: behaviors of other blocks, by `block:behavior`, of which one of this block takes a part over.
+    ranked: behaviors in the order in which they take their parts. Of those that begin at one instant it is kept: by a
+    handover the later waits for one more event, which is no reason to come first or last.
     """
 
     natural: frozenset[str] = frozenset()
     lasting: tuple[str, ...] = ()
     successors: Mapping[str, tuple[str, Point]] = {}
-    handovers: Mapping[str, Handover] = {}
+    handovers: Mapping[str, tuple[Handover, ...]] = {}
     cuts: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
     spoken: tuple[str, ...] = ()
     takes: Mapping[str, str] = {}
+    ranked: tuple[str, ...] = ()
 
 
 class Conflict(NamedTuple):
@@ -85,36 +89,37 @@ def arrange(
     rounds: Mapping[Point, int],
     barred: Container[tuple[str, Hand]] = (),
     given: Mapping[str, Chain] = {},
+    begun: Container[str] = (),
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
     rounds: order of points that come at one time. barred: hands with which a behavior cannot be done. given:
-    behaviors of other blocks that have parts, with their `times`.
+    behaviors of other blocks that have parts, with their `times`. begun: behaviors that have begun: they wait for
+    nobody any more, and use the arm that they have.
     """
     held, awaited = relations.held, relations.awaited
     yield len(relations.orders) // 8
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
-    handovers: dict[str, Handover] = {}
+    handovers: dict[str, tuple[Handover, ...]] = {}
     conflicts = []
     yield len(chains) // 4
-    ranked = entering(chains, mentioned, times, rounds)
+    ranked = entering(chains, mentioned, times, rounds, before.ranked)
     yield len(chains) // 4
     users = _users(chains, ranked)
     beneath = frozenset(_overlaid(chains, users, times))
     cuts.update(dict.fromkeys(beneath, 0))
     yield len(chains) // 4
-    for id, successor in _successors(chains, ranked, users).items():
-        yield 1
-        chain = chains[id]
-        if before.successors.get(successor, ("",))[0] == id:
+    for id, takers in _takers(chains, ranked, users).items():
+        yield len(takers)
+        chain, successor = chains[id], takers[0]
+        if before.successors.get(successor, ("",))[0] == id and id not in begun:
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
             continue
         if chain.type == "speech" and is_tied(chains[successor], chain, classes):
             continue
-        taken = times[Point(successor, "start")]
-        first = next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
+        first = _first_after(chain, times[Point(successor, "start")], times)
         is_natural = id in before.natural
         # Points that the successor itself is to come after are kept: cut short, they would come at once.
         own = held.union(awaited.get(successor, ()))
@@ -122,17 +127,18 @@ def arrange(
             is_asked = successor in mentioned
             last = last_kept(chain, chains[successor], first, own, is_natural=is_natural, is_asked=is_asked)
             turn = (successor, chain.points[last]) if last is not None else None
-            if turn is not None and chain.type != "speech" and id not in mentioned and successor in mentioned:
+            is_anytime = id not in mentioned and id not in begun
+            if turn is not None and chain.type != "speech" and is_anytime and successor in mentioned:
                 # Nobody has said when the earlier one comes: it is what waits.
                 number = _STROKE if successor in before.natural else len(chains[successor].points) - 1
                 turn = (id, chains[successor].points[number])
             if turn is not None:
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
-                conflicts.append(Conflict(turn, free_hand((successor, id), {**chains, **given}, times, barred)))
+                rivals = tuple([each for each in (successor, id) if each not in begun])
+                conflicts.append(Conflict(turn, free_hand(rivals, {**chains, **given}, times, barred)))
                 yield 1 + len(chains) // 32  # `free_hand` has looked at all others
         if chain.type != "speech":
-            kept = [number for number, point in enumerate(chain.points[: first or None]) if point in own]
-            handovers[id] = Handover(successor, chain.points[max([least(chain, chains[successor]), *kept])])
+            handovers[id] = tuple([_handover(chain, chains[each], relations, times) for each in takers])
         if id in successors or id in beneath:  # Who begins beneath a look ends by itself, at once.
             continue
         if is_natural:
@@ -141,8 +147,25 @@ def arrange(
             successors[id] = (successor, chain.points[first])
             cuts[id] = first - 1
     lasting = tuple(sorted(before.natural - successors.keys()))
-    arranged = replace(before, lasting=lasting, successors=successors, handovers=handovers, cuts=cuts)
+    arranged = replace(before, lasting=lasting, successors=successors, handovers=handovers, cuts=cuts, ranked=ranked)
     return arranged, conflicts
+
+
+def _first_after(chain: Chain, taken: Seconds, times: Mapping[Point, Seconds]) -> int:
+    """Number of the first point of a behavior after its part is taken; 0: it has ended by then."""
+    return next((number for number, point in enumerate(chain.points) if times[point] > taken + EPSILON), 0)
+
+
+def _handover(chain: Chain, successor: Chain, relations: Relations, times: Mapping[Point, Seconds]) -> Handover:
+    """The handover from a behavior to one that takes a part of it in this schedule.
+
+    A point that is kept stays so: the successor waits for it from then on. So the handovers of a schedule settle.
+    """
+    id = successor.behavior.id
+    held, own = relations.held, relations.awaited.get(id, ())
+    first = _first_after(chain, times[successor.points[0]], times)
+    kept = [number for number, point in enumerate(chain.points[: first or None]) if point in held or point in own]
+    return Handover(id, chain.points[max([least(chain, successor), *kept])])
 
 
 _BENEATH = ("gazeShift", "headDirectionShift")
@@ -150,11 +173,11 @@ _BENEATH = ("gazeShift", "headDirectionShift")
 
 
 def kept_points(
-    chains: Mapping[str, Chain], relations: Relations, handovers: Mapping[str, Handover]
+    chains: Mapping[str, Chain], relations: Relations, handovers: Mapping[str, tuple[Handover, ...]]
 ) -> Mapping[str, Point]:
     """For each behavior, the last point that it must pass itself, whoever takes its part."""
     held = relations.held
-    kept = {id: each.kept for id, each in handovers.items() if chains[id].type not in _BENEATH}
+    kept = {id: each[0].kept for id, each in handovers.items() if chains[id].type not in _BENEATH}
     for id, chain in chains.items():
         if id not in kept:
             numbers = [number for number, point in enumerate(chain.points) if point in held]
@@ -167,10 +190,15 @@ def entering(
     mentioned: Collection[str],
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
+    ranked: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Behaviors in the order in which they take parts. Of those that start together, unmentioned ones come last."""
+    """Behaviors in the order in which they take parts. Of those that start together, unmentioned ones come last.
+
+    ranked: the order so far.
+    """
+    so_far = {id: number for number, id in enumerate(ranked)}
     rank = {
-        id: (round(times[start := chain.points[0]], 6), rounds[start], id not in mentioned, number)
+        id: (round(times[start := chain.points[0]], 6), so_far.get(id, 0), rounds[start], id not in mentioned, number)
         for number, (id, chain) in enumerate(chains.items())
     }
     return tuple(sorted(chains, key=rank.__getitem__))
@@ -229,17 +257,19 @@ def _users(chains: Mapping[str, Chain], order: Iterable[str]) -> Mapping[str, Se
     return users
 
 
-def _successors(
+def _takers(
     chains: Mapping[str, Chain], ranked: Sequence[str], users: Mapping[str, Sequence[str]]
-) -> dict[str, str]:
-    """For each behavior, the next that takes any of its parts."""
+) -> dict[str, list[str]]:
+    """For each behavior, the next that takes each of its parts, in the order in which they do.
+
+    Of a shift, it is the next look, and the next shift: that waits for its end, also if the look brings that about.
+    """
     rank = {id: number for number, id in enumerate(ranked)}
-    found: dict[str, str] = {}
+    found: dict[str, set[str]] = {}
     for ids in users.values():
         for earlier, later in _pairs(ids, chains):
-            if earlier not in found or rank[later] < rank[found[earlier]]:
-                found[earlier] = later
-    return found
+            found.setdefault(earlier, set()).add(later)
+    return {id: sorted(takers, key=rank.__getitem__) for id, takers in found.items()}
 
 
 def _pairs(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[str, str]]:

@@ -5,7 +5,7 @@ each with a warning: behaviors that the body cannot do, and those that cannot be
 between equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Collection, Container, Iterable, Mapping
 
 from msgspec.structs import replace
 
@@ -17,10 +17,10 @@ from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan import unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
-from engage_hri.services.realizer.plan.deadlocks import Losses, clashes, judge
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, entering, kept_points
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
@@ -97,6 +97,8 @@ class _Planner:
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)
         """Behaviors, in the order in which they were dropped; the values mean nothing."""
+        self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
+        """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}
         """Speeches without some of their times: what the block said of these, and the warnings."""
         self.given: frozenset[Turn] = frozenset()
@@ -118,6 +120,7 @@ class _Planner:
         if begun := sorted(self.known.begun & self.chains.keys(), key=self._ends):
             # Who has begun comes first; neighbors come after the last of these to end.
             self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
+        self.places = tuple(self.chains)
         self.speeches = {id for id, chain in self.chains.items() if chain.type == "speech"}
         self.order = SpeakingOrder([id for id in self.chains if id in self.speeches], len(self.chains))
 
@@ -155,8 +158,13 @@ class _Planner:
         self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
 
     def plan(self) -> Steps[Plan]:
-        """The plan; behaviors that cannot be on time are dropped until the rest can be."""
+        """The plan; behaviors that cannot be on time are dropped until the rest can be.
+
+        It comes to an end: each time it is tried anew, a time of a speech is gone for good, a turn that nobody can
+        wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order that is new.
+        """
         while True:
+            self.turns = self.given - self.overlaps
             said = self.relations
             present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
@@ -165,21 +173,29 @@ class _Planner:
                     present, _ = yield from self._remaining(said)
                 return (yield from self._compared(plan, present))
             except Misordered:
-                self.turns = self.given
+                continue
             except Losses as found:
-                turns, self.turns = self.turns, self.given
                 times = yield from times_of(self.speeches, self.relations)
+                gone, losses, given_up = {*self.dropped}, list[Loss](), set[Point]()
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
                         yield 8 * PORTION
                     turn = loss.turn
-                    if turn and turn in turns and self._may_speak_at_once(turn[1].behavior, present):
+                    if turn and turn in self.turns and self._may_speak_at_once(turn[1].behavior, present):
                         self.overlaps.add(turn)
-                    elif given_up := times.give_up(loss.points, loss.among, self.dropped):
-                        self._keep_words(*given_up, loss.reason)
+                    elif time := times.give_up(loss.points, loss.among, gone):
+                        given_up.add(time[0])
+                        self._keep_words(*time, loss.reason)
                     else:
-                        self._drop(loss.behavior, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+                        gone.add(loss.behavior)
+                        losses.append(loss)
                 self.relations = times.left
+                self._take_back(given_up)
+                for part in portions(losses):
+                    for loss in part:
+                        if given_up.isdisjoint(loss.among):
+                            self._lose(loss)
+                    yield len(part)
                 self.order.begin_anew(self.chains)
 
     def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
@@ -194,19 +210,44 @@ class _Planner:
         broken = yield from broken_by(said, times)
         return replace(plan, relations=replace(said), broken=tuple(broken))
 
-    def _keep_words(self, id: str, said: str, reason: str) -> None:
+    def _lose(self, loss: Loss) -> None:
+        id = loss.behavior
+        lost = self.chains[id]
+        self._drop(id, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+        if lost.type != "speech":
+            self.depending[id] = lost, loss, self.problems[-1]
+
+    def _take_back(self, given_up: Collection[Point]) -> None:
+        """Take back what was dropped because of times that speeches have given up by now: it may be on time."""
+        back = [id for id, (_, loss, _) in self.depending.items() if not loss.among.isdisjoint(given_up)]
+        for id in back:
+            self.chains[id], _, problem = self.depending.pop(id)
+            self.problems.remove(problem)
+            del self.dropped[id]
+        if back:
+            self.chains = {id: self.chains[id] for id in self.places if id in self.chains}
+
+    def _keep_words(self, point: Point, said: str, reason: str) -> None:
+        id = point.behavior
         reason = f"{reason}; {said} is given up, so that the words are said"
         self.problems.append(Problem("IMPOSSIBLE_TO_SCHEDULE", at_line(self.lines[id], reason), id))
         self.given_up.setdefault(id, {})[said] = self.problems[-1]
 
     def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
-        """The plan of the behaviors that are left. Raises Losses: those that cannot be on time."""
+        """The plan of the behaviors that are left. Raises Losses: those that cannot be on time.
+
+        A conflict adds a turn, or settles a hand. Between two conflicts handovers only become more, or keep more. If
+        an arrangement comes again all the same, so would all that followed it. None of these has a conflict: the last
+        one is taken.
+        """
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         self.turns = frozenset(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
         arrangement = Arrangement(natural=natural, turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
+        tried: list[Arrangement] = []
+        """Arrangements since the last conflict."""
         while True:
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
@@ -217,7 +258,7 @@ class _Planner:
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given
+                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
             undated = without_date(assembly, self.known) if given else ()
             arranged, others = yield from share(
@@ -231,13 +272,13 @@ class _Planner:
                 for conflict in part:
                     self._resolve(conflict)
                 yield 2 * len(part)
+            tried.append(arrangement)
             if conflicts:
-                arrangement = Arrangement(natural=natural, turns=self.turns, spoken=arrangement.spoken)
-            elif arranged == arrangement:
+                arrangement, tried = Arrangement(natural=natural, turns=self.turns, spoken=arrangement.spoken), []
+            elif arranged in tried:
                 break
             else:
                 arrangement = arranged
-        mentioned = {point.behavior for point in present.constrained}
         return Plan(
             block=self._block(),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
@@ -251,7 +292,7 @@ class _Planner:
             required=present.required,
             waited_for=waited_for,
             kept=kept_points(self.chains, present, arrangement.handovers),
-            entering=entering(self.chains, mentioned, times, rounds),
+            entering=arranged.ranked,
             turns=self.turns,
             rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             relations=present,
@@ -267,9 +308,9 @@ class _Planner:
         )
 
     def _is_open(self, conflict: Conflict) -> bool:
-        """True if a conflict can be settled: who has begun waits no more, and uses the arm that it has."""
+        """True if a conflict can be settled: who has begun waits no more."""
         if conflict.hand:
-            return conflict.hand[0] not in self.known.begun
+            return True
         assert conflict.turn is not None
         is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
         return conflict.turn[0] not in self.known.begun and not is_settled
@@ -315,7 +356,8 @@ class _Planner:
             if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
                 return (yield from self._solved(assembler, arrangement, classes))
-            present, turns = assembler.relations, self.turns | self.order.turns | set(arrangement.handovers.values())
+            handovers = {each for takers in arrangement.handovers.values() for each in takers}
+            present, turns = assembler.relations, self.turns | self.order.turns | handovers
             raise (
                 yield from judge(impossible, assembly, self.chains, present, classes, self.block.id, turns)
             ) from None
