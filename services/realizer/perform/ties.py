@@ -167,7 +167,7 @@ class Ties:
                 start = Point(taker.behavior.partition(":")[2], taker.sync)
                 points[taker] = other.decisions.foresight.times(now).get(start, now) - decisions.began
         begun = decisions.facts.begun
-        points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in plan.chains}
+        points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in {*plan.chains, *begun}}
         return Known(
             blocks=self._blocks,
             points=points,
