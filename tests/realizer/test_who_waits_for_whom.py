@@ -83,6 +83,32 @@ async def test_the_end_of_a_block_does_not_wait_for_one_that_waits_for_it() -> N
         await all_ended(*asked, within=30.0)
 
 
+async def test_who_hands_a_look_over_keeps_it_if_another_block_is_tied_to_its_end() -> None:
+    """The look of b1 was to end as b2 takes the head. b3 names its end: b2 waits for that from then on."""
+    event = '<ebml:event xmlns:ebml="edu.wpi.ebml" id="v3" kind="mutual_facial_gaze" responder="human"/>'
+    look = '<gaze id="g{}" type="AT" target="cup" {}/>'
+    first = (
+        look.format(0, 'start="v3:end-0.5"') + '<gazeShift id="g1" target="cup" end="1.25"/>'
+        f'<wait id="w2" duration="1" end="g1:end+1.0"/>{event}<speech id="s4" start="b0:s0:start">one</speech>'
+    )  # fmt: skip
+    second = look.format(0, 'start="b1:v3:start" required="true"') + look.format(1, 'required="true"')
+    third = (
+        look.format(0, 'end="b1:g0:stroke_end+0.5"') + f'<gesture id="g1" {RIGHT} start="b1:v3:end+1.0"/>'
+        '<pointing id="p2" target="cup" hand="LEFT_HAND" start="b1:g1:end-0.5"/>'
+    )  # fmt: skip
+    async with stage() as seen:
+        asked = [seen.ask(bml('<speech id="s0" start="1.5">one<sync id="m0"/>two</speech>', "b0"))]
+        await asyncio.sleep(0.75)
+        asked.append(seen.ask(bml(first, "b1", composition="APPEND")))
+        await asyncio.sleep(0.25)
+        asked.append(seen.ask(bml(second + look.format(2, 'ready="b0:s0:m0"'), "b2"), "b1"))
+        await asyncio.sleep(0.25)
+        await interrupt(seen.requests, "b0", "s0")
+        await asyncio.sleep(0.25)
+        asked.append(seen.ask(bml(third, "b3")))
+        await all_ended(*asked, within=50.0)
+
+
 async def test_a_held_stroke_is_not_lost_to_one_that_is_planned_again() -> None:
     right = Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND")
     other = Gesture(id="h", lexeme="BEAT", mode="RIGHT_HAND")

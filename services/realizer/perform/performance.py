@@ -184,6 +184,7 @@ class BlockPerformance:
         """Tell from now on when these points are expected: other blocks are tied to them."""
         if points:
             self.take_in(partial(self.decisions.follow, points))
+            self.ties.name(points)
 
     def times(self) -> Mapping[Point, Seconds]:
         """Time of each point, measured or expected, by the loop's clock."""

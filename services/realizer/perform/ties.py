@@ -67,6 +67,8 @@ class Ties:
         self.given: dict[str, Point] = {}
         self._met: dict[tuple[str, str], Seconds] = {}
         """When a behavior of this block was to begin, and one of another block had a part of it."""
+        self._named: set[Point] = set()
+        """Points of this block that others are tied to."""
 
     # -- news of other blocks --------------------------------------------------------------------------------------
 
@@ -215,6 +217,17 @@ class Ties:
         if self.given.get(behavior) != taker and behavior in owner.decisions.plan.chains:
             self.given[behavior] = taker
             owner.take_in(owner.replan)
+
+    def name(self, points: Iterable[Point]) -> None:
+        """Take the news that other blocks are tied to these points.
+
+        Who hands its part over by plan may have to keep it up to there: else it waits for who takes the part, and
+        that one for the point.
+        """
+        fresh = {point for point in points if point not in self._named}
+        self._named |= fresh
+        if any(point.behavior in self.given for point in fresh):
+            self._owner.take_in(self._owner.replan)
 
     def renew(self) -> None:
         """Follow the points of other blocks that a new plan names, and tell whose parts it takes."""
