@@ -276,13 +276,12 @@ class BlockPerformance:
 
     def _tell(self) -> None:
         """Tell what was reached, in feedback and to other blocks."""
-        while self._untold:
-            untold, self._untold = self._untold, []
-            for point, at, arrived, by_body in untold:
-                came = self.decisions.facts.arrived.get(point, arrived)
-                self.report.reached(self.decisions, point, arrived=came, by_body=by_body)
-                self._shared.live_blocks.reach(self.plan.block.id, point, at)
-                self._let_go(point.behavior)
+        while self._untold:  # one by one: others may have it planned again when they hear, and that tells the rest
+            point, at, arrived, by_body = self._untold.pop(0)
+            came = self.decisions.facts.arrived.get(point, arrived)
+            self.report.reached(self.decisions, point, arrived=came, by_body=by_body)
+            self._shared.live_blocks.reach(self.plan.block.id, point, at)
+            self._let_go(point.behavior)
 
     def _let_go(self, behavior: str) -> None:
         """Hold a behavior no more once it has ended: nothing else is to be late for it."""
@@ -348,6 +347,7 @@ class BlockPerformance:
 
     def replan(self) -> None:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
+        self._tell()  # A behavior of which something is to be told may not be in the new plan.
         self._needs_replan = False
         gone = (*self._dropped, *self.ties.vanished)
         try:
