@@ -1,10 +1,11 @@
-"""Requests to hold, continue and stop."""
+"""Requests to hold, continue, stop and interrupt."""
 
 from itertools import count
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import PerformanceSteered, Steer, SteerPerformance, SteerRobot
+from engage_hri.schemas.blocks import InterruptBehavior, PerformanceSteered, Steer, SteerPerformance, SteerRobot
 from engage_hri.schemas.requests import Request
+from engage_hri.services.requests.ends import Pending, Requester
 from tests.realizer.stage import Stage
 
 NUMBERS = count()
@@ -22,3 +23,9 @@ async def steered(seen: Stage, to: Steer, block: str = "", behavior: str = "") -
     outcome = await seen.requests.send(*steer(f"steer-{next(NUMBERS)}", to, block, behavior)).outcome
     assert isinstance(outcome, PerformanceSteered)
     return outcome.blocks
+
+
+def interrupt(requests: Requester, block: str, behavior: str) -> Pending:
+    """End a behavior on request."""
+    request = InterruptBehavior(id=f"i-{block}-{behavior}", requester="test", block=block, behavior=behavior)
+    return requests.send(keys.BLOCK, request)

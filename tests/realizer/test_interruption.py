@@ -9,7 +9,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Event, Gaze, GazeShift, Gesture, Head, Mark, Pointing, Speech, Wait
-from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior
+from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome
 from engage_hri.schemas.body import GoHome, RobotState
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
@@ -22,6 +22,7 @@ from engage_hri.services.runtime.service import running
 from tests.control.suite import WORLD
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
+from tests.realizer.steering import interrupt
 
 BEAT = Gesture(id="beat", lexeme="BEAT", mode="RIGHT_HAND")
 """Takes 2.25 s: 0.5, 0.25, 0.5, 0.25, 0.25, 0.5."""
@@ -30,8 +31,7 @@ STORY = Speech(id="s", text="one two three", marks=(Mark("m1", 3), Mark("m2", 7)
 
 
 def ask(seen: Stage, behavior: str, block: str = "b") -> Pending:
-    request = InterruptBehavior(id=f"i-{behavior}", requester="test", block=block, behavior=behavior)
-    return seen.requests.send(keys.BLOCK, request)
+    return interrupt(seen.requests, block, behavior)
 
 
 async def interrupted(seen: Stage, behavior: str) -> BehaviorInterrupted:

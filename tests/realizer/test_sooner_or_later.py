@@ -7,23 +7,18 @@ from random import Random
 
 import pytest
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Head, Mark, Speech, Wait
-from engage_hri.schemas.blocks import Block, InterruptBehavior
+from engage_hri.schemas.blocks import Block
 from engage_hri.services.control.config import Slow, Stall, Variability
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, stage
+from tests.realizer.steering import interrupt
 from tests.realizer.test_simulated_body import Robot, robot
 
 LEFT = Gesture(id="l", lexeme="BEAT", mode="LEFT_HAND")
 WORDS = Speech(id="s", text="one two three four five six seven")
-
-
-async def interrupt(seen: Robot, name: str, behavior: str) -> None:
-    request = InterruptBehavior(id=f"i-{name}-{behavior}", requester="test", block=name, behavior=behavior)
-    await seen.requests.send(keys.BLOCK, request).outcome
 
 
 async def sooner(waiting: BlockBehavior, running: BlockBehavior) -> Robot:
@@ -34,7 +29,7 @@ async def sooner(waiting: BlockBehavior, running: BlockBehavior) -> Robot:
         await asyncio.sleep(0.1)
         second = seen.ask(block((running,), id="b"))
         await asyncio.sleep(0.5)
-        await interrupt(seen, "a", "w")
+        await interrupt(seen.requests, "a", "w").outcome
         await asyncio.gather(first.outcome, second.outcome)
     return seen
 
@@ -129,7 +124,7 @@ async def test_nothing_is_lost_to_another_block_whenever_waits_are_cut_short(see
 
 async def _cut_short(seen: Robot, number: int) -> None:
     with suppress(RequestRefused):  # the wait is over by itself
-        await interrupt(seen, f"k{number}", f"w{number}")
+        await interrupt(seen.requests, f"k{number}", f"w{number}").outcome
 
 
 async def test_who_has_begun_comes_before_its_neighbor_when_what_it_was_tied_to_vanishes() -> None:
@@ -141,7 +136,7 @@ async def test_who_has_begun_comes_before_its_neighbor_when_what_it_was_tied_to_
         second = seen.ask(block((LEFT, tied), id="b"))
         await asyncio.sleep(0.8)
         assert "h:start" in seen.times()
-        await interrupt(seen, "a", "w")
+        await interrupt(seen.requests, "a", "w").outcome
         await asyncio.gather(first.outcome, second.outcome)
 
     assert seen.kinds() == ["INTERRUPTED"]

@@ -6,7 +6,6 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
     FaceLexeme,
@@ -18,10 +17,11 @@ from engage_hri.schemas.behaviors import (
     Speech,
     Wait,
 )
-from engage_hri.schemas.blocks import Block, InterruptBehavior
+from engage_hri.schemas.blocks import Block
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import block, stage
+from tests.realizer.steering import interrupt
 from tests.realizer.test_sharing import MORE, RIGHT, WORDS, instants, mispredicted, told
 
 SMILE = FaceLexeme(id="f", lexeme="SMILE")
@@ -147,8 +147,7 @@ async def test_other_points_of_a_block_and_its_losses_say_nothing_of_its_end() -
         second = seen.ask(block((Wait(id="x", duration=2.0),), id="second", composition="APPEND"))
         third = seen.ask(block((timed(Wait(id="y", duration=1.0), start="first:u:end"), smile), id="third"))
         await asyncio.sleep(2.0)
-        request = InterruptBehavior(id="i", requester="test", block="first", behavior="v")
-        await seen.requests.send(keys.BLOCK, request).outcome
+        await interrupt(seen.requests, "first", "v").outcome
         await asyncio.gather(first.outcome, second.outcome, third.outcome)
 
     assert seen.times("second")["x:start"] == 0.0

@@ -6,21 +6,16 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Wait
-from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior
+from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.holds import Held
-from engage_hri.schemas.requests import Outcome, Refused
-from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
+from engage_hri.schemas.requests import Refused
+from engage_hri.services.requests.ends import Pending, RequestRefused
 from tests.realizer.puppet import bml, puppet
 from tests.realizer.stage import after, block, stage
-from tests.realizer.steering import steer, steered
+from tests.realizer.steering import interrupt, steer, steered
 
 RIGHT = 'lexeme="BEAT" hand="RIGHT_HAND"'
 """Takes 2.25 s; the stroke is over after 1.5."""
-
-
-async def interrupt(requests: Requester, block: str, behavior: str) -> Outcome:
-    request = InterruptBehavior(id=f"i-{block}-{behavior}", requester="test", block=block, behavior=behavior)
-    return await requests.send(keys.BLOCK, request).outcome
 
 
 async def all_ended(*asked: Pending, within: float = 60.0) -> None:
@@ -103,7 +98,7 @@ async def test_who_hands_a_look_over_keeps_it_if_another_block_is_tied_to_its_en
         await asyncio.sleep(0.25)
         asked.append(seen.ask(bml(second + look.format(2, 'ready="b0:s0:m0"'), "b2"), "b1"))
         await asyncio.sleep(0.25)
-        await interrupt(seen.requests, "b0", "s0")
+        await interrupt(seen.requests, "b0", "s0").outcome
         await asyncio.sleep(0.25)
         asked.append(seen.ask(bml(third, "b3")))
         await all_ended(*asked, within=50.0)
@@ -120,7 +115,7 @@ async def test_a_held_stroke_is_not_lost_to_one_that_is_planned_again() -> None:
         await asyncio.sleep(0.75)
         await steered(seen, "hold", "one", "g")  # it waits at the end of its stroke, at 1.5
         await asyncio.sleep(1.0)
-        await interrupt(seen.requests, "two", "w")  # that block is planned again
+        await interrupt(seen.requests, "two", "w").outcome  # that block is planned again
         await asyncio.sleep(1.0)
         await seen.requests.send(*steer("go", "continue")).outcome
         await all_ended(one, two)
@@ -137,7 +132,7 @@ async def test_a_point_that_was_reached_counts_though_its_behavior_was_dropped()
         await asyncio.sleep(0.25)
         asked.append(seen.ask(bml('<head id="h1" type="NOD" start="b0:g0:stroke_end-0.25"/>', "b1")))
         await asyncio.sleep(0.65)
-        await interrupt(seen.requests, "b0", "g0")
+        await interrupt(seen.requests, "b0", "g0").outcome
         await asyncio.sleep(0.05)
         asked.append(seen.ask(bml('<head id="h0" type="NOD" start="b0:g0:ready+1.0"/>', "b3")))
         await all_ended(*asked)
@@ -186,7 +181,8 @@ async def test_what_is_ended_on_request_fails_no_block_when_its_tie_vanishes() -
         await asyncio.sleep(0.25)
         two = seen.ask(bml(REQUIRED, "two"))
         await asyncio.sleep(0.5)
-        await asyncio.gather(interrupt(seen.requests, "one", "s"), interrupt(seen.requests, "two", "g"))
+        ended = [interrupt(seen.requests, *each).outcome for each in (("one", "s"), ("two", "g"))]
+        await asyncio.gather(*ended)
         await all_ended(one, two)
 
     outcome = two.outcome.result()
@@ -202,7 +198,7 @@ async def test_nor_while_a_slow_body_has_yet_to_end_it() -> None:
         await body.do("s", "start", block="one")
         two = body.ask(bml(REQUIRED, "two"))
         await body.do("g", "start", block="two")
-        asked = [asyncio.create_task(interrupt(body.requests, *each)) for each in (("two", "g"), ("one", "s"))]
+        asked = [interrupt(body.requests, *each).outcome for each in (("two", "g"), ("one", "s"))]
         await asyncio.sleep(0.1)
         body.end("s", "aborted", block="one")
         await asyncio.sleep(0.5)

@@ -125,10 +125,11 @@ class Decisions:
     ) -> list[Effect]:
         """Hold these behaviors, and no others, from now on: each waits where it next can. None: all of them.
 
+        The marking stays, and clocks before their instants stop. Those that were held and are not go on from there.
+        Who was told to pass a point asks again: what it is tied to may come later now.
+
         stuck: points of other blocks that do not come before what is held goes on. standing: those of them that come
-        no nearer either. The marking stays, and clocks
-        before their instants stop. Those that were held and are not go on from there. Who was told to pass a point
-        asks again: what it is tied to may come later now.
+        no nearer either.
         """
         facts = self.facts
         under_way = sorted(facts.under_way)
@@ -152,7 +153,8 @@ class Decisions:
         effects: list[Effect] = []
         for behavior in changed:
             effects.append(self._command(behavior, max(0, self.grants.through(behavior)), now))
-            self._kept_back |= {behavior} & self._asking.keys()
+            if behavior in self._asking:
+                self._kept_back.add(behavior)
             self._unwatched.add(behavior)
         for transition in range(len(self.plan.members)):
             self.grants.on_opened(transition)
@@ -251,8 +253,9 @@ class Decisions:
         through = self.grants.extend(behavior, now)
         after = self.foresight.pace(behavior, now, self.grants.may_pass)
         is_free = behavior in self._kept_back and behavior not in self._asking
+        if is_free:
+            self._kept_back.remove(behavior)
         if is_free or through > known or differ_noticeably(before, after):
-            self._kept_back.discard(behavior if is_free else "")
             self.foresight.paces[behavior] = after
             self._unwatched.add(behavior)
             yield self._command(behavior, through, now)
