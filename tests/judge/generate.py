@@ -3,17 +3,16 @@
 from collections.abc import Callable, Mapping, Sequence
 from random import Random
 from typing import Any, Literal
-from xml.sax.saxutils import escape, quoteattr
-
-from msgspec import Struct, field
+from xml.sax.saxutils import escape
 
 from tests.judge import reading
+from tests.judge.parts import Element, Made, offset
 from tests.judge.story import Deed, DeedKind, Story
+from tests.judge.webs import web
 
-Kind = Literal["alone", "streams", "sentences"]
-KINDS: tuple[Kind, ...] = ("alone", "streams", "sentences")
+Kind = Literal["alone", "streams", "sentences", "webs"]
+KINDS: tuple[Kind, ...] = ("alone", "streams", "sentences", "webs")
 TARGETS = ("cup", "box", "lamp", "human")
-OFFSETS = (-1.0, -0.5, -0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.5, 1.0)
 SENTENCES = (
     "This one here.",
     "And now the next piece goes there.",
@@ -34,44 +33,11 @@ HELD = (0.05, 0.2, 0.6, 1.5, 4.0)
 """Seconds for which something is held."""
 
 
-class Element(Struct):
-    """A behavior in the making. attributes: in order; `inner`: what stands between its tags."""
-
-    tag: str
-    id: str
-    points: tuple[str, ...]
-    main: str
-    attributes: dict[str, str] = field(default_factory=dict)
-    inner: str = ""
-    required: bool = False
-
-    def xml(self) -> str:
-        written = "".join(f" {name}={quoteattr(text)}" for name, text in self.attributes.items())
-        required = ' required="true"' if self.required else ""
-        return f"<{self.tag} id={quoteattr(self.id)}{written}{required}>{self.inner}</{self.tag}>"
-
-
-class Made(Struct):
-    """A block in the making, with what others may refer to."""
-
-    id: str
-    dialect: str
-    composition: str
-    elements: list[Element]
-    constraints: list[str]
-
-    def xml(self) -> str:
-        space = f' xmlns="{reading.BML_1_0}"' if self.dialect == "bml-1.0" else ' xmlns="org.mindmakers.bml"'
-        composed = f' composition="{self.composition}"' if self.composition != "MERGE" else ""
-        content = "\n  ".join((*(each.xml() for each in self.elements), *self.constraints))
-        return f'<bml id="{self.id}"{space}{composed}>\n  {content}\n</bml>'
-
-
 def story(seed: int, number: int, kind: Kind, *, faults: bool = False, holds: bool = False) -> Story:
     """A story. holds: the same, and parts of it are held for a while."""
     name = f"{seed}/{kind}/{number}"
     chance = Random(name)
-    make = {"alone": _alone, "streams": _stream, "sentences": _sentences}[kind]
+    make = {"alone": _alone, "streams": _stream, "sentences": _sentences, "webs": web}[kind]
     deeds = make(chance)
     if holds:
         deeds = _with_holds(Random(f"{name}/holds"), deeds)
@@ -126,7 +92,7 @@ def _sentences(chance: Random) -> tuple[Deed, ...]:
     constraints = []
     for one in chance.sample(dependents, chance.randint(0, 3)):
         to = chance.choice(speeches)
-        ref = _offset(chance, f"{to.id}:{chance.choice(to.points)}", (0.0, 0.0, 0.2, -0.2))
+        ref = offset(chance, f"{to.id}:{chance.choice(to.points)}", (0.0, 0.0, 0.2, -0.2))
         if chance.random() < 0.25:
             operator = chance.choice(("after", "synchronize"))
             own = f"{one.id}:{chance.choice(('start', one.main))}"
@@ -337,15 +303,15 @@ def _ref(chance: Random, block: Made, number: int, others: Sequence[Made]) -> st
         return str(round(chance.uniform(0.0, 4.0), 1))
     other = chance.choice(choice)
     sync = chance.choice((other.main, "start", "end", chance.choice(other.points)))
-    return _offset(chance, f"{other.id}:{sync}")
+    return offset(chance, f"{other.id}:{sync}")
 
 
 def _abroad(chance: Random, others: Sequence[Made]) -> str:
     other = chance.choice(others)
     if chance.random() < 0.25:
-        return _offset(chance, f"{other.id}:bml:{chance.choice(('end', 'end', 'start'))}")
+        return offset(chance, f"{other.id}:bml:{chance.choice(('end', 'end', 'start'))}")
     one = chance.choice(other.elements)
-    return _offset(chance, f"{other.id}:{one.id}:{chance.choice((one.main, 'end', chance.choice(one.points)))}")
+    return offset(chance, f"{other.id}:{one.id}:{chance.choice((one.main, 'end', chance.choice(one.points)))}")
 
 
 def _constraint(chance: Random, block: Made, others: Sequence[Made]) -> str:
@@ -358,7 +324,7 @@ def _constraint(chance: Random, block: Made, others: Sequence[Made]) -> str:
         sync = chance.choice((one.main, one.main, chance.choice(one.points)))
         if one.tag == "head" and sync == "stroke" and chance.random() < 0.15:
             sync = "stroke:2"
-        return _offset(chance, f"{one.id}:{sync}")
+        return offset(chance, f"{one.id}:{sync}")
 
     operator = chance.choice(("synchronize", "synchronize", "after", "before"))
     count = chance.choice((1, 1, 2, 3)) if operator == "synchronize" else chance.choice((1, 1, 2))
@@ -372,9 +338,3 @@ def _constraint(chance: Random, block: Made, others: Sequence[Made]) -> str:
     if chance.random() < 0.1:
         return f"<required><constraint>{content}</constraint></required>"
     return f"<constraint>{content}</constraint>"
-
-
-def _offset(chance: Random, point: str, offsets: Sequence[float] = OFFSETS) -> str:
-    offset = chance.choice(offsets)
-    spaced = " " if offset and chance.random() < 0.1 else ""
-    return f"{point}{spaced}{'+' if offset > 0 else '-'}{spaced}{abs(offset)}" if offset else point

@@ -15,6 +15,7 @@ LAWS: Mapping[str, str] = {
     "losses": "a behavior was lost without its one warning",
     "required": "something required was dropped, and the block is done",
     "words": "other words were told than heard",
+    "robbed": "another behavior took a part before the stroke was made, though the body is exact",
     "talked over": "words were lost because another block was speaking",
     "broken": "a constraint within a block was broken in silence",
     "broken across blocks": "a constraint with a point of another block was broken in silence",
@@ -37,6 +38,7 @@ LAWS: Mapping[str, str] = {
 
 CHECKS: tuple[Callable[[Case], Iterator[Finding]], ...] = (
     laws_feedback.one_end, laws_feedback.points, laws_feedback.losses, laws_feedback.words, laws_feedback.talked_over,
+    laws_feedback.robbed,
     laws_time.constraints, laws_custom.customs, laws_time.predictions, laws_time.spoken_order, laws_motion.motion,
     laws_motion.parts, laws_motion.home, laws_held.held, laws_held.late,
 )  # fmt: skip

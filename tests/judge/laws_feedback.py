@@ -129,6 +129,16 @@ def talked_over(case: Case) -> Iterator[Finding]:
             yield Finding("talked over", block, f"{message.behavior}: {message.message}")
 
 
+def robbed(case: Case) -> Iterator[Finding]:
+    """A stroke, or an arrival, is never lost to a behavior of whatever block: that waits, uses the other arm, or is
+    dropped before anything of it begins.
+    """
+    for told in case.record.told if case.is_exact else ():
+        message = told.message
+        if isinstance(message, WarningFeedback) and "another behavior took its part" in message.message:
+            yield Finding("robbed", message.block or "", f"{message.behavior}: {message.message}", message.behavior)
+
+
 def words(case: Case) -> Iterator[Finding]:
     """What the outcome says was said is what the voice has said: all, or the words before it was ended."""
     if case.story.faults.get("mute") or not case.is_told_true:
