@@ -84,7 +84,7 @@ def _timed(one: Element) -> tuple[str, ...]:
     """Points that can be tied at the behavior itself."""
     if one.tag in ("speech", "wait"):
         return ("start", "end")
-    return ("start", "ready", "stroke_end", "end") if one.points == SEVEN else one.points
+    return ("start", "ready", "strokeEnd", "end") if one.points == SEVEN else one.points
 
 
 def _ref(chance: Random, before: Sequence[Element], others: Sequence[Made]) -> str:

@@ -87,6 +87,10 @@ class PetriNet(Struct, frozen=True, dict=True):
         """
         return _reachable(self, sources, forward=True, is_of_instants=of_instants)
 
+    def earlier(self, targets: Iterable[int]) -> set[int]:
+        """Transitions that come before one of these, and these."""
+        return _reachable(self, targets, forward=False)
+
     @cached_property
     def initial(self) -> Marking:
         """The marking before the block starts: a token in each `idle` place."""

@@ -1,6 +1,6 @@
 """Knowledge about other live blocks, gathered for the planning of one: points, parts, and who depends on whom."""
 
-from collections.abc import Collection, Container, Iterable, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from typing import Protocol
 
 from msgspec import Struct
@@ -10,11 +10,10 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.perform.dependence import needed_by, waiting_for
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.plan.handover import least
 from engage_hri.services.realizer.plan.known import (
     Holder,
     Known,
@@ -68,10 +67,12 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
     there = {each.decisions.plan.block.id for each in concerned}
     points: dict[Point, Seconds] = {}
     holders: dict[str, Holder] = {}
-    for block in sorted({block_of(point) for point in asker.named} - there):
+    coming = dict(_coming(asker, live_blocks))
+    named = {block_of(each) for each in (*asker.named, *(each.chain.points[0] for each in coming.values()))}
+    for block in sorted(named - there):
         for point, at in {**live_blocks.times(block), **live_blocks.reached(block)}.items():
             points[qualified(block, point)] = at - asker.since
-    dependent = _dependents(asker.block, live_blocks)
+    awaiting = waiting_for(asker.block, live_blocks)
     for each in concerned:
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
@@ -85,16 +86,16 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         for point, at in live_blocks.reached(block).items():  # of what was dropped since, too
             points.setdefault(qualified(block, point), at - asker.since)
         if not each.is_ending:
-            over = {id for id, name in names.items() if decisions.facts.has_ended(id) or name in dependent}
+            over = {id for id, name in names.items() if decisions.facts.has_ended(id)}
             over |= {id for id, name in names.items() if block in asker.later and name not in asker.met}
             kept = plan.constrained | live_blocks.named(block)
             reached = decisions.facts.next_number
-            named = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}
-            takers = {id: taker for id, (of, _, taker) in named.items() if taker and of == asker.block}
+            after = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}
+            takers = {id: taker for id, (of, _, taker) in after.items() if taker and of == asker.block}
             holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over, reached, takers)
     # What had no tie could be waited for. It has none from then on, or two blocks would wait for each other.
-    untied = frozenset(point for point in asker.unnamed if point.behavior in dependent)
-    return Known(blocks=asker.blocks, points=points, holders=holders, untied=untied)
+    untied = frozenset(point for point in asker.unnamed if point in awaiting)
+    return Known(blocks=asker.blocks, points=points, holders={**coming, **holders}, untied=untied, awaiting=awaiting)
 
 
 def concerns(named: Iterable[Point], parts: Collection[str], other: Performed) -> bool:
@@ -106,38 +107,18 @@ def concerns(named: Iterable[Point], parts: Collection[str], other: Performed) -
     return any(part in parts and not has_ended(id) for id, each in plan.chains.items() for part in each.parts)
 
 
-def _dependents(block: str, live_blocks: LiveBlocks) -> set[str]:
-    """Behaviors, by `block:behavior`, that wait for points of a block, or for others that do: they are not given.
+def _coming(asker: Asker, live_blocks: LiveBlocks) -> Iterator[tuple[str, Holder]]:
+    """Behaviors of blocks that have yet to begin, if the asker is tied to what comes after them.
 
-    So no wait for a part closes a circle, whatever ties and waits there are: what a behavior of the block is to wait
-    for does not wait for the block. Nor may it wait for its turn behind that block. Ties name blocks that came
-    earlier; what has come by now is waited for no more.
-
-    The end of a look that waits to be taken over by that block does not count.
+    They cannot wait for it, so it is planned with them in mind.
     """
-    found: set[str] = set()
-    late = {block}
-    """Blocks that end later for it."""
-    others = [(plan, leaders) for plan, leaders in live_blocks.plans if plan.block.id != block]
-    coming = [[each for each in plan.foreign if not live_blocks.is_past(each)] for plan, _ in others]
-    tied = [(*each, foreign) for each, foreign in zip(others, coming, strict=True) if foreign or each[1]]
-    while True:
-        before = len(found)
-        for plan, leaders, foreign in tied:
-            if not late.isdisjoint(leaders):
-                late.add(plan.block.id)
-                found |= {f"{plan.block.id}:{id}" for id in (BLOCK_ITSELF, *plan.chains)}
-                continue
-            sources = [plan.at[each] for each in foreign if block_of(each) == block or each.behavior in found]
-            if sources:
-                later = plan.net.later(sources)
-                for id, each in plan.chains.items():
-                    needed = (*each.points[: least(each) + 1], *plan.constrained)
-                    if any(point.behavior == id and plan.at[point] in later for point in needed):
-                        late.add(plan.block.id)
-                        found |= {f"{plan.block.id}:{id}", f"{plan.block.id}:{BLOCK_ITSELF}"}
-        if len(found) == before:
-            return found
+    waiting = {plan.block.id: (plan, leaders) for plan, leaders in live_blocks.plans if leaders}
+    waiting.pop(asker.block, None)
+    for name, needed in needed_by(asker.named, waiting).items():
+        plan, _ = waiting[name]
+        kept = plan.constrained | live_blocks.named(name)
+        over = plan.chains.keys() - needed
+        yield from holders_of(name, plan.chains, plan.estimates, plan.natural, kept, over, lambda _: 0, {})
 
 
 def parts_of(behaviors: Iterable[BlockBehavior], estimates: Iterable[Estimate]) -> set[str]:

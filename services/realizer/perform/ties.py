@@ -178,6 +178,7 @@ class Ties:
             kept=frozenset(self._live_blocks.named(plan.block.id)),
             begun=frozenset(begun),
             untied=found.untied,
+            awaiting=found.awaiting,
             due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )
 

@@ -1,16 +1,19 @@
 """Points of other blocks in the schedule of a block: when they come, and what they leave no time for."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from math import inf
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.deadlocks import Loss
 from engage_hri.services.realizer.plan.handover import Turn
-from engage_hri.services.realizer.plan.known import Known, is_foreign
+from engage_hri.services.realizer.plan.known import BLOCK_END, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Circle, Foresight, Impossible
+from engage_hri.services.realizer.plan.prediction import Awaited, Circle, Foresight, Impossible
 from engage_hri.services.realizer.points import Point
+
+AFTER: Seconds = 0.001
+"""Least time from a point to one that waits for it: who waits for itself waits for ever."""
 
 
 def foreseen(assembly: Assembly, known: Known, doubted: Collection[Point]) -> dict[int, Seconds]:
@@ -21,6 +24,41 @@ def foreseen(assembly: Assembly, known: Known, doubted: Collection[Point]) -> di
             if point not in doubted and (at := known.points.get(point)) is not None:
                 found[transition] = max(at, found.get(transition, -inf))
     return found
+
+
+def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Point]]) -> Iterator[Awaited]:
+    """Which points of other blocks come only after points of this one: what waits for both waits in a circle.
+
+    waived: pairs of such points that do not count.
+    """
+    for foreign, target in assembly.at.items():
+        for own, seconds in known.awaiting.get(foreign, {}).items():
+            source = len(assembly.members) - 1 if own == BLOCK_END else assembly.at.get(own, 0)
+            if source and source != target and (own, foreign) not in waived:
+                lag = max(seconds, AFTER)
+                yield Awaited("order", source, target, lag, lag)
+
+
+def is_behind(assembly: Assembly, known: Known, foreign: Point, behavior: str) -> bool:
+    """True if a point of another block comes only after this behavior has begun."""
+    awaited = known.awaiting.get(foreign, {})
+    start = assembly.at[Point(behavior, "start")]
+    later = assembly.net.later([start]) if awaited else ()
+    return any(own == BLOCK_END or assembly.at.get(own) in later for own in awaited)
+
+
+def futile(impossible: Impossible, assembly: Assembly, known: Known) -> set[tuple[Point, Point]]:
+    """Pairs of points, as of `awaited`, that wait for each other whatever is planned."""
+    ends = {
+        (tie.source, tie.target) for circle in impossible.circles for tie, _ in circle if isinstance(tie, Awaited)
+    }
+    end = len(assembly.members) - 1
+    return {
+        (own, foreign)
+        for foreign, target in assembly.at.items()
+        for own in known.awaiting.get(foreign, ())
+        if (end if own == BLOCK_END else assembly.at.get(own, 0), target) in ends
+    }
 
 
 def losses_to_others(

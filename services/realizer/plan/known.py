@@ -41,6 +41,8 @@ class Known(Struct, frozen=True, kw_only=True):
     that takes them. kept: points of this block that other blocks wait for. begun: behaviors of this block that have
     begun; they wait for nobody any more. due: those that would begin now, but for a behavior of another block.
     untied: points of others to which nothing is to be tied: these wait for this block by now.
+    awaiting: points of others that come only after points of this block, each with those, and the seconds from there
+    at least. The end of the block is `BLOCK_END`.
     """
 
     blocks: Elsewhere = {}
@@ -51,6 +53,7 @@ class Known(Struct, frozen=True, kw_only=True):
     begun: frozenset[str] = frozenset()
     due: Set[str] = frozenset()
     untied: Set[Point] = frozenset()
+    awaiting: Mapping[Point, Mapping[Point, Seconds]] = {}
 
     def with_own(self, times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
         """Times of a schedule for the block's own points, with those of others as they are known here.
@@ -60,6 +63,19 @@ class Known(Struct, frozen=True, kw_only=True):
         if not self.points:
             return times
         return {**self.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
+
+    def with_waiting(self, times: Mapping[Point, Seconds], end: Seconds) -> Mapping[Point, Seconds]:
+        """The same times, with points of others no earlier than they can be if they wait for points of this block.
+
+        end: of the block.
+        """
+        own = {**times, BLOCK_END: end}
+        later = {
+            point: max([times[point], *(own[each] + seconds for each, seconds in waits.items() if each in own)])
+            for point, waits in self.awaiting.items()
+            if point in times
+        }
+        return {**times, **later} if later else times
 
     def in_truth(self, chains: Iterable[Chain], times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
         """The same, with behaviors of the block no earlier than they began or can begin now; who is due comes now."""

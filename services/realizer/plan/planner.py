@@ -6,6 +6,7 @@ between equals; any other permutation of a block gives the same net.
 """
 
 from collections.abc import Collection, Container, Iterable, Mapping
+from functools import partial
 
 from msgspec.structs import replace
 
@@ -15,10 +16,9 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan import unsupported
+from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
-from engage_hri.services.realizer.plan.foresight import foreseen, losses_to_others, too_late, without_date
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
@@ -92,6 +92,8 @@ class _Planner:
         """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
         self.untied: set[Point] = set(known.untied)
         """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
+        self.waived: set[tuple[Point, Point]] = set()
+        """Points of this block, each with one of another, that are waited for in a circle whatever is planned."""
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
@@ -255,14 +257,16 @@ class _Planner:
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times)
+            everywhere = self.known.with_waiting(everywhere, solution.times[-1])
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
                 self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
-            undated = without_date(assembly, self.known) if given else ()
+            undated = foresight.without_date(assembly, self.known) if given else ()
+            is_behind = partial(foresight.is_behind, assembly, self.known)
             arranged, others = yield from share(
-                self.chains, present, self.known, arranged, everywhere, self.barred, undated
+                self.chains, present, self.known, arranged, everywhere, self.barred, undated, is_behind
             )
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
@@ -337,30 +341,33 @@ class _Planner:
                 classes.tie(Equal(terms), self.block.id)
             assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
-            times = foreseen(assembly, self.known, self.doubted)
-            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times)
+            times = foresight.foreseen(assembly, self.known, self.doubted)
+            behind = tuple(foresight.awaited(assembly, self.known, self.waived))
+            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times, behind)
             if self.order.pass_alone():
                 raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:
             if self.order.refute(impossible.circles, assembly.net):
                 raise Misordered from None
-            if taken := losses_to_others(impossible, assembly, arrangement.turns, self.chains, self.known):
+            if taken := foresight.losses_to_others(impossible, assembly, arrangement.turns, self.chains, self.known):
                 raise Losses(taken) from None
-            if late := too_late(impossible, assembly) - self.doubted:
+            if futile := foresight.futile(impossible, assembly, self.known):
+                self.waived |= futile
+            elif late := foresight.too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
                 if foreign := {point for point in late if is_foreign(point.behavior)}:
                     self.untied |= foreign
                     raise Misordered from None
-                return (yield from self._solved(assembler, arrangement, classes))
-            if waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
+            elif waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
-                return (yield from self._solved(assembler, arrangement, classes))
-            handovers = {each for takers in arrangement.handovers.values() for each in takers}
-            present, turns = assembler.relations, self.turns | self.order.turns | handovers
-            raise (
-                yield from judge(impossible, assembly, self.chains, present, classes, self.block.id, turns)
-            ) from None
+            else:
+                handovers = {each for takers in arrangement.handovers.values() for each in takers}
+                present, turns = assembler.relations, self.turns | self.order.turns | handovers
+                raise (
+                    yield from judge(impossible, assembly, self.chains, present, classes, self.block.id, turns)
+                ) from None
+            return (yield from self._solved(assembler, arrangement, classes))
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
         """True for an utterance that no constraint mentions: the voice decides whether it has to wait."""

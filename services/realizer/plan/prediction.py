@@ -14,6 +14,10 @@ class Foresight(Place, frozen=True):
     """Place that stands for what is known beforehand of its target: it comes no earlier than `lag` seconds."""
 
 
+class Awaited(Place, frozen=True):
+    """Place that stands for what other blocks wait for: its target, a point of theirs, comes after its source."""
+
+
 Circle = tuple[tuple[Place | Bound, Seconds], ...]
 """Ties that lead back to their start, in order, each with its seconds: the sum is more than 0."""
 
@@ -33,17 +37,19 @@ def predict(
     net: PetriNet,
     is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False,
     known: Mapping[int, Seconds] = {},
+    awaited: Iterable[Awaited] = (),
 ) -> Steps[Solution]:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
     known: when transitions come that depend on more than this net, at the earliest; negative: before the block.
+    awaited: which of them come after transitions of this net.
     A cycle that takes too long is shortened: each phase by a share of its room, those that can be slower before those
     that have to hurry. Raises Impossible; also for a cycle with ties that are dispensable: no phase is hurried for
     their sake.
     """
     foreseen = [Foresight("order", 0, each, at, at) for each, at in sorted(known.items()) if each and at > 0.0]
     past = {each: at for each, at in known.items() if each and at <= 0.0}
-    ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds, *foreseen)
+    ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds, *foreseen, *awaited)
     lags = []
     for number, tie in enumerate(ties):
         if tie.kind != "idle":

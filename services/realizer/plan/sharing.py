@@ -4,7 +4,7 @@ The others are given: what they were promised is not taken from them. A behavior
 part over and loses its way home, as within one block; before that, who comes waits, or uses the other arm.
 """
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 
 from msgspec.structs import replace
 
@@ -22,7 +22,7 @@ from engage_hri.services.realizer.plan.handover import (
     leaving,
     window,
 )
-from engage_hri.services.realizer.plan.known import Holder, Known, is_foreign
+from engage_hri.services.realizer.plan.known import BLOCK_END, Holder, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
 from engage_hri.services.realizer.plan.steps import Steps
@@ -37,15 +37,17 @@ def share(
     times: Mapping[Point, Seconds],
     barred: Container[tuple[str, Hand]] = (),
     undated: Container[str] = (),
+    is_behind: Callable[[Point, str], bool] = lambda point, behavior: False,
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
     times: of the points of this block, in the schedule that `arranged` is for, and of others. undated: behaviors that
-    wait for points of which nobody knows yet when they come; they are planned again once it is known.
+    wait for points of which nobody knows yet when they come; they are planned again once it is known. is_behind:
+    whether a point of another block comes only after a behavior of this one has begun.
     """
     if not known.holders and not known.given:
         return arranged, []
-    shared = _Sharing(chains, relations, known, arranged, times, barred)
+    shared = _Sharing(chains, relations, known, arranged, times, barred, is_behind)
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
@@ -68,7 +70,9 @@ class _Sharing:
         arranged: Arrangement,
         times: Mapping[Point, Seconds],
         barred: Container[tuple[str, Hand]],
+        is_behind: Callable[[Point, str], bool],
     ) -> None:
+        self.is_behind = is_behind
         self.chains = chains
         self.known = known
         self.times = times
@@ -140,13 +144,15 @@ class _Sharing:
         """Hand the part over to the behavior of another block that takes it by that block's plan.
 
         That waits for what this one keeps, whenever it is expected. If that is the way home of one that lasts until
-        something takes its place, it does not wait for who takes it: the two would wait for each other.
+        something takes its place, it does not wait for who takes it: the two would wait for each other. Nor if that
+        one waits for the end of this block.
         """
         if (taker := self.known.given.get(id)) is not None and taker in self.times:
             chain, kept = self.chains[id], self.held | self.known.kept
             first = self._first_after(chain, self.times[taker])
             least_kept = max([least(chain), *(number for number, point in enumerate(chain.points) if point in kept)])
-            is_awaited = id in self.natural and least_kept >= leaving(chain)
+            is_waited_for = BLOCK_END in self.known.awaiting.get(taker, ())
+            is_awaited = id in self.natural and (least_kept >= leaving(chain) or is_waited_for)
             if first is not None and least_kept + 1 < len(chain.points) and not is_awaited:
                 self._hand_over(id, taker.behavior, max(first, least_kept + 1))
 
@@ -178,6 +184,8 @@ class _Sharing:
         since, to = window(self.chains[id], self.times)
         for begins, ends, name in self._users_of(id):
             holder, at = self.known.holders[name], self.times[point]
+            if self.is_behind(holder.chain.points[0], id):
+                continue
             if at < ends - EPSILON and at - EPSILON <= begins < at + to - since - EPSILON:
                 point = self._release(id, holder, 1)
         return point

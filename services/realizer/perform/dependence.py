@@ -1,0 +1,162 @@
+"""Which points of other live blocks come only after points of a block, and which behaviors a point comes after.
+
+Blocks wait for each other in many ways: a point is tied to a point, a part is free from some point on, an end comes
+when all has come, a turn when others have ended. What waits is a point, so it is followed from point to point.
+"""
+
+from collections import defaultdict, deque
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from math import inf
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.petri_net import Bound, Place
+from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, block_of, is_foreign, qualified
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.points import EPSILON, Point
+
+Here = tuple[str, int]
+"""A transition of the net of a block."""
+UNAWAITED = ("idle", "handover")
+"""Kinds of places that nothing waits for."""
+_ROUNDS = 8
+"""How often a transition may be found to come later: blocks that wait for each other already are not gone round."""
+
+
+def waiting_for(block: str, live_blocks: LiveBlocks) -> Mapping[Point, Mapping[Point, Seconds]]:
+    """Points of other live blocks, named as these do, that come only after points of this one: each with those, and
+    the seconds from there at least. The end of the block is its `BLOCK_END`.
+    """
+    return _Followed(block, live_blocks).all()
+
+
+class _Followed:
+    """All live blocks but one, as far as they wait for that one."""
+
+    def __init__(self, block: str, live_blocks: LiveBlocks) -> None:
+        self.block = block
+        self.live_blocks = live_blocks
+        others = {plan.block.id: (plan, leaders) for plan, leaders in live_blocks.plans if plan.block.id != block}
+        self.plans = {name: plan for name, (plan, _) in others.items()}
+        self.behind = {name: leaders for name, (_, leaders) in others.items()}
+        self.tied: dict[Point, list[Here]] = defaultdict(list)
+        """For each point that other blocks name, where it stands in their nets."""
+        for name, plan in self.plans.items():
+            for point in plan.foreign:
+                if self._waiting(name)[plan.at[point]]:
+                    self.tied[point].append((name, plan.at[point]))
+        self.out: dict[str, Mapping[int, list[tuple[int, Seconds]]]] = {}
+
+    def all(self) -> Mapping[Point, Mapping[Point, Seconds]]:
+        found: dict[Point, dict[Point, Seconds]] = defaultdict(dict)
+        named = {point for point in self.tied if block_of(point) == self.block}
+        followed = [point for point in sorted(named) if not self.live_blocks.is_past(point)]
+        end = qualified(self.block, BLOCK_END)
+        for point in dict.fromkeys((*followed, end)):
+            own = Point(point.behavior.removeprefix(f"{self.block}:"), point.sync)
+            starts = dict.fromkeys(self.tied.get(point, ()), 0.0)
+            if point == end:
+                starts |= {(name, 0): 0.0 for name, leaders in self.behind.items() if self.block in leaders}
+            for here, seconds in self._after(starts).items():
+                for each in self._points(here):
+                    found[each][own] = max(seconds, found[each].get(own, -inf))
+        return found
+
+    def _after(self, starts: Mapping[Here, Seconds]) -> Mapping[Here, Seconds]:
+        """Transitions that come after these, and these, with the seconds from there at least."""
+        found = dict(starts)
+        todo = deque(starts)
+        rounds: dict[Here, int] = defaultdict(int)
+        while todo:
+            here = todo.popleft()
+            for there, seconds in self._next(here):
+                at = found[here] + seconds
+                if at > found.get(there, -inf) + EPSILON and rounds[there] < _ROUNDS:
+                    rounds[there] += 1
+                    found[there] = at
+                    todo.append(there)
+        return found
+
+    def _next(self, here: Here) -> Iterator[tuple[Here, Seconds]]:
+        name, transition = here
+        for target, seconds in self._ties(name).get(transition, ()):
+            yield (name, target), seconds
+        for point in self._points(here):
+            yield from ((there, 0.0) for there in self.tied.get(point, ()))
+        if transition == len(self.plans[name].net.transitions) - 1:
+            yield from (((other, 0), 0.0) for other, leaders in self.behind.items() if name in leaders)
+
+    def _points(self, here: Here) -> Iterator[Point]:
+        """Points of the block itself that are a transition of its net, named as other blocks name them."""
+        name, transition = here
+        net = self.plans[name].net
+        own = [each for each in net.transitions[transition].points if not is_foreign(each.behavior)]
+        if transition == 0:
+            own.append(BLOCK_START)
+        elif transition == len(net.transitions) - 1:
+            own.append(BLOCK_END)
+        yield from (qualified(name, each) for each in own)
+
+    def _ties(self, name: str) -> Mapping[int, list[tuple[int, Seconds]]]:
+        """For each transition of a block, those that come after it, and the seconds from there at least.
+
+        What has no room to wait comes later if what follows it does. What has been waits for nothing, nor does who
+        hands a part over: it goes home by itself.
+        """
+        if name not in self.out:
+            net, is_open = self.plans[name].net, self._waiting(name)
+            out: dict[int, list[tuple[int, Seconds]]] = defaultdict(list)
+            ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
+            for tie in ties:
+                is_awaited = tie.kind not in UNAWAITED and tie.target and is_open[tie.target]
+                if is_awaited and (seconds := _least(tie)) > -inf:
+                    out[tie.source].append((tie.target, seconds))
+            self.out[name] = out
+        return self.out[name]
+
+    def _waiting(self, name: str) -> list[bool]:
+        """For each transition of a block, whether it comes later if what it waits for does.
+
+        What has been does not; nor does what cannot wait any more: the end of words that are being said.
+        """
+        plan, reached = self.plans[name], self.live_blocks.reached(name)
+        kinds = {(each.behavior, at): each.kind for at, members in enumerate(plan.members) for each in members}
+        found = [all(is_foreign(each.behavior) for each in members) for members in plan.members]
+        for id, chain in plan.chains.items():
+            may_wait = False
+            for point in chain.points:
+                at = plan.at[point]
+                may_wait = may_wait or (point not in reached and kinds[id, at] != "passive")
+                found[at] = found[at] or (may_wait and point not in reached)
+        return found
+
+
+def _least(tie: Place | Bound) -> Seconds:
+    """The least seconds from the source to the target of a tie; minus infinity: any."""
+    if isinstance(tie, Place):
+        return tie.shortest
+    return -inf if tie.stretch is None else tie.lag - tie.stretch
+
+
+def needed_by(points: Iterable[Point], among: Mapping[str, tuple[Plan, Collection[str]]]) -> Mapping[str, set[str]]:
+    """Behaviors of blocks that wait for their turn which have to come before some points; by block.
+
+    points: named as other blocks name them. among: plan of each of these blocks, and those that have to end first.
+    """
+    found: dict[str, set[str]] = defaultdict(set)
+    todo = list(points)
+    seen = set(todo)
+    while todo:
+        point = todo.pop()
+        if (name := block_of(point)) not in among:
+            continue
+        plan, leaders = among[name]
+        last = plan.transition(Point(point.behavior.removeprefix(f"{name}:"), point.sync))
+        before = plan.net.earlier([last]) if last is not None else {0}
+        there = [each for each, transition in plan.at.items() if transition in before]
+        found[name] |= {each.behavior for each in there if not is_foreign(each.behavior)}
+        ends = [qualified(leader, BLOCK_END) for leader in leaders]
+        fresh = [each for each in (*there, *ends) if is_foreign(each.behavior) and each not in seen]
+        seen.update(fresh)
+        todo += fresh
+    return found
