@@ -95,7 +95,14 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
             holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over, reached, takers)
     # What had no tie could be waited for. It has none from then on, or two blocks would wait for each other.
     untied = frozenset(point for point in asker.unnamed if point in awaiting)
-    return Known(blocks=asker.blocks, points=points, holders={**coming, **holders}, untied=untied, awaiting=awaiting)
+    return Known(
+        blocks=asker.blocks,
+        points=points,
+        holders={**coming, **holders},
+        untied=untied,
+        awaiting=awaiting,
+        lost={each for each in asker.named if live_blocks.is_lost(each)},
+    )
 
 
 def concerns(named: Iterable[Point], parts: Collection[str], other: Performed) -> bool:

@@ -180,6 +180,14 @@ class LiveBlocks:
         tracked = self._tracked.get(block := block_of(point))
         return tracked is None or Point(point.behavior.removeprefix(f"{block}:"), point.sync) in tracked.reached
 
+    def is_lost(self, point: Point) -> bool:
+        """True if a point, named as other blocks name it, has not been reached and never will be."""
+        home = self._find(block := block_of(point))
+        named = Point(point.behavior.removeprefix(f"{block}:"), point.sync)
+        if home is None or named in home.reached:
+            return home is None
+        return named.behavior in home.lost or self._tracked.get(block) is not home
+
     def times(self, block: str) -> Mapping[Point, Seconds]:
         """Times of the points of a live block, measured or expected; none if it is yet to be planned."""
         tracked = self._tracked.get(block)
@@ -307,7 +315,7 @@ class LiveBlocks:
             home = homes.get(block)
             if home is not None and (at := home.reached.get(named)) is not None:
                 follower.hear(point, at)
-            elif home is None or named.behavior in home.lost or self._tracked.get(block) is not home:
+            elif home is None or self.is_lost(point):
                 follower.miss((point.behavior,))
             else:
                 home.named.add(named)

@@ -31,6 +31,7 @@ from engage_hri.services.realizer.perform.recognition_link import RecognitionLin
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.perform.ties import Ties
+from engage_hri.services.realizer.plan.phases import ARMS
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import DROPPED
@@ -349,13 +350,15 @@ class BlockPerformance:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
         self._tell()  # A behavior of which something is to be told may not be in the new plan.
         self._needs_replan = False
-        gone = (*self._dropped, *self.ties.vanished)
+        gone, so_far, known = (*self._dropped, *self.ties.vanished), self.decisions.plan, self.ties.known()
+        # Blocks that came later were planned around the arms that this one has chosen.
+        chosen = {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
         try:
-            plan = plan_block(self.plan.block, self.plan.estimates.values(), dropped=gone, known=self.ties.known())
+            plan = plan_block(so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=chosen)
         except InputRefused as error:
             self._live.fail(error.fault)
             return
-        before = self.decisions.plan.given_up
+        before = so_far.given_up
         self.decisions.replan(plan)
         self.ties.renew()
         # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.

@@ -179,6 +179,7 @@ class Ties:
             begun=frozenset(begun),
             untied=found.untied,
             awaiting=found.awaiting,
+            lost=found.lost,
             due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )
 

@@ -104,7 +104,7 @@ def arrange(
     handovers: dict[str, tuple[Handover, ...]] = {}
     conflicts = []
     yield len(chains) // 4
-    ranked = entering(chains, mentioned, times, rounds, before.ranked)
+    ranked = entering(chains, mentioned, times, rounds, before.ranked, begun)
     yield len(chains) // 4
     users = _users(chains, ranked)
     beneath = frozenset(_overlaid(chains, users, times))
@@ -191,14 +191,23 @@ def entering(
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
     ranked: Sequence[str] = (),
+    begun: Container[str] = (),
 ) -> tuple[str, ...]:
-    """Behaviors in the order in which they take parts. Of those that start together, unmentioned ones come last.
+    """Behaviors in the order in which they take parts. Of those that start together, those that have begun come first
+    and unmentioned ones last.
 
     ranked: the order so far.
     """
     so_far = {id: number for number, id in enumerate(ranked)}
     rank = {
-        id: (round(times[start := chain.points[0]], 6), so_far.get(id, 0), rounds[start], id not in mentioned, number)
+        id: (
+            round(times[start := chain.points[0]], 6),
+            id not in begun,
+            so_far.get(id, 0),
+            rounds[start],
+            id not in mentioned,
+            number,
+        )
         for number, (id, chain) in enumerate(chains.items())
     }
     return tuple(sorted(chains, key=rank.__getitem__))

@@ -42,7 +42,7 @@ class Known(Struct, frozen=True, kw_only=True):
     begun; they wait for nobody any more. due: those that would begin now, but for a behavior of another block.
     untied: points of others to which nothing is to be tied: these wait for this block by now.
     awaiting: points of others that come only after points of this block, each with those, and the seconds from there
-    at least. The end of the block is `BLOCK_END`.
+    at least. The end of the block is `BLOCK_END`. lost: points of others that are named and never come.
     """
 
     blocks: Elsewhere = {}
@@ -54,6 +54,7 @@ class Known(Struct, frozen=True, kw_only=True):
     due: Set[str] = frozenset()
     untied: Set[Point] = frozenset()
     awaiting: Mapping[Point, Mapping[Point, Seconds]] = {}
+    lost: Set[Point] = frozenset()
 
     def with_own(self, times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
         """Times of a schedule for the block's own points, with those of others as they are known here.
@@ -82,7 +83,7 @@ class Known(Struct, frozen=True, kw_only=True):
         late: dict[Point, Seconds] = {}
         for chain in chains if self.points else ():
             start = chain.points[0]
-            by = self.points.get(start, times[start]) - times[start]
+            by = self.points.get(start, 0.0) - times[start]
             if by > EPSILON or chain.behavior.id in self.due:
                 late |= {point: times[point] + by for point in chain.points}
         return {**self.with_own(times), **late}
