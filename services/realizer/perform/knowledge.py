@@ -88,6 +88,9 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         if not each.is_ending:
             over = {id for id, name in names.items() if decisions.facts.has_ended(id)}
             over |= {id for id, name in names.items() if block in asker.later and name not in asker.met}
+            if is_named_in(asker.block, plan.constrained):
+                # It is planned with the asker in mind: two blocks that make way for each other never agree.
+                over |= plan.chains.keys() - decisions.facts.under_way
             kept = plan.constrained | live_blocks.named(block)
             reached = decisions.facts.next_number
             after = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}

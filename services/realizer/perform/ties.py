@@ -18,6 +18,9 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import EPSILON, Point
 
+MOST_PLANS = 20
+"""Most plans of one block, at one time, because of parts that it hands over to others."""
+
 
 class Tied(Performed, Protocol):
     """A performance, as its ties need it. plan: the one that it began with. interrupted: ended on request."""
@@ -67,6 +70,8 @@ class Ties:
         self.given: dict[str, Point] = {}
         self._met: dict[tuple[str, str], Seconds] = {}
         """When a behavior of this block was to begin, and one of another block had a part of it."""
+        self._replanned: tuple[Seconds, int] = (-inf, 0)
+        """When it was last planned again for parts that it hands over, and how often at that time."""
         self._named: set[Point] = set()
         """Points of this block that others are tied to."""
 
@@ -211,14 +216,24 @@ class Ties:
         for id in kept:
             del self.given[id]
         if kept:
-            self._owner.take_in(self._owner.replan)
+            self._replan()
 
     def give(self, behavior: str, taker: Point) -> None:
         """Plan to hand over the part of a behavior at `taker`, a point of another block."""
         owner = self._owner
         if self.given.get(behavior) != taker and behavior in owner.decisions.plan.chains:
             self.given[behavior] = taker
-            owner.take_in(owner.replan)
+            self._replan()
+
+    def _replan(self) -> None:
+        """Plan again at once, but not for ever: blocks that hand parts to each other may never agree on who is first.
+
+        Who meets another when it is to begin waits all the same.
+        """
+        now = self._owner.report.now()
+        self._replanned = (now, self._replanned[1] + 1 if self._replanned[0] == now else 1)
+        if self._replanned[1] <= MOST_PLANS:
+            self._owner.take_in(self._owner.replan)
 
     def name(self, points: Iterable[Point]) -> None:
         """Take the news that other blocks are tied to these points.
@@ -229,7 +244,7 @@ class Ties:
         fresh = {point for point in points if point not in self._named}
         self._named |= fresh
         if any(point.behavior in self.given for point in fresh):
-            self._owner.take_in(self._owner.replan)
+            self._replan()
 
     def renew(self) -> None:
         """Follow the points of other blocks that a new plan names, and tell whose parts it takes."""
