@@ -65,7 +65,7 @@ class Reporter:
         """Time of the latest message; none after it has an earlier one."""
         self._told: dict[Point, Seconds] = {}
         """The last prediction of each point, in seconds from the block's start."""
-        self._not_before = 0.0
+        self.not_before = 0.0
         """Earliest time for the next prediction."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
@@ -80,12 +80,12 @@ class Reporter:
 
     def may_expect(self) -> bool:
         """True if it is time to predict again."""
-        return self._bus.now() >= self._not_before
+        return self._bus.now() >= self.not_before
 
     def expect(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
         """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
         ours = {point: times[point] for point in _points(plan) if point in times}
-        self._not_before = self._bus.now() + AGAIN * len(ours)
+        self.not_before = self._bus.now() + AGAIN * len(ours)
         if moved_noticeably(self._told, ours):
             self._predict(plan, began, ours)
 

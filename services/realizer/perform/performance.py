@@ -257,7 +257,9 @@ class BlockPerformance:
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
         self.held.tell()
-        self._timer.set(None if self._ending.done() else self.decisions.deadline)
+        untold = self.report.not_before if foresight.is_surprised else None
+        deadlines = [each for each in (self.decisions.deadline, untold) if each is not None]
+        self._timer.set(min(deadlines) if deadlines and not self._ending.done() else None)
         self._net.tell_soon()
 
     def apply(self, effect: Effect) -> bool:

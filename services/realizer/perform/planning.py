@@ -70,7 +70,7 @@ class Planning:
     async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Plan a block that had to wait: by now the body and the other blocks are elsewhere."""
         known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
-        question = question_about(plan.block, poses_before(plan, known), planned_times(plan))
+        question = question_about(plan.block, poses_before(plan, known), planned_times(plan, known))
         estimates = await self._estimates(plan.block, question)
         return await self._agreed(plan.block, question, estimates, elsewhere, plan.foreign)
 
@@ -105,7 +105,7 @@ class Planning:
                 if rounds.settled is None:
                     raise
                 return rounds.settled
-            about_plan = question_about(plan.block, poses_before(plan, known), planned_times(plan))
+            about_plan = question_about(plan.block, poses_before(plan, known), planned_times(plan, known))
             if plan.block is chosen:
                 told = rounds.answer(about_plan) or await self._estimates(chosen, about_plan)
                 if (agreed := rounds.close(plan, about_plan, told)) is not None:

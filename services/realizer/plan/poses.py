@@ -57,22 +57,23 @@ def poses_before(plan: Plan, known: Known = NOTHING) -> dict[str, BodyPose]:
     return poses
 
 
-def planned_times(plan: Plan) -> dict[str, tuple[PlannedTime, ...]]:
+def planned_times(plan: Plan, known: Known = NOTHING) -> dict[str, tuple[PlannedTime, ...]]:
     """Times at which behaviors begin, wait, hurry and dawdle, by their ids, in the order in which they begin.
 
-    Empty if no behavior makes a difference to another or to itself: then its first estimates hold.
+    Empty if no behavior makes a difference to another or to itself: then its first estimates hold. known: other live
+    blocks.
     """
     order = plan.begun_in_order(plan.chains)
     order.sort(key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
     moving = [id for id in order if (estimate := plan.estimates.get(id)) is not None and estimate.parts]
-    times = {id: _times(plan, id) for id in moving if plan.estimates[id].parts != ("voice",)}
+    times = {id: _times(plan, id, known) for id in moving if plan.estimates[id].parts != ("voice",)}
     used = [part for id in times for part in plan.estimates[id].parts]
     if len(set(used)) == len(used) and "torso" not in used and all(len(each) == 1 for each in times.values()):
         return {}
     return times
 
 
-def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
+def _times(plan: Plan, id: str, known: Known) -> tuple[PlannedTime, ...]:
     chain = plan.chains[id]
     times = [PlannedTime(sync=chain.points[0].sync, at=plan.predicted(chain.points[0]))]
     taken, (_, cut) = _taken(plan, id), plan.successors.get(id, ("", None))
@@ -87,7 +88,7 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
         if to == cut and surplus < -NOTICEABLE:
             break
         is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
-        is_due = _is_met_there(plan, to) if segment.hold else is_just_in_time
+        is_due = _is_met_there(plan, to, known, begins) if segment.hold else is_just_in_time
         if abs(surplus) > NOTICEABLE or is_due:
             is_slower = EPSILON < surplus <= slack(plan, to)
             at = comes + (APART if id in plan.natural else 0.0)
@@ -95,10 +96,14 @@ def _times(plan: Plan, id: str) -> tuple[PlannedTime, ...]:
     return tuple(times)
 
 
-def _is_met_there(plan: Plan, hold: Point) -> bool:
-    """True if one comes to this instant who cannot wait: who is at the hold point waits until that is measured."""
+def _is_met_there(plan: Plan, hold: Point, known: Known, before: Seconds) -> bool:
+    """True if one comes to this instant who cannot wait: who is at the hold point waits until that is measured.
+
+    before: when it is at the point before. If a point of another block has come by then, it need not stop for it.
+    """
     members = plan.members[plan.at[hold]]
-    return any(each.behavior != hold.behavior and each.kind in ("passive", "prompt") for each in members)
+    others = (each for each in members if each.behavior != hold.behavior and each.kind in ("passive", "prompt"))
+    return any(known.points.get(each.point, inf) > before for each in others)
 
 
 def _taken(plan: Plan, id: str) -> Seconds:
