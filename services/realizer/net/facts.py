@@ -147,6 +147,11 @@ class Facts:
         """True if any behavior is held, or anything stuck elsewhere."""
         return self.held is None or bool(self.held) or bool(self.stuck)
 
+    @property
+    def has_held(self) -> bool:
+        """True if anything has been held since the block began."""
+        return bool(self._holds)
+
     def is_held(self, behavior: str) -> bool:
         """True if the behavior is to wait where it next can."""
         return self.held is None or behavior in self.held

@@ -366,7 +366,8 @@ class BlockPerformance:
         # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.
         for id in tuple(self._dropped):
             self._shared.live_blocks.lose(self.plan.block.id, id)
-        self.report.unkept(plan)
+        if not self.decisions.facts.has_held:  # else it is told when it comes, without what holds account for
+            self.report.unkept(plan)
         for id, given_up in plan.given_up.items():
             for said in sorted(given_up.keys() - before.get(id, {}).keys()):
                 self.report.warn(given_up[said].kind, given_up[said].message, id)

@@ -47,6 +47,11 @@ def is_behind(assembly: Assembly, known: Known, foreign: Point, behavior: str) -
     return any(own == BLOCK_END or assembly.at.get(own) in later for own in awaited)
 
 
+def comes_with(assembly: Assembly, own: Point, foreign: Point) -> bool:
+    """True if a point of this block comes only once a point of another one has."""
+    return foreign in assembly.at and assembly.at[own] in assembly.net.later([assembly.at[foreign]])
+
+
 def futile(impossible: Impossible, assembly: Assembly, known: Known) -> set[tuple[Point, Point]]:
     """Pairs of points, as of `awaited`, that wait for each other whatever is planned."""
     ends = {

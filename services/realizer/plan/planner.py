@@ -39,7 +39,7 @@ from engage_hri.services.realizer.plan.relations import (
 )
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
-from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
+from engage_hri.services.realizer.plan.sharing import Waits, naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import Point
@@ -264,9 +264,9 @@ class _Planner:
                 self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
             undated = foresight.without_date(assembly, self.known) if given else ()
-            is_behind = partial(foresight.is_behind, assembly, self.known)
+            waits = Waits(partial(foresight.is_behind, assembly, self.known), partial(foresight.comes_with, assembly))
             arranged, others = yield from share(
-                self.chains, present, self.known, arranged, everywhere, self.barred, undated, is_behind
+                self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits
             )
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]

@@ -5,6 +5,7 @@ part over and loses its way home, as within one block; before that, who comes wa
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -29,6 +30,20 @@ from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import EPSILON, Point
 
 
+class Waits(NamedTuple):
+    """Who waits for whom, whatever the times are.
+
+    is_behind: whether a point of another block comes only after a behavior of this one has begun. comes_with: whether
+    a point of this block comes only once a point of another one has.
+    """
+
+    is_behind: Callable[[Point, str], bool]
+    comes_with: Callable[[Point, Point], bool]
+
+
+NOBODY = Waits(lambda point, behavior: False, lambda own, point: False)
+
+
 def share(
     chains: Mapping[str, Chain],
     relations: Relations,
@@ -37,17 +52,16 @@ def share(
     times: Mapping[Point, Seconds],
     barred: Container[tuple[str, Hand]] = (),
     undated: Container[str] = (),
-    is_behind: Callable[[Point, str], bool] = lambda point, behavior: False,
+    waits: Waits = NOBODY,
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
     times: of the points of this block, in the schedule that `arranged` is for, and of others. undated: behaviors that
-    wait for points of which nobody knows yet when they come; they are planned again once it is known. is_behind:
-    whether a point of another block comes only after a behavior of this one has begun.
+    wait for points of which nobody knows yet when they come; they are planned again once it is known.
     """
     if not known.holders and not known.given:
         return arranged, []
-    shared = _Sharing(chains, relations, known, arranged, times, barred, is_behind)
+    shared = _Sharing(chains, relations, known, arranged, times, barred, waits)
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
@@ -70,9 +84,9 @@ class _Sharing:
         arranged: Arrangement,
         times: Mapping[Point, Seconds],
         barred: Container[tuple[str, Hand]],
-        is_behind: Callable[[Point, str], bool],
+        waits: Waits,
     ) -> None:
-        self.is_behind = is_behind
+        self.waits = waits
         self.chains = chains
         self.known = known
         self.times = times
@@ -114,6 +128,8 @@ class _Sharing:
             if first is None or is_overlaid(holder.chain, chain):
                 return
             last = last_kept(chain, holder.chain, first, self.held, is_natural=id in self.natural, is_asked=True)
+            if last is None and self._comes_too_late(chain, holder):
+                last = first
             if last is None:
                 self._hand_over(id, name, first)
             elif id not in self.known.begun:
@@ -127,6 +143,11 @@ class _Sharing:
                 self.conflicts.append(Conflict((id, point), None))  # by plan it comes first; it may turn out slow
             elif name not in self.takes or start < self.times[self.chains[self.takes[name]].points[0]] - EPSILON:
                 self.takes[name] = id
+
+    def _comes_too_late(self, chain: Chain, holder: Holder) -> bool:
+        """True if what the behavior must have made comes only once the holder has begun: then that has the part."""
+        start = holder.chain.points[0]
+        return any(self.waits.comes_with(point, start) for point in chain.points[: least(chain, holder.chain) + 1])
 
     def keep_taking(self, id: str) -> None:
         """Go on taking what is handed over to a behavior by plan: only for that does it end as this one begins.
@@ -184,7 +205,7 @@ class _Sharing:
         since, to = window(self.chains[id], self.times)
         for begins, ends, name in self._users_of(id):
             holder, at = self.known.holders[name], self.times[point]
-            if self.is_behind(holder.chain.points[0], id):
+            if self.waits.is_behind(holder.chain.points[0], id):
                 continue
             if at < ends - EPSILON and at - EPSILON <= begins < at + to - since - EPSILON:
                 point = self._release(id, holder, 1)
