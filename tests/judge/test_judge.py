@@ -23,7 +23,7 @@ ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
     "in the air", "spoken order", "broken", "broken across blocks", "broken, point was past",
     "needless loss", "unmade end of a stroke", "moves though held", "late for a hold",
-    "pointless", "talked over",
+    "pointless", "talked over", "robbed",
 )  # fmt: skip
 """Laws that no story may break."""
 ALONE = ("left too early",)
@@ -33,12 +33,17 @@ OFF = 0.02
 SEED = 12
 MANY: dict[tuple[Kind, bool], int] = {
     ("alone", False): 30, ("streams", False): 25, ("sentences", False): 20,
-    ("alone", True): 15, ("streams", True): 10,
+    ("alone", True): 15, ("streams", True): 10, ("webs", False): 40, ("webs", True): 20,
 }  # fmt: skip
 """Number of stories of each kind, without and with a body that has faults."""
 PREDICTED, OTHERS = 400, 31
 """Number of single blocks of which the predictions are judged, and their seed."""
-HELD: dict[tuple[Kind, bool], int] = {("alone", False): 20, ("streams", False): 12, ("streams", True): 6}
+HELD: dict[tuple[Kind, bool], int] = {
+    ("alone", False): 20,
+    ("streams", False): 12,
+    ("streams", True): 6,
+    ("webs", False): 12,
+}
 """Number of stories of which parts are held for a while, without and with a body that has faults."""
 WHOLE: dict[Kind, tuple[int, ...]] = {
     "alone": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15), "streams": (0, 1, 2, 3, 4, 6, 8, 10, 11, 16),

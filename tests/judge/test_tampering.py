@@ -124,6 +124,12 @@ def busy(messages: list[Any]) -> list[Any]:
     return [Told(0.4, message), *messages]
 
 
+def robbed(messages: list[Any]) -> list[Any]:
+    """Someone took the arm of the first gesture."""
+    message = "another behavior took its part after ready"
+    return [*messages, Told(9.0, WarningFeedback(block="b", kind="EXECUTION_FAILURE", behavior="q", message=message))]
+
+
 def ends(change: Callable[[list[Any]], list[Any]]) -> Callable[[Record], Record]:
     return lambda record: replace(record, ends={**record.ends, "b": change(record.ends["b"])})
 
@@ -241,6 +247,7 @@ TAMPERED = [
     ("a voice goes on while it is held", held("s", since=0.01), "moves though held"),
     ("a word is said twice", lambda record: replace(record, words=[*record.words, record.words[-1]]), "words"),
     ("words are lost to another block", told(busy), "talked over"),
+    ("a stroke is lost to another behavior", told(robbed), "robbed"),
     ("a bug was logged", lambda record: replace(record, errors=["KeyError"]), "crash"),
 ]  # fmt: skip
 

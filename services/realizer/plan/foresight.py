@@ -27,7 +27,7 @@ def foreseen(assembly: Assembly, known: Known, doubted: Collection[Point]) -> di
 
 
 def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Point]]) -> Iterator[Awaited]:
-    """Which points of other blocks come only after points of this one: what waits for both waits in a circle.
+    """Ties of a schedule from points of this block to those of others that come after them.
 
     waived: pairs of such points that do not count.
     """

@@ -31,7 +31,7 @@ from engage_hri.services.realizer.points import EPSILON, Point
 
 
 class Waits(NamedTuple):
-    """Who waits for whom, whatever the times are.
+    """Answers to who waits for whom, whatever the times are.
 
     is_behind: whether a point of another block comes only after a behavior of this one has begun. comes_with: whether
     a point of this block comes only once a point of another one has.
