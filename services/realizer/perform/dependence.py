@@ -1,4 +1,4 @@
-"""Dependence of live blocks on each other: points that come only after points of a block, and what has to come before.
+"""Dependence of live blocks on each other: points that come only after those of a block, and what comes before.
 
 Blocks wait for each other in many ways: a point is tied to a point, a part is free from some point on, an end comes
 when all has come, a turn when others have ended. What waits is a point, so it is followed from point to point.

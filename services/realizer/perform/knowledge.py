@@ -77,9 +77,14 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
         names = {id: f"{block}:{id}" for id in plan.chains}
+        under_way = set(decisions.facts.under_way)
         for point, at in decisions.foresight.times(asker.now).items():
             if not is_foreign(point.behavior):
-                keeps = names.get(point.behavior) in asker.met or decisions.facts.is_held(point.behavior)
+                keeps = (
+                    names.get(point.behavior) in asker.met
+                    or point.behavior in under_way
+                    or decisions.facts.is_held(point.behavior)
+                )
                 if point not in decisions.facts.reached and keeps:
                     at = max(at, asker.now + MOMENT)
                 points[qualified(block, point)] = at - asker.since

@@ -111,7 +111,7 @@ class _Sharing:
         """Behaviors of other blocks that have a part of this one while it does, in the order of their starts."""
         since, to = window(self.chains[id], self.times)
         for begins, ends, name in self._users_of(id):
-            if since < ends - EPSILON and (begins < to - EPSILON or begins <= since + EPSILON):
+            if since <= ends + EPSILON and (begins < to - EPSILON or begins <= since + EPSILON):
                 yield name
 
     def _users_of(self, id: str) -> list[tuple[Seconds, Seconds, str]]:
@@ -136,11 +136,14 @@ class _Sharing:
                 self._wait(id, self._release(id, holder, 1))
         elif is_overlaid(chain, holder.chain):
             self.cuts[id] = 0  # A shift takes nothing from a gaze.
-        elif (first := self._first_after(holder.chain, start)) is not None and id not in self.known.begun:
-            if (point := self._needed(id, holder, first)) is not None:
+        elif id not in self.known.begun:
+            first = self._first_after(holder.chain, start)
+            if first is not None and (point := self._needed(id, holder, first)) is not None:
                 self._wait(id, point)
-            elif (point := self._needed(id, holder, holder.reached)) is not None and (id, point) not in self.turns:
-                self.conflicts.append(Conflict((id, point), None))  # by plan it comes first; it may turn out slow
+            elif (point := self._still_needed(id, holder, first)) is not None:
+                self.conflicts.append(Conflict((id, point), None))
+            elif first is None:
+                return
             elif name not in self.takes or start < self.times[self.chains[self.takes[name]].points[0]] - EPSILON:
                 self.takes[name] = id
 
@@ -199,6 +202,17 @@ class _Sharing:
         is_asked = id in self.mentioned
         last = last_kept(holder.chain, self.chains[id], first, kept, is_natural=holder.is_natural, is_asked=is_asked)
         return None if last is None else holder.chain.points[last]
+
+    def _still_needed(self, id: str, holder: Holder, first: int | None) -> Point | None:
+        """A point that comes before a behavior of this block by plan, but which may turn out slow.
+
+        first: number of the first point of the holder after that; None: it has ended by then, or does just then.
+        """
+        point = self._needed(id, holder, holder.reached)
+        if point is None or (id, point) in self.turns:
+            return None
+        is_just_now = self.times[point] >= self.times[self.chains[id].points[0]] - EPSILON
+        return point if first is not None or (is_just_now and not self.waits.is_behind(point, id)) else None
 
     def _behind_all(self, id: str, point: Point) -> Point:
         """The point that a behavior waits for if it waits for `point`, and for whoever is in its way from then on."""
