@@ -44,8 +44,17 @@ class _Followed:
         for name, plan in self.plans.items():
             for point in plan.foreign:
                 if self._waiting(name)[plan.at[point]]:
-                    self.tied[point].append((name, plan.at[point]))
+                    self.tied[self._at_least(point)].append((name, plan.at[point]))
         self.out: dict[str, Mapping[int, list[tuple[int, Seconds]]]] = {}
+
+    def _at_least(self, point: Point) -> Point:
+        """The point, or the start of its block if that has dropped it so far: then it is known what comes of it."""
+        name = block_of(point)
+        plan = self.plans.get(name)
+        is_planned = (
+            plan is None or plan.transition(Point(point.behavior.removeprefix(f"{name}:"), point.sync)) is not None
+        )
+        return point if is_planned else qualified(name, BLOCK_START)
 
     def all(self) -> Mapping[Point, Mapping[Point, Seconds]]:
         found: dict[Point, dict[Point, Seconds]] = defaultdict(dict)
@@ -109,7 +118,7 @@ class _Followed:
             ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
             for tie in ties:
                 is_awaited = tie.kind not in UNAWAITED and tie.target and is_open[tie.target]
-                if is_awaited and (seconds := _least(tie)) > -inf:
+                if is_awaited and (seconds := _least(tie, self.plans[name])) > -inf:
                     out[tie.source].append((tie.target, seconds))
             self.out[name] = out
         return self.out[name]
@@ -131,11 +140,17 @@ class _Followed:
         return found
 
 
-def _least(tie: Place | Bound) -> Seconds:
-    """The least seconds from the source to the target of a tie; minus infinity: any."""
+def _least(tie: Place | Bound, plan: Plan) -> Seconds:
+    """The least seconds from the source to the target of a tie; minus infinity: any.
+
+    Who sets out late enough not to wait on its target waits before it sets out.
+    """
     if isinstance(tie, Place):
         return tie.shortest
-    return -inf if tie.stretch is None else tie.lag - tie.stretch
+    if tie.stretch is not None:
+        return tie.lag - tie.stretch
+    is_prompt = any(each.behavior == tie.behavior and each.kind == "prompt" for each in plan.members[tie.source])
+    return tie.lag if is_prompt else -inf
 
 
 def needed_by(points: Iterable[Point], among: Mapping[str, tuple[Plan, Collection[str]]]) -> Mapping[str, set[str]]:

@@ -175,10 +175,15 @@ class _Sharing:
             chain, kept = self.chains[id], self.held | self.known.kept
             first = self._first_after(chain, self.times[taker])
             least_kept = max([least(chain), *(number for number, point in enumerate(chain.points) if point in kept)])
-            is_waited_for = BLOCK_END in self.known.awaiting.get(taker, ())
-            is_awaited = id in self.natural and (least_kept >= leaving(chain) or is_waited_for)
+            is_awaited = id in self.natural and least_kept >= leaving(chain)
             if first is not None and least_kept + 1 < len(chain.points) and not is_awaited:
                 self._hand_over(id, taker.behavior, max(first, least_kept + 1))
+
+    def _waits_for_home(self, id: str, taker: Point) -> bool:
+        """True if who is to take the part waits for the way home of the behavior, or for the end of the block."""
+        chain = self.chains[id]
+        home = (BLOCK_END, *chain.points[leaving(chain) :])
+        return not self.known.awaiting.get(taker, {}).keys().isdisjoint(home)
 
     def _first_after(self, chain: Chain, at: Seconds) -> int | None:
         """Number of the first point of a behavior that comes after `at`; None: it has ended by then."""
@@ -186,6 +191,8 @@ class _Sharing:
         return next(numbers, None)
 
     def _hand_over(self, id: str, successor: str, first: int) -> None:
+        if id in self.natural and self._waits_for_home(id, Point(successor, "start")):
+            return
         if id in self.successors:
             before = Point(self.successors[id][0], "start")
             if self.times[before] <= self.times[Point(successor, "start")] + EPSILON:
