@@ -77,17 +77,18 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
         plan, decisions = each.decisions.plan, each.decisions
         block = plan.block.id
         names = {id: f"{block}:{id}" for id in plan.chains}
-        under_way = set(decisions.facts.under_way)
+        under_way, begun = set(decisions.facts.under_way), decisions.facts.begun
         for point, at in decisions.foresight.times(asker.now).items():
-            if not is_foreign(point.behavior):
-                keeps = (
-                    names.get(point.behavior) in asker.met
-                    or point.behavior in under_way
-                    or decisions.facts.is_held(point.behavior)
-                )
-                if point not in decisions.facts.reached and keeps:
-                    at = max(at, asker.now + MOMENT)
-                points[qualified(block, point)] = at - asker.since
+            behavior = point.behavior
+            if is_foreign(behavior):
+                continue
+            if behavior in under_way and point.sync == "start":
+                at = begun[behavior]
+            elif point not in decisions.facts.reached and (
+                names.get(behavior) in asker.met or behavior in under_way or decisions.facts.is_held(behavior)
+            ):
+                at = max(at, asker.now + MOMENT)
+            points[qualified(block, point)] = at - asker.since
         for point, at in live_blocks.reached(block).items():  # of what was dropped since, too
             points.setdefault(qualified(block, point), at - asker.since)
         if not each.is_ending:

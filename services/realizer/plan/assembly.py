@@ -243,7 +243,7 @@ class Assembler:
         for id, chain in self.chains.items():
             before = previous.get(chain.type)
             previous[chain.type] = chain
-            is_placed = id in self.relations.placed or id in sharing
+            is_placed = id in self.relations.placed or id in sharing or id in self.arrangement.begun
             if before is None or is_placed or performer(chain.behavior) == "recognition":
                 continue
             other = before.behavior.id

@@ -245,7 +245,7 @@ class _Planner:
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         self.turns = frozenset(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
-        arrangement = Arrangement(natural=natural, turns=self.turns, spoken=self.order.current)
+        arrangement = Arrangement(natural, self.known.begun, turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
         tried: list[Arrangement] = []
@@ -278,7 +278,10 @@ class _Planner:
                 yield 2 * len(part)
             tried.append(arrangement)
             if conflicts:
-                arrangement, tried = Arrangement(natural=natural, turns=self.turns, spoken=arrangement.spoken), []
+                arrangement, tried = (
+                    Arrangement(natural, self.known.begun, turns=self.turns, spoken=arrangement.spoken),
+                    [],
+                )
             elif arranged in tried:
                 break
             else:

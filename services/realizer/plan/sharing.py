@@ -219,7 +219,8 @@ class _Sharing:
         if point is None or (id, point) in self.turns:
             return None
         is_just_now = self.times[point] >= self.times[self.chains[id].points[0]] - EPSILON
-        return point if first is not None or (is_just_now and not self.waits.is_behind(point, id)) else None
+        is_free = not is_just_now or point in self.named or self.waits.is_behind(point, id)
+        return None if first is None and is_free else point
 
     def _behind_all(self, id: str, point: Point) -> Point:
         """The point that a behavior waits for if it waits for `point`, and for whoever is in its way from then on."""
