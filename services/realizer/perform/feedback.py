@@ -65,10 +65,14 @@ class Reporter:
         """Time of the latest message; none after it has an earlier one."""
         self._told: dict[Point, Seconds] = {}
         """The last prediction of each point, in seconds from the block's start."""
+        self._given_up: set[tuple[str, str]] = set()
+        """Times that speeches have given up, as the block says them, that were warned of."""
         self.not_before = 0.0
         """Earliest time for the next prediction."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
+        """Tell that the block has begun. The problems of this plan are told apart from that."""
+        self._given_up = {(id, said) for id, all in plan.given_up.items() for said in all}
         self._character = plan.block.character_id
         at = self._bus.stamp(self._no_earlier(began))
         self._say(BlockProgress(block=self._block, progress="start", at=at, character_id=self._character))
@@ -129,6 +133,14 @@ class Reporter:
         """Warn if a point, reached now, and those before it have not come as the block says; also one of another."""
         for broken in decisions.broken(point):
             self._broken(decisions.net.part_of[broken.point].point, broken, "came")
+
+    def given_up(self, plan: Plan) -> None:
+        """Warn of the times that speeches give up by a new plan: once of each."""
+        told = {(id, said): problem for id, all in plan.given_up.items() for said, problem in sorted(all.items())}
+        for each, problem in told.items():
+            if each not in self._given_up:
+                self.warn(problem.kind, problem.message, problem.behavior)
+        self._given_up |= told.keys()
 
     def unkept(self, plan: Plan) -> None:
         """Warn of what the plan itself cannot keep: ties to points of other blocks that leave no time for it."""

@@ -360,17 +360,16 @@ class BlockPerformance:
         except InputRefused as error:
             self._live.fail(error.fault)
             return
-        before = so_far.given_up
         self.decisions.replan(plan)
         self.ties.renew()
         # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.
         for id in tuple(self._dropped):
             self._shared.live_blocks.lose(self.plan.block.id, id)
+        if self.decisions.plan is not plan:
+            return  # What others did then had it planned again.
         if not self.decisions.facts.has_held:  # else it is told when it comes, without what holds account for
             self.report.unkept(plan)
-        for id, given_up in plan.given_up.items():
-            for said in sorted(given_up.keys() - before.get(id, {}).keys()):
-                self.report.warn(given_up[said].kind, given_up[said].message, id)
+        self.report.given_up(plan)
         for problem in plan.problems:
             # Without the dropped ones, others may be too late now.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
