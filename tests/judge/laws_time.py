@@ -50,12 +50,18 @@ def constraints(case: Case) -> Iterator[Finding]:
 
 
 def _counts(place: Place, block: str, case: Case) -> bool:
-    """True if the point was reached, nothing of its behavior was lost, and it was there to be named."""
+    """True if the point was reached, nothing of its behavior was lost, and it was there to be named.
+
+    A block that was broken off tells nothing of what others do after that.
+    """
     if place not in case.times or (place.block, place.behavior) in case.lost:
         return False
     if place.block == block:
         return True
     asked = case.record.asked
+    over = case.times.get(Place(block, "", "end"), inf)
+    if case.record.status(block) != "done" and case.times[place] > over:
+        return False
     if place.block not in asked or asked[place.block] > asked[block]:
         return False
     ends = case.record.ends.get(place.block, [])
