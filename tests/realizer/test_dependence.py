@@ -1,4 +1,4 @@
-"""Which points of other blocks come only after points of a block: held against what happens if one of these is late.
+"""Points of other blocks that come only after those of a block, held against what happens if one of these is late.
 
 The oracle plans all blocks twice, one after the other: as expected, and with one point of the first a long time later.
 What comes later by that waits for it. It knows nothing of nets.
@@ -85,7 +85,7 @@ def part(behavior: BlockBehavior, **refs: str) -> BlockBehavior:
     return timed(behavior, **refs)
 
 
-# -- the oracle --------------------------------------------------------------------------------------------------------
+# -- the oracle ------------------------------------------------------------------------------------------------------
 
 Told = list[tuple[Block, tuple[str, ...]]]
 
@@ -166,7 +166,7 @@ def is_of_others(point: Point) -> bool:
     return not point.behavior.startswith("b0:") and not point.behavior.endswith(":")
 
 
-# -- by hand -----------------------------------------------------------------------------------------------------------
+# -- by hand ---------------------------------------------------------------------------------------------------------
 
 ARM = Gesture(id="g", lexeme="BEAT", mode="LEFT_HAND")
 OTHER_ARM = Gesture(id="h", lexeme="BEAT", mode="RIGHT_HAND")
@@ -256,7 +256,7 @@ def test_who_hands_a_part_over_goes_home_by_itself() -> None:
     assert len(syncs(made, "g:relax", "b1:k")) == 7
 
 
-# -- what has to come before -------------------------------------------------------------------------------------------
+# -- what has to come before -----------------------------------------------------------------------------------------
 
 
 def needed(world: World, *points: str) -> dict[str, set[str]]:
