@@ -1,7 +1,7 @@
 """Points of other blocks that come only after those of a block, held against what happens if one of these is late.
 
-The oracle plans all blocks twice, one after the other: as expected, and with one point of the first a long time later.
-What comes later by that waits for it. It knows nothing of nets.
+The oracle plans all blocks twice, one after the other: as expected, and with one point of the first a long time
+later. What comes later by that waits for it. It knows nothing of nets.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence

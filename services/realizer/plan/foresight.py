@@ -114,8 +114,8 @@ def too_late(impossible: Impossible, assembly: Assembly) -> set[Point]:
 
 
 def without_date(assembly: Assembly, known: Known) -> set[str]:
-    """Behaviors that come after points of other blocks of which it is not known when they come."""
+    """Behaviors that begin after points of other blocks of which it is not known when they come."""
     dated = {*known.points, *known.lost}
     unknown = [at for point, at in assembly.at.items() if is_foreign(point.behavior) and point not in dated]
     later = assembly.net.later(unknown)
-    return {point.behavior for point, at in assembly.at.items() if at in later}
+    return {point.behavior for point, at in assembly.at.items() if at in later and point.sync == "start"}
