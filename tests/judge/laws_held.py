@@ -25,7 +25,7 @@ def late(case: Case) -> Iterator[Finding]:
     """Nothing is late only because something was held."""
     if not case.story.is_held or not case.is_exact:
         return
-    for id in case.blocks:
+    for id in case.blocks.keys() - case.record.refused_anyhow:
         for warning in case.record.late(id):
             if (id, warning.behavior) not in case.record.late_anyhow:
                 yield Finding("late for a hold", id, f"{warning.behavior}: {warning.message}", warning.behavior)

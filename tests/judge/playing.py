@@ -51,6 +51,7 @@ def play(story: Story, *, asks: bool = False) -> Record:
     if story.is_held:
         calm = play(story.let_go())
         record.late_anyhow = {(block, it.behavior) for block in calm.ends for it in calm.late(block)}
+        record.refused_anyhow = {block for block in calm.ends if calm.status(block) == "refused"}
     bugs = _Bugs(record)
     LOG.addHandler(bugs)
     before, LOG.propagate = LOG.propagate, False

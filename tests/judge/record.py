@@ -60,7 +60,8 @@ class Steered(Struct, frozen=True):
 class Record(Struct):
     """Everything seen. ends: of each block. asked: when each block was asked for.
 
-    late_anyhow: behaviors that are late without holds, too; by block.
+    late_anyhow: behaviors that are late without holds, too; by block. refused_anyhow: blocks that are refused then:
+    those that they name have ended.
     """
 
     joints: tuple[str, ...] = ()
@@ -73,6 +74,7 @@ class Record(Struct):
     errors: list[str] = field(default_factory=list)
     steered: list[Steered] = field(default_factory=list)
     late_anyhow: set[tuple[str, str]] = field(default_factory=set)
+    refused_anyhow: set[str] = field(default_factory=set)
     natural: dict[tuple[str, str], tuple[tuple[str, str, float, bool], ...]] = field(default_factory=dict)
     """What the body says of a behavior, asked before the story began: phases as (since, to, seconds, may wait)."""
 
