@@ -11,7 +11,14 @@ from math import inf
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, Place
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, block_of, is_foreign, qualified
+from engage_hri.services.realizer.plan.known import (
+    BLOCK_END,
+    BLOCK_START,
+    block_of,
+    is_foreign,
+    is_named_in,
+    qualified,
+)
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 
@@ -27,23 +34,28 @@ def waiting_for(block: str, live_blocks: LiveBlocks) -> Mapping[Point, Mapping[P
     """Points of other live blocks, named as these do, that come only after points of this one: each with those, and
     the seconds from there at least. The end of the block is its `BLOCK_END`.
     """
-    return _Followed(block, live_blocks).all()
+    plans = [each for each in live_blocks.plans if each[0].block.id != block]
+    if any(is_named_in(block, plan.foreign) or block in leaders for plan, leaders in plans):
+        return _Followed(block, live_blocks, plans).all()
+    return {}
 
 
 class _Followed:
     """All live blocks but one, as far as they wait for that one."""
 
-    def __init__(self, block: str, live_blocks: LiveBlocks) -> None:
+    def __init__(self, block: str, live_blocks: LiveBlocks, others: Iterable[tuple[Plan, Collection[str]]]) -> None:
+        """others: their plans, and the blocks that have to end before each begins."""
         self.block = block
         self.live_blocks = live_blocks
-        others = {plan.block.id: (plan, leaders) for plan, leaders in live_blocks.plans if plan.block.id != block}
-        self.plans = {name: plan for name, (plan, _) in others.items()}
-        self.behind = {name: leaders for name, (_, leaders) in others.items()}
+        self.plans, self.behind = dict[str, Plan](), dict[str, Collection[str]]()
+        for plan, leaders in others:
+            self.plans[plan.block.id], self.behind[plan.block.id] = plan, leaders
         self.tied: dict[Point, list[Here]] = defaultdict(list)
         """For each point that other blocks name, where it stands in their nets."""
         for name, plan in self.plans.items():
+            is_open = self._waiting(name) if plan.foreign else []
             for point in plan.foreign:
-                if self._waiting(name)[plan.at[point]]:
+                if is_open[plan.at[point]]:
                     self.tied[self._at_least(point)].append((name, plan.at[point]))
         self.out: dict[str, Mapping[int, list[tuple[int, Seconds]]]] = {}
 

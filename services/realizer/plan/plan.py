@@ -1,6 +1,7 @@
 """A plan of a block: what its planning comes to (see planner.py)."""
 
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 
 from msgspec import Struct
 
@@ -17,7 +18,7 @@ from engage_hri.services.realizer.plan.relations import Problem, Relations
 from engage_hri.services.realizer.points import Member, Point
 
 
-class Plan(Struct, frozen=True, kw_only=True):
+class Plan(Struct, frozen=True, kw_only=True, dict=True):
     """A planned block.
 
     schedule: of each transition of the net, seconds from the block's start, if all goes as estimated.
@@ -82,7 +83,7 @@ class Plan(Struct, frozen=True, kw_only=True):
         """The transition of a point as other blocks may name it: the end of the block has one, too."""
         return len(self.net.transitions) - 1 if point == BLOCK_END else self.at.get(point)
 
-    @property
+    @cached_property
     def foreign(self) -> tuple[Point, ...]:
         """Points of other blocks that this one is tied to, or waits for."""
         return tuple([point for point in self.at if is_foreign(point.behavior)])
