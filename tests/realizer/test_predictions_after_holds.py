@@ -4,12 +4,14 @@ import asyncio
 
 import pytest
 
-from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.behaviors import Head, Speech, Wait
 from engage_hri.schemas.feedback import PredictionFeedback, SyncPointProgress
+from engage_hri.services.control.config import Variability
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, after, block, stage
 from tests.realizer.steering import steered
 from tests.realizer.test_holding import BEAT, STORY
+from tests.realizer.test_simulated_body import robot
 
 LONG = Wait(id="w", duration=5.0)
 
@@ -68,3 +70,21 @@ async def test_who_was_held_and_is_late_by_nothing_is_not_predicted_again() -> N
         await performing.outcome
 
     assert len(predictions(seen)) == 1
+
+
+async def test_the_end_of_words_is_predicted_right_after_each_hold() -> None:
+    """Each hold comes within a word, which is said to its end: the voice stands for less than the hold."""
+    words = Speech(id="s", text="Good morning to all of you and welcome to this conversation.")
+    nod = timed(Head(id="n", lexeme="NOD"), stroke="s:end")
+    async with robot(Variability()) as seen:
+        pending = seen.ask(block((words, nod)))
+        for _ in range(3):
+            await asyncio.sleep(0.55)
+            await steered(seen, "hold", "b", "s")
+            await asyncio.sleep(1.0)
+            await steered(seen, "continue", "b", "s")
+        await pending.outcome
+
+    times = seen.times()
+    assert times["s:end"].at.seconds == pytest.approx(times["n:stroke"].at.seconds, abs=0.001)
+    assert times["s:end"].time == pytest.approx(times["s:end"].predicted, abs=0.001)

@@ -129,7 +129,7 @@ class Foresight(Observer):
         number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
         before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
         stands = isinstance(chain.behavior, Speech) or performer(chain.behavior) != "body"
-        stood = self._facts.held_between(before, now, behavior) if stands else 0.0
+        stood = self._facts.stood_between(before, now, behavior) if stands else 0.0
         at = before + self._phase(behavior, number) + stood
         return self.plan.at[point], now if self._facts.holds(point) else max(now, at)
 

@@ -36,6 +36,8 @@ class Facts:
         self.standing: frozenset[Point] = frozenset()
         self._holds: list[tuple[Seconds, Collection[str] | None]] = []
         """The times at which other behaviors were held than before, and which."""
+        self._words: dict[str, list[Seconds]] = {}
+        """When the voice has finished words of a behavior that was held then."""
 
     def adopt(self, net: RunningNet, points: Mapping[str, tuple[Point, ...]]) -> None:
         """Let `net` run from its start to where these facts bring it. points: of each behavior, in order."""
@@ -155,6 +157,22 @@ class Facts:
     def is_held(self, behavior: str) -> bool:
         """True if the behavior is to wait where it next can."""
         return self.held is None or behavior in self.held
+
+    def say(self, behavior: str, at: Seconds) -> None:
+        """Note that the voice has finished a word: the one in which it is held, perhaps. Then it stands."""
+        if self.is_held(behavior):
+            self._words.setdefault(behavior, []).append(at)
+
+    def stood_between(self, since: Seconds, until: Seconds, behavior: str) -> Seconds:
+        """Seconds between these times in which the behavior was held and stood: from the end of its last word on."""
+        holds: list[tuple[Seconds, Seconds]] = []
+        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=True):
+            if held is None or behavior in held:
+                since_before = holds.pop()[0] if holds and holds[-1][1] == at else at
+                holds.append((since_before, end))
+        words = self._words.get(behavior, ())
+        stood = [(max([first, *(word for word in words if first <= word <= last)]), last) for first, last in holds]
+        return sum(max(0.0, min(last, until) - max(first, since)) for first, last in stood)
 
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""
