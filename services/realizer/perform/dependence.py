@@ -5,7 +5,7 @@ when all has come, a turn when others have ended. What waits is a point, so it i
 """
 
 from collections import defaultdict, deque
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Set
 from math import inf
 
 from engage_hri.schemas.units import Seconds
@@ -26,6 +26,8 @@ Here = tuple[str, int]
 """A transition of the net of a block."""
 UNAWAITED = ("idle", "handover")
 """Kinds of places that nothing waits for."""
+DAWDLING: Seconds = 1.0
+"""Seconds: a motion that can be slower by so much can wait for something on its way."""
 _ROUNDS = 8
 """How often a transition may be found to come later: blocks that wait for each other already are not gone round."""
 
@@ -53,11 +55,11 @@ class _Followed:
         self.tied: dict[Point, list[Here]] = defaultdict(list)
         """For each point that other blocks name, where it stands in their nets."""
         for name, plan in self.plans.items():
-            is_open = self._waiting(name) if plan.foreign else []
             for point in plan.foreign:
-                if is_open[plan.at[point]]:
-                    self.tied[self._at_least(point)].append((name, plan.at[point]))
+                self.tied[self._at_least(point)].append((name, plan.at[point]))
         self.out: dict[str, Mapping[int, list[tuple[int, Seconds]]]] = {}
+        self.waiting: dict[str, Set[Point]] = {}
+        """Points of each block that come later if what they wait for does."""
 
     def _at_least(self, point: Point) -> Point:
         """The point, or the start of its block if that has dropped it so far: then it is known what comes of it."""
@@ -108,47 +110,75 @@ class _Followed:
             yield from (((other, 0), 0.0) for other, leaders in self.behind.items() if name in leaders)
 
     def _points(self, here: Here) -> Iterator[Point]:
-        """Points of the block itself that are a transition of its net, named as other blocks name them."""
+        """Points of the block itself that wait for a transition of its net, named as other blocks name them."""
         name, transition = here
-        net = self.plans[name].net
-        own = [each for each in net.transitions[transition].points if not is_foreign(each.behavior)]
+        net, waiting = self.plans[name].net, self._waiting(name)
+        own = [each for each in net.transitions[transition].points if each in waiting]
         if transition == 0:
             own.append(BLOCK_START)
         elif transition == len(net.transitions) - 1:
             own.append(BLOCK_END)
         yield from (qualified(name, each) for each in own)
 
+    def _waiting(self, name: str) -> Set[Point]:
+        """Points of a block that come later if what they wait for does.
+
+        What has been does not; nor does what cannot wait any more: the end of words that are being said.
+        """
+        if name not in self.waiting:
+            plan, reached = self.plans[name], self.live_blocks.reached(name)
+            kinds = {(each.behavior, at): each.kind for at, members in enumerate(plan.members) for each in members}
+            found = set()
+            for id, chain in plan.chains.items():
+                left = [point for point in chain.points if point not in reached]
+                phases = zip(chain.points[1:], chain.segments, chain.longest, strict=True)
+                slow = {to for to, each, limit in phases if limit is None or limit > each.natural + DAWDLING}
+                slow = slow if chain.type != "speech" else set()  # Words cannot be said slower.
+                gates = (n for n, each in enumerate(left) if each in slow or kinds[id, plan.at[each]] != "passive")
+                found.update(left[next(gates, len(left)) :])
+            self.waiting[name] = found
+        return self.waiting[name]
+
     def _ties(self, name: str) -> Mapping[int, list[tuple[int, Seconds]]]:
         """For each transition of a block, those that come after it, and the seconds from there at least.
 
-        What has no room to wait comes later if what follows it does. What has been waits for nothing, nor does who
-        hands a part over: it goes home by itself.
+        What has no room to wait comes later if what follows it does. Who hands a part over waits for nothing: it goes
+        home by itself. Who cannot wait at an instant passes it alone; what else is tied to the instant waits.
         """
         if name not in self.out:
-            net, is_open = self.plans[name].net, self._waiting(name)
+            plan, waiting = self.plans[name], self._waiting(name)
+            net, past = plan.net, self._past(name)
+            is_open = [not waiting.isdisjoint(transition.points) for transition in net.transitions]
             out: dict[int, list[tuple[int, Seconds]]] = defaultdict(list)
             ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
+            for number in range(len(net.transitions) - 1):
+                out[number].append((len(net.transitions) - 1, 0.0))  # the end waits for all that is tied, too
             for tie in ties:
-                is_awaited = tie.kind not in UNAWAITED and tie.target and is_open[tie.target]
-                if is_awaited and (seconds := _least(tie, self.plans[name])) > -inf:
+                if tie.kind in UNAWAITED or tie.target in past or not tie.target:
+                    continue
+                if isinstance(tie, Place):
+                    is_awaited = is_open[tie.source] or not (tie.kind == "phase" or tie.after in plan.chains)
+                else:
+                    is_awaited = is_open[tie.target]
+                if is_awaited and (seconds := _least(tie, plan)) > -inf:
                     out[tie.source].append((tie.target, seconds))
             self.out[name] = out
         return self.out[name]
 
-    def _waiting(self, name: str) -> list[bool]:
-        """For each transition of a block, whether it comes later if what it waits for does.
-
-        What has been does not; nor does what cannot wait any more: the end of words that are being said.
-        """
+    def _past(self, name: str) -> Set[int]:
+        """Transitions of a block that nothing waits for any more, also of what was tied to other blocks there."""
         plan, reached = self.plans[name], self.live_blocks.reached(name)
-        kinds = {(each.behavior, at): each.kind for at, members in enumerate(plan.members) for each in members}
-        found = [all(is_foreign(each.behavior) for each in members) for members in plan.members]
-        for id, chain in plan.chains.items():
-            may_wait = False
-            for point in chain.points:
-                at = plan.at[point]
-                may_wait = may_wait or (point not in reached and kinds[id, at] != "passive")
-                found[at] = found[at] or (may_wait and point not in reached)
+        net, found = plan.net, set[int]()
+        for number, transition in enumerate(net.transitions[:-1]):  # numbered as they can fire
+            own = all(
+                self.live_blocks.is_past(each) if is_foreign(each.behavior) else each in reached
+                for each in transition.points
+                if each.behavior
+            )
+            before = (net.places[each] for each in net.inputs[number])
+            has_begun = number or BLOCK_START in reached
+            if has_begun and own and all(each.source in found for each in before if each.kind not in UNAWAITED):
+                found.add(number)
         return found
 
 

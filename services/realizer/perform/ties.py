@@ -137,11 +137,19 @@ class Ties:
                 is_shared = not parts.isdisjoint(chains[id].parts)
                 if is_shared and not (is_overlaid(chains[id], chain) or is_overlaid(chain, chains[id])):
                     met.add((behavior, f"{block}:{id}"))
-        met = {each for each in met if each[1] not in plan.takes and self._met.get(each, -inf) < now - EPSILON}
+        met = {each for each in met if not self._may_take(each[1]) and self._met.get(each, -inf) < now - EPSILON}
         if met:
             self._met |= dict.fromkeys(met, now)
             self._owner.plan_again()
         return not met
+
+    def _may_take(self, name: str) -> bool:
+        """True if the part of this behavior of another block is taken by plan, and it has made what it has to."""
+        block, _, id = name.partition(":")
+        if name not in self._owner.decisions.plan.takes or (other := self._performances.get(block)) is None:
+            return False
+        needed = other.decisions.plan.kept.get(id)
+        return needed is None or needed in other.decisions.facts.reached
 
     def known(self) -> Known:
         """Other blocks, and what of this one has begun, as known now. Times from this block's start.

@@ -4,13 +4,14 @@ from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from math import inf
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.petri_net import Place
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.deadlocks import Loss
 from engage_hri.services.realizer.plan.handover import Turn
-from engage_hri.services.realizer.plan.known import BLOCK_END, Known, is_foreign
+from engage_hri.services.realizer.plan.known import BLOCK_END, Known, block_of, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Awaited, Circle, Foresight, Impossible
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import EPSILON, Point
 
 AFTER: Seconds = 0.001
 """Least time from a point to one that waits for it: who waits for itself waits for ever."""
@@ -39,6 +40,21 @@ def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Poi
                 yield Awaited("order", source, target, lag, lag)
 
 
+def lasting_for_ever(impossible: Impossible, assembly: Assembly, lasting: Iterable[str]) -> set[tuple[str, str]]:
+    """Behaviors that last until another has ended that waits, through another block, until they have left."""
+    targets = {assembly.at[Point(id, "relax")]: id for id in lasting}
+    found = set()
+    for circle in impossible.circles:
+        ties = [tie for tie, _ in circle]
+        if any(isinstance(tie, Awaited) for tie in ties):
+            found |= {
+                (id, tie.after)
+                for tie in ties
+                if isinstance(tie, Place) and tie.after and (id := targets.get(tie.target)) and tie.behavior == id
+            }
+    return found
+
+
 def is_behind(assembly: Assembly, known: Known, foreign: Point, behavior: str) -> bool:
     """True if a point of another block comes only after this behavior has begun."""
     awaited = known.awaiting.get(foreign, {})
@@ -47,9 +63,12 @@ def is_behind(assembly: Assembly, known: Known, foreign: Point, behavior: str) -
     return any(own == BLOCK_END or assembly.at.get(own) in later for own in awaited)
 
 
-def comes_with(assembly: Assembly, own: Point, foreign: Point) -> bool:
-    """True if a point of this block comes only once a point of another one has."""
-    return foreign in assembly.at and assembly.at[own] in assembly.net.later([assembly.at[foreign]])
+def comes_with(assembly: Assembly, known: Known, own: Point, foreign: Point) -> bool:
+    """True if a point of this block comes only once a point of another one has, or a later one of that block."""
+    block, at = block_of(foreign), known.points.get(foreign, inf) - EPSILON
+    named = [each for each in assembly.at if is_foreign(each.behavior) and block_of(each) == block]
+    later = assembly.net.later([assembly.at[each] for each in named if known.points.get(each, -inf) >= at])
+    return assembly.at[own] in later
 
 
 def futile(impossible: Impossible, assembly: Assembly, known: Known) -> set[tuple[Point, Point]]:

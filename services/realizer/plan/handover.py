@@ -48,7 +48,8 @@ class Arrangement(Struct, frozen=True):
     """Order in which behaviors use parts of the body.
 
     natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
-    begun: behaviors that have begun, and come after nothing any more.
+    begun: behaviors that have begun, and come after nothing any more. early: lasting behaviors, each with one of the
+    block that it does not last for: that waits, through another block, until it has left.
     successors: for a behavior, the one that takes its part, and the first of its points that this brings about.
     handovers: for each behavior whose parts others take some time, the next on each part, and what it leaves to it.
     The first of these ends it; the others wait for it, too, or a slow one would lose its stroke to them.
@@ -63,6 +64,7 @@ class Arrangement(Struct, frozen=True):
     natural: frozenset[str] = frozenset()
     begun: frozenset[str] = frozenset()
     lasting: tuple[str, ...] = ()
+    early: frozenset[tuple[str, str]] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     handovers: Mapping[str, tuple[Handover, ...]] = {}
     cuts: Mapping[str, int] = {}

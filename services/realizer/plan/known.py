@@ -79,11 +79,15 @@ class Known(Struct, frozen=True, kw_only=True):
         return {**times, **later} if later else times
 
     def in_truth(self, chains: Iterable[Chain], times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
-        """The same, with behaviors of the block no earlier than they began or can begin now; who is due comes now."""
+        """The same, with behaviors of the block when they began, or no earlier than they can begin now; who is due
+        comes now.
+        """
         late: dict[Point, Seconds] = {}
         for chain in chains if self.points else ():
             start = chain.points[0]
             by = self.points.get(start, 0.0) - times[start]
+            if chain.behavior.id in self.begun:
+                late[start] = self.points[start]
             if by > EPSILON or chain.behavior.id in self.due:
                 late |= {point: times[point] + by for point in chain.points}
         return {**self.with_own(times), **late}

@@ -92,6 +92,8 @@ class _Planner:
         """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
         self.untied: set[Point] = set(known.untied)
         """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
+        self.early: frozenset[tuple[str, str]] = frozenset()
+        """Lasting behaviors, and those that they do not last for; see `Arrangement`."""
         self.waived: set[tuple[Point, Point]] = set()
         """Points of this block, each with one of another, that are waited for in a circle whatever is planned."""
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
@@ -245,7 +247,8 @@ class _Planner:
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
         self.turns = frozenset(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
-        arrangement = Arrangement(natural, self.known.begun, turns=self.turns, spoken=self.order.current)
+        arranged_anew = partial(Arrangement, natural, self.known.begun, early=self.early)
+        arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
         tried: list[Arrangement] = []
@@ -264,7 +267,9 @@ class _Planner:
                 self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
             undated = foresight.without_date(assembly, self.known) if given else ()
-            waits = Waits(partial(foresight.is_behind, assembly, self.known), partial(foresight.comes_with, assembly))
+            waits = Waits(
+                *(partial(each, assembly, self.known) for each in (foresight.is_behind, foresight.comes_with))
+            )
             arranged, others = yield from share(
                 self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits
             )
@@ -278,10 +283,7 @@ class _Planner:
                 yield 2 * len(part)
             tried.append(arrangement)
             if conflicts:
-                arrangement, tried = (
-                    Arrangement(natural, self.known.begun, turns=self.turns, spoken=arrangement.spoken),
-                    [],
-                )
+                arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
             elif arranged in tried:
                 break
             else:
@@ -355,6 +357,9 @@ class _Planner:
                 raise Misordered from None
             if taken := foresight.losses_to_others(impossible, assembly, arrangement.turns, self.chains, self.known):
                 raise Losses(taken) from None
+            if early := foresight.lasting_for_ever(impossible, assembly, arrangement.lasting):
+                self.early |= early
+                raise Misordered from None
             if futile := foresight.futile(impossible, assembly, self.known):
                 self.waived |= futile
             elif late := foresight.too_late(impossible, assembly) - self.doubted:
@@ -374,11 +379,8 @@ class _Planner:
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:
         """True for an utterance that no constraint mentions: the voice decides whether it has to wait."""
-        return (
-            id in self.chains
-            and self.chains[id].type == "speech"
-            and all(point.behavior != id for point in present.constrained)
-        )
+        is_speech = id in self.chains and self.chains[id].type == "speech"
+        return is_speech and all(point.behavior != id for point in present.constrained)
 
     def _resolve(self, conflict: Conflict) -> None:
         """Settle a conflict: one of the two uses the other arm, or waits for its turn."""
@@ -386,10 +388,8 @@ class _Planner:
             assert conflict.turn is not None
             self.turns |= {conflict.turn}
             return
-        id, hand = conflict.hand
-        self.hands[id] = hand
-        behavior = replace(self.chains[id].behavior, mode=hand)
-        self.chains[id] = chain(behavior, self.estimates.get(id))
+        id, self.hands[conflict.hand[0]] = conflict.hand
+        self.chains[id] = chain(replace(self.chains[id].behavior, mode=self.hands[id]), self.estimates.get(id))
 
     def _block(self) -> Block:
         if not self.hands:
