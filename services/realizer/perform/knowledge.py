@@ -47,7 +47,7 @@ class Asker(Struct, frozen=True):
     named: points of other blocks that it names. parts: those that it may use. blocks: see `Known`. met: behaviors
     of others, by `block:behavior`, that have a part that one of its behaviors was to take. later: blocks of which
     only these count, since they have begun after it. unnamed: points of others that the block names, but its plan
-    does not, so far.
+    does not, so far. performing: all blocks that are being performed.
     """
 
     block: str
@@ -59,6 +59,7 @@ class Asker(Struct, frozen=True):
     met: Container[str] = ()
     later: Container[str] = ()
     unnamed: Collection[Point] = ()
+    performing: Container[str] = ()
 
 
 def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks) -> Known:
@@ -128,8 +129,11 @@ def _coming(asker: Asker, live_blocks: LiveBlocks) -> Iterator[tuple[str, Holder
 
     They cannot wait for it, so it is planned with them in mind.
     """
-    waiting = {plan.block.id: (plan, leaders) for plan, leaders in live_blocks.plans if leaders}
-    waiting.pop(asker.block, None)
+    waiting = {
+        plan.block.id: (plan, leaders)
+        for plan, leaders in live_blocks.plans
+        if leaders and plan.block.id not in asker.performing and plan.block.id != asker.block
+    }
     for name, needed in needed_by(asker.named, waiting).items():
         plan, _ = waiting[name]
         kept = plan.constrained | live_blocks.named(name)

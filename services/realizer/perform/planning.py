@@ -135,8 +135,10 @@ class Planning:
         self, block: Block, elsewhere: Mapping[str, Block], named: Collection[Point], estimates: Iterable[Estimate]
     ) -> Known:
         now = self._bus.now()
-        parts = parts_of(block.behaviors, estimates)
-        return knowledge(Asker(block.id, now, now, named, parts, elsewhere), self._performing(), self._live_blocks)
+        parts, others = parts_of(block.behaviors, estimates), list(self._performing())
+        performing = {each.decisions.plan.block.id for each in others}
+        asker = Asker(block.id, now, now, named, parts, elsewhere, performing=performing)
+        return knowledge(asker, others, self._live_blocks)
 
     async def _estimates(self, block: Block, question: EstimateBehaviors) -> tuple[Estimate, ...]:
         """Estimates of the body for behaviors of a block. Raises BlockRefused."""

@@ -173,7 +173,18 @@ class Ties:
         parts = parts_of(plan.block.behaviors, plan.estimates.values())
         now = owner.report.now()
         unnamed = [each for each in plan.relations.named if is_foreign(each.behavior) and each not in plan.at]
-        asker = Asker(plan.block.id, decisions.began, now, self.foreign, parts, self._blocks, met, later, unnamed)
+        asker = Asker(
+            plan.block.id,
+            decisions.began,
+            now,
+            self.foreign,
+            parts,
+            self._blocks,
+            met,
+            later,
+            unnamed,
+            self._performances,
+        )
         found = knowledge(asker, others, self._live_blocks)
         points = dict(found.points)
         performances = self._performances
