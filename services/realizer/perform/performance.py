@@ -352,7 +352,7 @@ class BlockPerformance:
         """Go on as if what was dropped, or vanished elsewhere, had never been written."""
         self._tell()  # A behavior of which something is to be told may not be in the new plan.
         self._needs_replan = False
-        gone, so_far, known = (*self._dropped, *self.ties.vanished), self.decisions.plan, self.ties.known()
+        gone, so_far, known = (*self._dropped, *self.ties.gone), self.decisions.plan, self.ties.known()
         # Blocks that came later were planned around the arms that this one has chosen.
         chosen = {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
         try:

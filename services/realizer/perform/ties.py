@@ -1,6 +1,6 @@
 """Ties between a block that is performed and other live blocks: points of theirs, and parts that change hands."""
 
-from collections.abc import Callable, Collection, Container, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Set
 from functools import partial
 from math import inf
 from typing import Protocol
@@ -107,6 +107,12 @@ class Ties:
         missed = {point for point in points if point.behavior in lost}
         self._owner.take_in(partial(self._go_on_without, missed))
 
+    @property
+    def gone(self) -> frozenset[str]:
+        """Behaviors that have vanished and of which no point has come that the block names."""
+        reached = self._owner.decisions.facts.reached
+        return self.vanished - {point.behavior for point in self.foreign_ties if point in reached}
+
     def _go_on_without(self, missed: Collection[Point]) -> None:
         """Plan without points of other blocks; fail if a required behavior or constraint was tied to one of them."""
         owner = self._owner
@@ -201,11 +207,21 @@ class Ties:
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
             kept=frozenset(self._live_blocks.named(plan.block.id)),
             begun=frozenset(begun),
-            untied=found.untied,
+            untied=found.untied | self._missed,
             awaiting=found.awaiting,
             lost=found.lost,
             due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )
+
+    @property
+    def _missed(self) -> Set[Point]:
+        """Points that will not come, of behaviors that have vanished after others of their points had come."""
+        some = self.vanished - self.gone
+        return {
+            point
+            for point in self.foreign
+            if point.behavior in some and point not in self._owner.decisions.facts.reached
+        }
 
     @property
     def _performances(self) -> Mapping[str, Tied]:
