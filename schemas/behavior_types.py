@@ -130,8 +130,8 @@ def sync_points(behavior: of.Behavior) -> tuple[str, ...]:
 
 # -- spelling in dialects ------------------------------------------------------------------------------------------
 
-PEAK = "attackPeak"
-_FROM_CAMEL = {"strokeStart": "stroke_start", "strokeEnd": "stroke_end", PEAK: "ready"}
+_PEAK = "attackPeak"
+_FROM_CAMEL = {"strokeStart": "stroke_start", "strokeEnd": "stroke_end", _PEAK: "ready"}
 
 
 def canonical_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0"] = "draft") -> str:
@@ -144,7 +144,7 @@ def canonical_sync(name: str, type: str = "", dialect: Literal["draft", "bml-1.0
         return name
     if dialect == "bml-1.0" and name in (known := _from_bml_1_0(type)):
         return known[name]
-    if name == PEAK and type in TYPES and name not in TYPES[type].bml_1_0_names.values():
+    if name == _PEAK and type in TYPES and name not in TYPES[type].bml_1_0_names.values():
         return name  # A gesture has none.
     return _FROM_CAMEL.get(name, name)
 

@@ -81,10 +81,6 @@ def waits(world: World, name: str) -> dict[Point, set[Point]]:
     return {point: set(of) for point, of in waiting_for(name, world.live).items()}
 
 
-def part(behavior: BlockBehavior, **refs: str) -> BlockBehavior:
-    return timed(behavior, **refs)
-
-
 # -- the oracle ------------------------------------------------------------------------------------------------------
 
 Told = list[tuple[Block, tuple[str, ...]]]
@@ -127,10 +123,10 @@ def told(chance: Random) -> Told:
                 ref = f"{other.id}:{to.id}:{chance.choice(SYNCS[type(to)])}"
                 if chance.random() < 0.2:
                     ref = f"{other.id}:bml:end"
-                one = part(one, **{chance.choice(TIED[type(one)]): ref})
+                one = timed(one, **{chance.choice(TIED[type(one)]): ref})
             elif behaviors and chance.random() < 0.4:
                 to = chance.choice(behaviors)
-                one = part(one, **{chance.choice(TIED[type(one)]): f"{to.id}:{chance.choice(SYNCS[type(to)])}"})
+                one = timed(one, **{chance.choice(TIED[type(one)]): f"{to.id}:{chance.choice(SYNCS[type(to)])}"})
             behaviors.append(one)
         behind = tuple(each.id for each, _ in found) if found and chance.random() < 0.3 else ()
         found.append((block(tuple(behaviors), id=f"b{number}"), behind))
@@ -189,14 +185,14 @@ def syncs(world: World, own: str, behavior: str) -> list[str]:
 
 
 def test_what_comes_before_the_tie_does_not_wait() -> None:
-    made = two(part(OTHER_ARM, stroke_end="b0:g:start"))
+    made = two(timed(OTHER_ARM, stroke_end="b0:g:start"))
 
     assert sorted(syncs(made, "g:start", "b1:h")) == ["end", "relax", "stroke_end"]
     assert Point("b1:bml", "end") in waits(made, "b0")
 
 
 def test_seconds_are_counted_from_the_point() -> None:
-    made = two(part(OTHER_ARM, start="b0:g:ready+0.25"))
+    made = two(timed(OTHER_ARM, start="b0:g:ready+0.25"))
     found = waiting_for("b0", made.live)[Point("b1:h", "stroke")]
 
     shortest = [each.shortest for each in BODY.estimate(OTHER_ARM).phases]
@@ -204,20 +200,20 @@ def test_seconds_are_counted_from_the_point() -> None:
 
 
 def test_who_sets_out_just_in_time_waits_before_it_does() -> None:
-    made = two(part(OTHER_ARM, stroke="b0:g:relax"))
+    made = two(timed(OTHER_ARM, stroke="b0:g:relax"))
 
     assert len(syncs(made, "g:relax", "b1:h")) == 7
-    assert len(syncs(two(part(OTHER_ARM, stroke_end="b0:g:relax")), "g:relax", "b1:h")) == 3
+    assert len(syncs(two(timed(OTHER_ARM, stroke_end="b0:g:relax")), "g:relax", "b1:h")) == 3
 
 
 def test_words_wait_before_they_begin_for_what_a_mark_is_tied_to() -> None:
-    made = two(part(WORDS, m="b0:g:relax"))
+    made = two(timed(WORDS, m="b0:g:relax"))
 
     assert sorted(syncs(made, "g:relax", "b1:s")) == ["end", "m", "start"]
 
 
 def test_words_that_are_said_wait_for_nothing() -> None:
-    made = two(part(WORDS, end="b0:g:end"))
+    made = two(timed(WORDS, end="b0:g:end"))
     assert "end" in syncs(made, "g:end", "b1:s")
     made.reach("b1", "s:start")
 
@@ -225,7 +221,7 @@ def test_words_that_are_said_wait_for_nothing() -> None:
 
 
 def test_nobody_waits_for_what_has_been() -> None:
-    made = two(part(OTHER_ARM, start="b0:g:start"))
+    made = two(timed(OTHER_ARM, start="b0:g:start"))
     made.reach("b0", "g:start")
 
     assert syncs(made, "g:start", "b1:h") == []
@@ -239,17 +235,17 @@ def test_a_block_that_waits_for_its_turn_waits_for_the_end_with_all_it_has() -> 
 
 def test_who_is_tied_to_that_waits_too_also_for_what_it_has_dropped_so_far() -> None:
     """The second block drops its words, which are to end before they begin: that it does is told as it begins."""
-    made = two(part(Gesture(id="x", lexeme="BEAT", mode="LEFT_HAND"), start="1", end="1.1"), behind=("b0",))
+    made = two(timed(Gesture(id="x", lexeme="BEAT", mode="LEFT_HAND"), start="1", end="1.1"), behind=("b0",))
     assert made.plans["b1"].dropped == ("x",)
     made.blocks["b1"] = block((Gesture(id="x", lexeme="BEAT", mode="LEFT_HAND"),), id="b1")
-    made.add(block((part(OTHER_ARM, ready="b1:x:stroke"),), id="b2"))
+    made.add(block((timed(OTHER_ARM, ready="b1:x:stroke"),), id="b2"))
 
     assert len(syncs(made, "bml:end", "b2:h")) == 7
 
 
 def test_who_hands_a_part_over_goes_home_by_itself() -> None:
     later = Gesture(id="k", lexeme="BEAT", mode="RIGHT_HAND")
-    made = two(part(OTHER_ARM, start="0"), part(later, start="b0:g:relax"))
+    made = two(timed(OTHER_ARM, start="0"), timed(later, start="b0:g:relax"))
     assert any(each.kind == "handover" for each in made.plans["b1"].net.places)
 
     assert syncs(made, "g:relax", "b1:h") == []
@@ -269,7 +265,7 @@ def needed(world: World, *points: str) -> dict[str, set[str]]:
 
 
 def test_what_comes_before_a_point_of_a_block_that_waits_is_needed_and_nothing_else() -> None:
-    made = two(OTHER_ARM, part(WORDS, start="h:relax"), Head(id="n", lexeme="NOD"), behind=("b0",))
+    made = two(OTHER_ARM, timed(WORDS, start="h:relax"), Head(id="n", lexeme="NOD"), behind=("b0",))
 
     assert needed(made, "b1:h:stroke") == {"b1": {"", "h"}}
     assert needed(made, "b1:s:m") == {"b1": {"", "h", "s"}}
@@ -286,7 +282,7 @@ def test_the_turn_of_a_block_waits_for_all_of_those_before_it() -> None:
 
 def test_what_a_waiting_block_is_tied_to_in_another_is_needed() -> None:
     made = two(OTHER_ARM, behind=("b0",))
-    made.add(block((part(WORDS, start="b1:h:ready"), Wait(id="w", duration=1.0)), id="b2"), ("b0",))
+    made.add(block((timed(WORDS, start="b1:h:ready"), Wait(id="w", duration=1.0)), id="b2"), ("b0",))
 
     assert needed(made, "b2:s:m") == {"b1": {"", "h"}, "b2": {"", "s"}}
     assert needed(made, "b2:w:end") == {"b2": {"", "w"}}

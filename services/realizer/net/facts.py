@@ -165,20 +165,27 @@ class Facts:
 
     def stood_between(self, since: Seconds, until: Seconds, behavior: str) -> Seconds:
         """Seconds between these times in which the behavior was held and stood: from the end of its last word on."""
-        holds: list[tuple[Seconds, Seconds]] = []
-        for (at, held), end in zip(self._holds, [*(at for at, _ in self._holds[1:]), until], strict=True):
-            if held is None or behavior in held:
-                since_before = holds.pop()[0] if holds and holds[-1][1] == at else at
-                holds.append((since_before, end))
         words = self._words.get(behavior, ())
-        stood = [(max([first, *(word for word in words if first <= word <= last)]), last) for first, last in holds]
-        return sum(max(0.0, min(last, until) - max(first, since)) for first, last in stood)
+        return sum(
+            _overlap(max([first, *(word for word in words if first <= word <= last)]), last, since, until)
+            for first, last in self._holds_of(behavior, until)
+        )
 
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""
+        return sum(_overlap(first, last, since, until) for first, last in self._holds_of(behavior, until))
+
+    def _holds_of(self, behavior: str, until: Seconds) -> list[tuple[Seconds, Seconds]]:
+        """Intervals in which the behavior (empty: any) was held; the last goes on to `until` if it is held still."""
+        found: list[tuple[Seconds, Seconds]] = []
         ends = [*(at for at, _ in self._holds[1:]), until]
-        return sum(
-            max(0.0, min(end, until) - max(at, since))
-            for (at, held), end in zip(self._holds, ends, strict=False)
-            if held is None or (behavior in held if behavior else held)
-        )
+        for (at, held), end in zip(self._holds, ends, strict=False):
+            if held is None or (behavior in held if behavior else held):
+                first = found.pop()[0] if found and found[-1][1] == at else at
+                found.append((first, end))
+        return found
+
+
+def _overlap(first: Seconds, last: Seconds, since: Seconds, until: Seconds) -> Seconds:
+    """Seconds that are both between the first two times and between the other two."""
+    return max(0.0, min(last, until) - max(first, since))

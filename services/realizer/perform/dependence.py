@@ -14,6 +14,7 @@ from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.known import (
     BLOCK_END,
     BLOCK_START,
+    at_home,
     block_of,
     is_foreign,
     is_named_in,
@@ -63,12 +64,9 @@ class _Followed:
 
     def _at_least(self, point: Point) -> Point:
         """The point, or the start of its block if that has dropped it so far: then it is known what comes of it."""
-        name = block_of(point)
-        plan = self.plans.get(name)
-        is_planned = (
-            plan is None or plan.transition(Point(point.behavior.removeprefix(f"{name}:"), point.sync)) is not None
-        )
-        return point if is_planned else qualified(name, BLOCK_START)
+        plan = self.plans.get(block_of(point))
+        is_planned = plan is None or plan.transition(at_home(point)) is not None
+        return point if is_planned else qualified(block_of(point), BLOCK_START)
 
     def all(self) -> Mapping[Point, Mapping[Point, Seconds]]:
         found: dict[Point, dict[Point, Seconds]] = defaultdict(dict)
@@ -76,7 +74,7 @@ class _Followed:
         followed = [point for point in sorted(named) if not self.live_blocks.is_past(point)]
         end = qualified(self.block, BLOCK_END)
         for point in dict.fromkeys((*followed, end)):
-            own = Point(point.behavior.removeprefix(f"{self.block}:"), point.sync)
+            own = at_home(point)
             starts = dict.fromkeys(self.tied.get(point, ()), 0.0)
             if point == end:
                 starts |= {(name, 0): 0.0 for name, leaders in self.behind.items() if self.block in leaders}
@@ -208,7 +206,7 @@ def needed_by(points: Iterable[Point], among: Mapping[str, tuple[Plan, Collectio
         if (name := block_of(point)) not in among:
             continue
         plan, leaders = among[name]
-        last = plan.transition(Point(point.behavior.removeprefix(f"{name}:"), point.sync))
+        last = plan.transition(at_home(point))
         before = plan.net.earlier([last]) if last is not None else {0}
         there = [each for each, transition in plan.at.items() if transition in before]
         found[name] |= {each.behavior for each in there if not is_foreign(each.behavior)}

@@ -11,7 +11,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.references import with_names
 from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.known import block_of, qualified
+from engage_hri.services.realizer.plan.known import at_home, block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 
@@ -177,16 +177,16 @@ class LiveBlocks:
 
     def is_past(self, point: Point) -> bool:
         """True if a point, named as other blocks name it, is reached, or its block not live any more."""
-        tracked = self._tracked.get(block := block_of(point))
-        return tracked is None or Point(point.behavior.removeprefix(f"{block}:"), point.sync) in tracked.reached
+        tracked = self._tracked.get(block_of(point))
+        return tracked is None or at_home(point) in tracked.reached
 
     def is_lost(self, point: Point) -> bool:
         """True if a point, named as other blocks name it, has not been reached and never will be."""
-        home = self._find(block := block_of(point))
-        named = Point(point.behavior.removeprefix(f"{block}:"), point.sync)
-        if home is None or named in home.reached:
-            return home is None
-        return named.behavior in home.lost or self._tracked.get(block) is not home
+        home, named = self._find(block_of(point)), at_home(point)
+        if home is None:
+            return True
+        is_over = named.behavior in home.lost or self._tracked.get(block_of(point)) is not home
+        return is_over and named not in home.reached
 
     def times(self, block: str) -> Mapping[Point, Seconds]:
         """Times of the points of a live block, measured or expected; none if it is yet to be planned."""
@@ -311,7 +311,7 @@ class LiveBlocks:
                 tracked.followers.append(follower)
         for point in wanted:
             block = block_of(point)
-            named = Point(point.behavior.removeprefix(f"{block}:"), point.sync)
+            named = at_home(point)
             home = homes.get(block)
             if home is not None and (at := home.reached.get(named)) is not None:
                 follower.hear(point, at)

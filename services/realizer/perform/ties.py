@@ -5,6 +5,8 @@ from functools import partial
 from math import inf
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
@@ -13,7 +15,7 @@ from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.handover import is_overlaid
-from engage_hri.services.realizer.plan.known import Known, block_of, is_foreign, is_named_in
+from engage_hri.services.realizer.plan.known import Known, at_home, block_of, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import EPSILON, Point
@@ -180,36 +182,25 @@ class Ties:
         now = owner.report.now()
         unnamed = [each for each in plan.relations.named if is_foreign(each.behavior) and each not in plan.at]
         asker = Asker(
-            plan.block.id,
-            decisions.began,
-            now,
-            self.foreign,
-            parts,
-            self._blocks,
-            met,
-            later,
-            unnamed,
-            self._performances,
-        )
+            plan.block.id, decisions.began, now, self.foreign, parts, self._blocks,
+            met=met, later=later, unnamed=unnamed, performing=self._performances,
+        )  # fmt: skip
         found = knowledge(asker, others, self._live_blocks)
         points = dict(found.points)
         performances = self._performances
         for taker in self.given.values():
             if (other := performances.get(block_of(taker))) is not None:
-                start = Point(taker.behavior.partition(":")[2], taker.sync)
-                points[taker] = other.decisions.foresight.times(now).get(start, now) - decisions.began
+                points[taker] = other.decisions.foresight.times(now).get(at_home(taker), now) - decisions.began
         begun = decisions.facts.begun
         points |= {Point(id, "start"): begun.get(id, now) - decisions.began for id in {*plan.chains, *begun}}
-        return Known(
-            blocks=self._blocks,
+        return replace(
+            found,
             points=points,
             holders={id: each for id, each in found.holders.items() if id not in self.vanished},
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
             kept=frozenset(self._live_blocks.named(plan.block.id)),
             begun=frozenset(begun),
             untied=found.untied | self._missed,
-            awaiting=found.awaiting,
-            lost=found.lost,
             due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )
 

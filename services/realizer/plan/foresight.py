@@ -1,6 +1,7 @@
 """Points of other blocks in the schedule of a block: when they come, and what they leave no time for."""
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from functools import partial
 from math import inf
 
 from engage_hri.schemas.units import Seconds
@@ -11,6 +12,7 @@ from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known, block_of, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Awaited, Circle, Foresight, Impossible
+from engage_hri.services.realizer.plan.sharing import Waits
 from engage_hri.services.realizer.points import EPSILON, Point
 
 AFTER: Seconds = 0.001
@@ -37,7 +39,7 @@ def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Poi
             source = len(assembly.members) - 1 if own == BLOCK_END else assembly.at.get(own, 0)
             if source and source != target and (own, foreign) not in waived:
                 lag = max(seconds, AFTER)
-                yield Awaited("order", source, target, lag, lag)
+                yield Awaited("order", source, target, lag, lag, pair=(own, foreign))
 
 
 def lasting_for_ever(impossible: Impossible, assembly: Assembly, lasting: Iterable[str]) -> set[tuple[str, str]]:
@@ -63,26 +65,21 @@ def is_behind(assembly: Assembly, known: Known, foreign: Point, behavior: str) -
     return any(own == BLOCK_END or assembly.at.get(own) in later for own in awaited)
 
 
-def comes_with(assembly: Assembly, known: Known, own: Point, foreign: Point) -> bool:
-    """True if a point of this block comes only once a point of another one has, or a later one of that block."""
+def coming_with(assembly: Assembly, known: Known, foreign: Point) -> set[Point]:
+    """Points of this block that come only once a point of another one has, or a later one of that block."""
     block, at = block_of(foreign), known.points.get(foreign, inf) - EPSILON
     named = [each for each in assembly.at if is_foreign(each.behavior) and block_of(each) == block]
     later = assembly.net.later([assembly.at[each] for each in named if known.points.get(each, -inf) >= at])
-    return assembly.at[own] in later
+    return {point for point, transition in assembly.at.items() if transition in later}
 
 
-def futile(impossible: Impossible, assembly: Assembly, known: Known) -> set[tuple[Point, Point]]:
+def waits(assembly: Assembly, known: Known) -> Waits:
+    return Waits(partial(is_behind, assembly, known), partial(coming_with, assembly, known))
+
+
+def futile(impossible: Impossible) -> set[tuple[Point, Point]]:
     """Pairs of points, as of `awaited`, that wait for each other whatever is planned."""
-    ends = {
-        (tie.source, tie.target) for circle in impossible.circles for tie, _ in circle if isinstance(tie, Awaited)
-    }
-    end = len(assembly.members) - 1
-    return {
-        (own, foreign)
-        for foreign, target in assembly.at.items()
-        for own in known.awaiting.get(foreign, ())
-        if (end if own == BLOCK_END else assembly.at.get(own, 0), target) in ends
-    }
+    return {tie.pair for circle in impossible.circles for tie, _ in circle if isinstance(tie, Awaited)}
 
 
 def losses_to_others(

@@ -65,11 +65,8 @@ class Known(Struct, frozen=True, kw_only=True):
             return times
         return {**self.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
 
-    def with_waiting(self, times: Mapping[Point, Seconds], end: Seconds) -> Mapping[Point, Seconds]:
-        """The same times, with points of others no earlier than they can be if they wait for points of this block.
-
-        end: of the block.
-        """
+    def _with_waiting(self, times: Mapping[Point, Seconds], end: Seconds) -> Mapping[Point, Seconds]:
+        """The same times, with points of others no earlier than they can be if they wait for points of this block."""
         own = {**times, BLOCK_END: end}
         later = {
             point: max([times[point], *(own[each] + seconds for each, seconds in waits.items() if each in own)])
@@ -78,9 +75,13 @@ class Known(Struct, frozen=True, kw_only=True):
         }
         return {**times, **later} if later else times
 
-    def in_truth(self, chains: Iterable[Chain], times: Mapping[Point, Seconds]) -> Mapping[Point, Seconds]:
-        """The same, with behaviors of the block when they began, or no earlier than they can begin now; who is due
-        comes now.
+    def in_truth(
+        self, chains: Iterable[Chain], times: Mapping[Point, Seconds], end: Seconds
+    ) -> Mapping[Point, Seconds]:
+        """Times as of `with_own`, as far as they can be kept.
+
+        Behaviors of the block begin when they began, or no earlier than they can begin now; who is due comes now.
+        Points of others that wait for points of this block come no earlier than these allow. end: of the block.
         """
         late: dict[Point, Seconds] = {}
         for chain in chains if self.points else ():
@@ -90,7 +91,7 @@ class Known(Struct, frozen=True, kw_only=True):
                 late[start] = self.points[start]
             if by > EPSILON or chain.behavior.id in self.due:
                 late |= {point: times[point] + by for point in chain.points}
-        return {**self.with_own(times), **late}
+        return self._with_waiting({**self.with_own(times), **late}, end)
 
 
 NOTHING = Known()
@@ -99,6 +100,11 @@ NOTHING = Known()
 def qualified(block: str, point: Point) -> Point:
     """The point as other blocks name it."""
     return Point(f"{block}:{point.behavior}", point.sync)
+
+
+def at_home(point: Point) -> Point:
+    """The point, named as other blocks name it, as its own block does."""
+    return Point(point.behavior.partition(":")[2], point.sync)
 
 
 def block_of(point: Point) -> str:

@@ -39,7 +39,7 @@ from engage_hri.services.realizer.plan.relations import (
 )
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
-from engage_hri.services.realizer.plan.sharing import Waits, naming_others, share, waits_elsewhere
+from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import Point
@@ -259,17 +259,14 @@ class _Planner:
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
-            everywhere = self.known.in_truth(self.chains.values(), times)
-            everywhere = self.known.with_waiting(everywhere, solution.times[-1])
+            everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
                 self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
             undated = foresight.without_date(assembly, self.known) if given else ()
-            waits = Waits(
-                *(partial(each, assembly, self.known) for each in (foresight.is_behind, foresight.comes_with))
-            )
+            waits = foresight.waits(assembly, self.known)
             arranged, others = yield from share(
                 self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits
             )
@@ -360,7 +357,7 @@ class _Planner:
             if early := foresight.lasting_for_ever(impossible, assembly, arrangement.lasting):
                 self.early |= early
                 raise Misordered from None
-            if futile := foresight.futile(impossible, assembly, self.known):
+            if futile := foresight.futile(impossible):
                 self.waived |= futile
             elif late := foresight.too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
@@ -388,8 +385,9 @@ class _Planner:
             assert conflict.turn is not None
             self.turns |= {conflict.turn}
             return
-        id, self.hands[conflict.hand[0]] = conflict.hand
-        self.chains[id] = chain(replace(self.chains[id].behavior, mode=self.hands[id]), self.estimates.get(id))
+        id, hand = conflict.hand
+        self.hands[id] = hand
+        self.chains[id] = chain(replace(self.chains[id].behavior, mode=hand), self.estimates.get(id))
 
     def _block(self) -> Block:
         if not self.hands:

@@ -7,15 +7,20 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, solve
 from engage_hri.services.realizer.plan.steps import PORTION, Steps
-from engage_hri.services.realizer.points import EPSILON
+from engage_hri.services.realizer.points import EPSILON, Point
 
 
 class Foresight(Place, frozen=True):
     """Place that stands for what is known beforehand of its target: it comes no earlier than `lag` seconds."""
 
 
-class Awaited(Place, frozen=True):
-    """Place that stands for what other blocks wait for: its target, a point of theirs, comes after its source."""
+class Awaited(Place, frozen=True, kw_only=True):
+    """Place that stands for what other blocks wait for: its target, a point of theirs, comes after its source.
+
+    pair: the point of this block, and that of the other.
+    """
+
+    pair: tuple[Point, Point]
 
 
 Circle = tuple[tuple[Place | Bound, Seconds], ...]

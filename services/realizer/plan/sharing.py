@@ -4,7 +4,7 @@ The others are given: what they were promised is not taken from them. A behavior
 part over and loses its way home, as within one block; before that, who comes waits, or uses the other arm.
 """
 
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping, Set
 from typing import NamedTuple
 
 from msgspec.structs import replace
@@ -33,15 +33,15 @@ from engage_hri.services.realizer.points import EPSILON, Point
 class Waits(NamedTuple):
     """Answers to who waits for whom, whatever the times are.
 
-    is_behind: whether a point of another block comes only after a behavior of this one has begun. comes_with: whether
-    a point of this block comes only once a point of another one has.
+    is_behind: whether a point of another block comes only after a behavior of this one has begun. coming_with: the
+    points of this block that come only once a point of another one has.
     """
 
     is_behind: Callable[[Point, str], bool]
-    comes_with: Callable[[Point, Point], bool]
+    coming_with: Callable[[Point], Set[Point]]
 
 
-NOBODY = Waits(lambda point, behavior: False, lambda own, point: False)
+NOBODY = Waits(lambda point, behavior: False, lambda point: frozenset())
 
 
 def share(
@@ -149,8 +149,8 @@ class _Sharing:
 
     def _comes_too_late(self, chain: Chain, holder: Holder) -> bool:
         """True if what the behavior must have made comes only once the holder has begun: then that has the part."""
-        start = holder.chain.points[0]
-        return any(self.waits.comes_with(point, start) for point in chain.points[: least(chain, holder.chain) + 1])
+        needed = chain.points[: least(chain, holder.chain) + 1]
+        return not self.waits.coming_with(holder.chain.points[0]).isdisjoint(needed)
 
     def keep_taking(self, id: str) -> None:
         """Go on taking what is handed over to a behavior by plan: only for that does it end as this one begins.
