@@ -229,7 +229,8 @@ async def measure_inside(laps: int, trips: int, links: int, as_json: bool) -> No
 async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
     """kB that a realizer keeps for a block whose first behavior runs: plan, authority, tasks, requests."""
     config = RealizerConfig(stall=3600.0)
-    async with MemoryHub(decodes=False) as hub, running(hub, {"realizer": partial(realize, config=config)}):
+    # A bus keeps messages encoded, for those who come late: they are not the realizer's.
+    async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=config)}):
         bus = hub.join("control")
         desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
         bus.answer(keys.ESTIMATE, estimate)

@@ -3,9 +3,10 @@
 Each type of behavior has a row in schemas/behavior_types.py.
 """
 
+from collections.abc import Iterable
 from functools import lru_cache
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from msgspec import Struct
 
@@ -40,6 +41,15 @@ Gate = Literal["start", "hold", "prompt", "passive"]
 start: it is not begun yet. hold: it comes there and holds. passive: it cannot wait there.
 prompt: it could hold, but sets out so late that it need not. (A look that is on its target too early misleads.)
 """
+
+
+T = TypeVar("T")
+_NOTHING: frozenset[Any] = frozenset()
+
+
+def frozen(items: Iterable[T] = ()) -> frozenset[T]:
+    """The items as a set, and the same object whenever there are none: a live block keeps a dozen of those."""
+    return frozenset(items) or _NOTHING
 
 
 class Member(Struct, frozen=True, gc=False):

@@ -1,7 +1,7 @@
 """Deadlines by name, the earliest first. Pure."""
 
 import heapq
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from itertools import count
 from math import inf
 from typing import Any, Generic, TypeVar
@@ -47,6 +47,9 @@ class Deadlines(Generic[K]):
 
     def __getitem__(self, name: K) -> Seconds | None:
         return self._at.get(name)
+
+    def __iter__(self) -> Iterator[K]:
+        return iter(self._at)
 
     @property
     def earliest(self) -> Seconds | None:

@@ -17,7 +17,7 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
-from engage_hri.services.realizer.points import EPSILON, Member, Point
+from engage_hri.services.realizer.points import EPSILON, Member, Point, frozen
 
 
 class Grants(Observer):
@@ -230,4 +230,4 @@ def _pauses(plan: Plan) -> frozenset[Point]:
                 waits = at and plan.predicted(gap) - plan.predicted(Point(id, phase.since)) > phase.natural + EPSILON
                 if phase.hold and (waits or at in constrained or len(plan.members[at]) > 1):
                     found.add(gap)
-    return frozenset(found)
+    return frozen(found)

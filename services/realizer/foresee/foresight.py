@@ -20,7 +20,7 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import slack
-from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, performer
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer
 
 SURPRISE: Seconds = 0.1
 """Difference from the expected time, in seconds, from which predictions are computed again."""
@@ -66,14 +66,14 @@ class Foresight(Observer):
         """What the forecast has yet to be told: a function, and its arguments."""
         self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
         """Behaviors and numbers of their next points: until when, and since when, each is expected there."""
-        self._minded: frozenset[str] = frozenset()
+        self._minded: frozenset[str] = frozen()
         self.forecast = None
         if is_predictive(plan) or self.followed:
             self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
             for transition in self._transitions_followed():
                 forecast.require(transition)
             bounded = forecast.bounded
-            self._minded = frozenset(member.behavior for transition in bounded for member in plan.members[transition])
+            self._minded = frozen(member.behavior for transition in bounded for member in plan.members[transition])
 
     def minds(self, transition: int) -> bool:
         """True if it takes a forecast to say when `transition` is due: some behavior there may be held back."""

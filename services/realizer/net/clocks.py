@@ -11,7 +11,6 @@ class Clocks:
 
     def __init__(self) -> None:
         self._due: Deadlines[int] = Deadlines(int)
-        self._running: set[int] = set()
         self._left: dict[int, Seconds] = {}
 
     @property
@@ -29,7 +28,6 @@ class Clocks:
         if is_stopped:
             self._left[place] = at - now
         else:
-            self._running.add(place)
             self._due.set(place, at)
 
     def ripe(self, now: Seconds) -> tuple[int, Seconds] | None:
@@ -37,7 +35,6 @@ class Clocks:
         at = self._due.earliest
         if at is None or at > now or (place := self._due.due(now)) is None:
             return None
-        self._running.discard(place)
         return place, at
 
     def stop(self, is_held: Callable[[int], bool], now: Seconds) -> dict[int, Seconds]:
@@ -45,11 +42,10 @@ class Clocks:
 
         Returns the places whose clocks go on, each with the time at which its token is ripe now.
         """
-        for place in [each for each in self._running if is_held(each)]:
+        for place in [each for each in self._due if is_held(each)]:
             at = self._due[place]
             assert at is not None
             self._due.clear(place)
-            self._running.discard(place)
             self._left[place] = at - now
         going_on = {place: now + left for place, left in self._left.items() if not is_held(place)}
         for place, at in going_on.items():

@@ -10,7 +10,7 @@ from math import isfinite
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.running import RunningNet
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import Point, frozen
 
 
 class Facts:
@@ -32,8 +32,8 @@ class Facts:
         self._heard: dict[str, Seconds] = {}
         """Time of the latest report of each behavior."""
         self.held: Collection[str] | None = ()
-        self.stuck: frozenset[Point] = frozenset()
-        self.standing: frozenset[Point] = frozenset()
+        self.stuck: frozenset[Point] = frozen()
+        self.standing: frozenset[Point] = frozen()
         self._holds: list[tuple[Seconds, Collection[str] | None]] = []
         """The times at which other behaviors were held than before, and which."""
         self._words: dict[str, list[Seconds]] = {}
@@ -102,7 +102,7 @@ class Facts:
 
         Clocks before their instants stop, and those before points of other blocks that are stuck.
         """
-        self.held, self.stuck, self.standing = behaviors, frozenset(stuck), frozenset(standing)
+        self.held, self.stuck, self.standing = behaviors, frozen(stuck), frozen(standing)
         stopped = None if behaviors is None else {*behaviors, *(point.behavior for point in stuck)}
         self._holds.append((now, stopped))
         self._net.hold(stopped, now)

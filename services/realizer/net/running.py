@@ -13,6 +13,7 @@ has gone home by itself, and a token that comes too late is taken at once.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
+from typing import NamedTuple
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.clocks import Clocks
@@ -42,6 +43,16 @@ class Observer:
         """Take the news that `transition` has fired."""
 
 
+class _Audience(NamedTuple):
+    """Functions to call when something happens. Most observers hear of two or three events: others cost no time."""
+
+    began: list[Callable[[str, Seconds], None]]
+    arrived: list[Callable[[Point, Seconds], None]]
+    reached: list[Callable[[Point, Seconds], None]]
+    opened: list[Callable[[int], None]]
+    fired: list[Callable[[int, Seconds], None]]
+
+
 class RunningNet:
     """A marking that runs, from the initial one to the initial one.
 
@@ -63,11 +74,7 @@ class RunningNet:
         self.passed: dict[int, Seconds] = {}
         self.at = at
         self._members = members
-        self._on_began: list[Callable[[str, Seconds], None]] = []
-        self._on_arrived: list[Callable[[Point, Seconds], None]] = []
-        self._on_reached: list[Callable[[Point, Seconds], None]] = []
-        self._on_opened: list[Callable[[int], None]] = []
-        self._on_fired: list[Callable[[int, Seconds], None]] = []
+        self._told = _Audience([], [], [], [], [])
         self.observe(observers)
         self._tokens = bytearray(RIPE * count for count in net.initial)
         self._before: dict[int, int] = {}
@@ -85,12 +92,15 @@ class RunningNet:
         """For each transition, the time at which the tokens that lie before it are ripe, or were."""
         self._firing: list[tuple[int, Seconds]] = []
         """Transitions that fire now, the first is at it."""
-        self._into: dict[tuple[str, int], int] = {}
-        self._out_of: dict[tuple[str, int], int] = {}
-        """The phases of each behavior, by the transitions at their ends."""
-        before: list[list[int]] = [[] for _ in range(size)]
-        behind: list[list[int]] = [[] for _ in range(size)]
-        self._after: dict[tuple[str, int], tuple[int, ...]] = {}
+        parts = {(each.behavior, number): each for number, group in enumerate(members) for each in group}
+        self.part_of: Mapping[Point, Member] = {
+            point: parts[point.behavior, number] for point, number in at.items() if (point.behavior, number) in parts
+        }
+        """For each point, the part that its behavior has in the point's instant."""
+        self._into: dict[Point, int] = {}
+        self._out_of: dict[Point, int] = {}
+        """The phases of each behavior, by the points at their ends: of several at one instant, that of its part."""
+        self._after: dict[Point, tuple[int, ...]] = {}
         """Places that a behavior puts a token into as it passes a transition, apart from its phases."""
         self._put_at: dict[int, Seconds] = {}
         """For each place with a clock, when its token was put."""
@@ -102,67 +112,55 @@ class RunningNet:
         """For each transition, the behaviors that have not passed it, and places before it without a ripe token."""
         for number, place in enumerate(net.places):
             if place.kind == "phase":
-                self._into[place.behavior, place.target] = self._out_of[place.behavior, place.source] = number
+                self._into[parts[place.behavior, place.target].point] = number
+                self._out_of[parts[place.behavior, place.source].point] = number
                 continue
-            before[place.target].append(number)
             if place.after:
-                key = (place.after, place.source)
-                self._after[key] = (*self._after.get(key, ()), number)
-            else:
-                behind[place.source].append(number)
+                point = parts[place.after, place.source].point
+                self._after[point] = (*self._after.get(point, ()), number)
             if place.kind not in ("handover", "idle"):
                 self._lacking[place.target] += 1
                 self._missing[place.target] += 1
-        self._inputs, self._outputs = list(map(tuple, before)), list(map(tuple, behind))
-        """Places before and behind each transition, apart from phases."""
-        self._stations: dict[str, list[int]] = {}
-        """For each behavior, the transitions that it comes to later than with its start."""
+        stations: dict[str, list[int]] = {}
         for transition, group in enumerate(members):
             for member in group:
                 if member.kind != "start" and ":" not in member.behavior:
-                    self._stations.setdefault(member.behavior, []).append(transition)
+                    stations.setdefault(member.behavior, []).append(transition)
                     self._lacking[transition] += 1
-        parts = {(each.behavior, number): each for number, group in enumerate(members) for each in group}
-        self.part_of: Mapping[Point, Member] = {
-            point: parts[point.behavior, number] for point, number in at.items() if (point.behavior, number) in parts
-        }
-        """For each point, the part that its behavior has in the point's instant."""
+        self._stations = {behavior: tuple(each) for behavior, each in stations.items()}
+        """For each behavior, the transitions that it comes to later than with its start."""
         self.end = size - 1
         self._before_end = self._leading_to_end()
-        self._lacking[self.end] = self._missing[self.end] = len(self._before_end)
+        self._lacking[self.end] = self._missing[self.end] = sum(self._before_end)
 
     def observe(self, observers: Iterable[Observer]) -> None:
         """Tell these, too, what happens from now on."""
         for each in observers:
-            kind = type(each)  # Most are told of two or three events: no time is spent on the others.
+            kind = type(each)
             if kind.on_began is not Observer.on_began:
-                self._on_began.append(each.on_began)
+                self._told.began.append(each.on_began)
             if kind.on_arrived is not Observer.on_arrived:
-                self._on_arrived.append(each.on_arrived)
+                self._told.arrived.append(each.on_arrived)
             if kind.on_reached is not Observer.on_reached:
-                self._on_reached.append(each.on_reached)
+                self._told.reached.append(each.on_reached)
             if kind.on_opened is not Observer.on_opened:
-                self._on_opened.append(each.on_opened)
+                self._told.opened.append(each.on_opened)
             if kind.on_fired is not Observer.on_fired:
-                self._on_fired.append(each.on_fired)
+                self._told.fired.append(each.on_fired)
 
-    def _leading_to_end(self) -> set[int]:
-        """The transitions that the end of the block waits for.
+    def _leading_to_end(self) -> bytearray:
+        """For each transition, 1 if the end of the block waits for it, or 0.
 
         Not among them are ends of events that may outlast it, and who takes a part by plan: a behavior that was early
         has gone home by itself.
         """
-        sources: list[list[int]] = [[] for _ in self.net.transitions]
-        for place in self.net.places:
-            if place.kind not in ("idle", "handover"):
-                sources[place.target].append(place.source)
-        found: set[int] = set()
+        found = bytearray(len(self.net.transitions))
         todo = [self.end]
         while todo:
-            for source in sources[todo.pop()]:
-                if source not in found:
-                    found.add(source)
-                    todo.append(source)
+            for place in (self.net.places[each] for each in self.net.inputs[todo.pop()]):
+                if place.kind not in ("idle", "handover") and not found[place.source]:
+                    found[place.source] = 1
+                    todo.append(place.source)
         return found
 
     # -- questions -----------------------------------------------------------------------------------------------
@@ -197,7 +195,7 @@ class RunningNet:
         -inf: there are none. inf: a clock is stopped.
         """
         stopped = self._clocks.stopped
-        if stopped and any(place in stopped for place in self._inputs[transition]):
+        if stopped and any(place in stopped for place in self.net.inputs[transition]):
             return inf
         return self._ripe[transition]
 
@@ -215,33 +213,32 @@ class RunningNet:
 
     def begin(self, behavior: str, at: Seconds) -> None:
         """Note that a behavior was told to begin."""
-        for tell in self._on_began:
+        for tell in self._told.began:
             tell(behavior, at)
         for transition in self._stations.get(behavior, ()):
             self._lack_less(transition)
 
     def arrive(self, point: Point, at: Seconds) -> None:
         """Note that a behavior holds at `point`, which ends a phase."""
-        if (transition := self.at.get(point)) is None:
+        if point not in self.at:
             return
-        if (place := self._into.get((point.behavior, transition))) is not None and self._tokens[place]:
+        if (place := self._into.get(self.part_of[point].point)) is not None and self._tokens[place]:
             self._set(place, RIPE)
-        for tell in self._on_arrived:
+        for tell in self._told.arrived:
             tell(point, at)
 
     def reach(self, point: Point, at: Seconds) -> None:
         """Move the token of a behavior that has passed `point`, and fire what has everything then."""
         if (transition := self.at.get(point)) is None:
             return
-        for tell in self._on_reached:
+        for tell in self._told.reached:
             tell(point, at)
         if self.part_of[point].point == point:
-            here = (point.behavior, transition)
-            if (place := self._into.get(here)) is not None:
+            if (place := self._into.get(point)) is not None:
                 self._set(place, EMPTY)
-            if (place := self._out_of.get(here)) is not None:
+            if (place := self._out_of.get(point)) is not None:
                 self._set(place, TOKEN)
-            for each in self._after.get(here, ()):
+            for each in self._after.get(point, ()):
                 self._put(each, at)
             self._latest[transition] = max(self._latest[transition], at)
             self._absent[transition] -= 1
@@ -278,7 +275,7 @@ class RunningNet:
     def _lack_less(self, transition: int) -> None:
         self._lacking[transition] -= 1
         if not self._lacking[transition]:
-            for tell in self._on_opened:
+            for tell in self._told.opened:
                 tell(transition)
 
     def _miss_less(self, transition: int, at: Seconds) -> None:
@@ -297,14 +294,17 @@ class RunningNet:
 
     def _fire_one(self, transition: int, at: Seconds) -> None:
         self.instants[transition] = at
-        for place in self._inputs[transition]:
-            if self.net.places[place].source not in self.instants or self.net.places[place].kind != "idle":
-                self._set(place, EMPTY)
-        for tell in self._on_fired:
+        for number in self.net.inputs[transition]:
+            place = self.net.places[number]
+            if place.kind != "phase" and (place.source not in self.instants or place.kind != "idle"):
+                self._set(number, EMPTY)
+        for tell in self._told.fired:
             tell(transition, at)
-        for place in self._outputs[transition]:
-            self._put(place, at)
-        if transition in self._before_end:
+        for number in self.net.outputs[transition]:
+            place = self.net.places[number]
+            if place.kind != "phase" and not place.after:
+                self._put(number, at)
+        if self._before_end[transition]:
             self._miss_less(self.end, at)
 
     def _put(self, number: int, at: Seconds) -> None:
@@ -346,8 +346,8 @@ class RunningNet:
         outlasting = {self.net.places[each].behavior for each in left}
         for number in left:
             self._set(number, RIPE)
-        for (behavior, _), number in self._into.items():
-            if behavior in outlasting:
+        for point, number in self._into.items():
+            if point.behavior in outlasting:
                 self._set(number, EMPTY)
 
     def clear(self) -> None:

@@ -24,7 +24,7 @@ from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.plan.relations import at_line
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import Point, frozen
 
 NOTICEABLE: Seconds = 0.1
 """Seconds that people notice between what they see and hear; a prediction that moves by less is not told again."""
@@ -65,14 +65,14 @@ class Reporter:
         """Time of the latest message; none after it has an earlier one."""
         self._told: dict[Point, Seconds] = {}
         """The last prediction of each point, in seconds from the block's start."""
-        self._given_up: set[tuple[str, str]] = set()
+        self._given_up: frozenset[tuple[str, str]] = frozen()
         """Times that speeches have given up, as the block says them, that were warned of."""
         self.not_before = 0.0
         """Earliest time for the next prediction."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
         """Tell that the block has begun. The problems of this plan are told apart from that."""
-        self._given_up = {(id, said) for id, all in plan.given_up.items() for said in all}
+        self._given_up = frozen((id, said) for id, all in plan.given_up.items() for said in all)
         self._character = plan.block.character_id
         at = self._bus.stamp(self._no_earlier(began))
         self._say(BlockProgress(block=self._block, progress="start", at=at, character_id=self._character))

@@ -13,7 +13,7 @@ from engage_hri.services.realizer.decide.effects import Effect
 from engage_hri.services.realizer.perform.feedback import Reporter
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.ties import Ties
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import Point, frozen
 
 
 class Holdable(Protocol):
@@ -51,9 +51,9 @@ class HeldBlock:
         self._owner = owner
         self._live_blocks = live_blocks
         self._behaviors = behaviors
-        self._stuck: Set[Point] = frozenset()
+        self._stuck: Set[Point] = frozen()
         """Points of other blocks that do not come before what is held goes on."""
-        self._standing: Set[Point] = frozenset()
+        self._standing: Set[Point] = frozen()
         """Those of them that come no nearer either."""
         self.is_holding = is_holding
 

@@ -1,7 +1,7 @@
 """Holds that are in force: on the whole robot, on blocks, on behaviors."""
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.points import EPSILON
+from engage_hri.services.realizer.points import EPSILON, frozen
 
 Named = tuple[str, str]
 """A block and a behavior of it. An empty behavior: the whole block; an empty block: the robot."""
@@ -26,7 +26,7 @@ class Holds:
         """Behaviors of the block that are held; None: all."""
         if ("", "") in self._since or (block, "") in self._since:
             return None
-        return frozenset(behavior for name, behavior in self._since if name == block)
+        return frozen(behavior for name, behavior in self._since if name == block)
 
     @property
     def in_force(self) -> list[tuple[Named, Seconds]]:

@@ -13,7 +13,7 @@ from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import at_home, block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.realizer.points import EPSILON, Point, frozen
 
 MOST_TELLINGS = 20
 """Most changes of one expected time that are told in a row. Blocks that wait for each other, by a tie and by a part
@@ -102,7 +102,7 @@ class _Tracked:
         self.named: set[Point] = set()
         self.expected: dict[Point, Seconds] = {}
         self.reached: dict[Point, Seconds] = {}
-        self.lost: frozenset[str] = frozenset()
+        self.lost: frozenset[str] = frozen()
         self.followers: list[TiedBlock] = []
 
 

@@ -18,7 +18,7 @@ from engage_hri.services.realizer.plan.handover import is_overlaid
 from engage_hri.services.realizer.plan.known import Known, at_home, block_of, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
-from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.realizer.points import EPSILON, Point, frozen
 
 MOST_PLANS = 20
 """Most plans of one block, at one time, because of parts that it hands over to others."""
@@ -67,8 +67,8 @@ class Ties:
         self._live_blocks = live_blocks
         self._blocks = blocks
         self.foreign = set(owner.plan.foreign)
-        self.foreign_ties = frozenset(point for point in owner.plan.foreign if point in owner.plan.constrained)
-        self.vanished: frozenset[str] = frozenset()
+        self.foreign_ties = frozen(point for point in owner.plan.foreign if point in owner.plan.constrained)
+        self.vanished: frozenset[str] = frozen()
         self.given: dict[str, Point] = {}
         self._met: dict[tuple[str, str], Seconds] = {}
         """When a behavior of this block was to begin, and one of another block had a part of it."""

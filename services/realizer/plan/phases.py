@@ -11,7 +11,7 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.points import ON_TARGET, Point, Segment, family, segments
+from engage_hri.services.realizer.points import ON_TARGET, Point, Segment, family, frozen, segments
 
 ARMS: Mapping[Hand, tuple[str, ...]] = {
     "LEFT_HAND": ("left_arm",), "RIGHT_HAND": ("right_arm",), "BOTH_HANDS": ("left_arm", "right_arm"),
@@ -87,7 +87,7 @@ def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...
 def natural_ends(chains: Mapping[str, Chain], relations: Relations) -> frozenset[str]:
     """Behaviors that last until something takes their place or all ends: the block does not say when they end."""
     constrained = relations.constrained
-    return frozenset(
+    return frozen(
         id
         for id, each in chains.items()
         if each.type in ON_TARGET

@@ -42,7 +42,7 @@ from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.points import Point, frozen
 
 
 def plan_block(
@@ -246,7 +246,7 @@ class _Planner:
         """
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - self._unawaited_events(present)
-        self.turns = frozenset(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
+        self.turns = frozen(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
         arranged_anew = partial(Arrangement, natural, self.known.begun, early=self.early)
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)

@@ -12,7 +12,7 @@ from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.steps import Steps, portions
-from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.realizer.points import ORIGIN, Point, frozen
 
 
 def remaining(
@@ -40,7 +40,7 @@ def remaining(
     present = Relations(
         tuple(equals),
         tuple([Order(timed(each.earlier), timed(each.later), each.placed) for each in orders]),
-        frozenset(id for id in relations.required if id not in dropped),
+        frozen(id for id in relations.required if id not in dropped),
     )
     return present, classes
 
