@@ -127,9 +127,11 @@ class _Document:
         self._note(reason, element, behavior, kind)
 
     def _note(
-        self, reason: str, element: etree._Element, behavior: str = "", kind: WarningKind = "PARSING_FAILURE"
+        self, reason: str, at: etree._Element | int, behavior: str = "", kind: WarningKind = "PARSING_FAILURE"
     ) -> None:
-        message = f"line {self._source.line(element)}: {reason}; it is ignored"
+        """at: an element, or a line."""
+        line = at if isinstance(at, int) else self._source.line(at)
+        message = f"line {line}: {reason}; it is ignored"
         self._unread.append(Unread(message=message, behavior=behavior, kind=kind))
 
     def _note_attributes(
@@ -156,9 +158,11 @@ class _Document:
 
     def _walk(self, parent: etree._Element, *, required: bool) -> None:
         """Read the content of a document, or of a <required> in it."""
-        texts = [parent.text, *(child.tail for child in parent if not self._speaks_on(child))]
-        if words := " ".join(text.strip() for text in texts if text and text.strip()):
-            self._note(f"text {words[:40]!r} outside of speech", parent)
+        behind = [child for child in parent if child.tail and child.tail.strip() and not self._speaks_on(child)]
+        text = (parent.text or "").strip()
+        if words := " ".join([*([text] if text else ()), *(str(child.tail).strip() for child in behind)]):
+            line = self._source.line_of_text(*([parent] if text else behind[:1]), is_behind=not text)
+            self._note(f"text {words[:40]!r} outside of speech", line)
         for element in parent:
             namespace, local = split(str(element.tag))
             if namespace not in READ:

@@ -87,6 +87,12 @@ class Source:
         """Line on which the element begins, from 1."""
         return self._lines.get(element, 0) or cast(int, element.sourceline or 0)
 
+    def line_of_text(self, element: etree._Element, *, is_behind: bool = False) -> int:
+        """The line on which the text of an element begins, or that behind the element."""
+        text = element.tail if is_behind else element.text
+        since = _last_line(element) if is_behind else cast(int, element.sourceline or 0)
+        return since + (text or "").partition((text or "").strip())[0].count("\n")
+
     def refusal(
         self, reason: str, element: etree._Element | None = None, *, line: int = 0, advice: str = ""
     ) -> InputRefused:
@@ -186,6 +192,16 @@ def _declaring(text: str, prefixes: Set[str]) -> str:
     end = next(tag.end(1) for tag in _TAGS.finditer(text) if tag[1])
     declarations = "".join(f' xmlns:{prefix}="{_UNKNOWN_PREFIX}{prefix}"' for prefix in sorted(prefixes))
     return f"{text[:end]}{declarations}{text[end:]}"
+
+
+def _last_line(element: etree._Element) -> int:
+    """The line on which the end tag of an element begins."""
+    last, behind = element, element.text or ""
+    for last in element.iterchildren(reversed=True):
+        behind = last.tail or ""
+        break
+    since = cast(int, element.sourceline or 0) if last is element else _last_line(last)
+    return since + behind.count("\n")
 
 
 def _start_lines(text: str) -> Iterator[int]:

@@ -328,3 +328,18 @@ def test_what_is_left_out_of_words_is_no_markup_and_the_words_around_it_stay() -
     assert speech == Speech(
         id="s", text="Well, hello you", marks=(Mark("m", 11),), markup='<b>Well</b>,  hello<mark name="m"/> you'
     )
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        ("\n\n  words <gaze id='g' target='t'/>", 3),
+        ("\n<gaze id='g'\n target='t'/>\n  words", 4),
+        ("\n<speech id='s'><text>one\ntwo</text>\n</speech> words", 4),
+        ("\n<speech id='s'><text>one\ntwo</text>\n</speech>\n\nwords\n<gaze id='g' target='t'/> more", 6),
+    ],
+)
+def test_words_outside_of_speech_are_noted_with_their_own_line(content: str, line: int) -> None:
+    (noted,) = block(content, DRAFT).unread
+
+    assert noted.message.startswith(f"line {line}: text 'words")
