@@ -3,6 +3,8 @@
 import asyncio
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
@@ -131,14 +133,14 @@ class BehaviorRun:
             outcome = await self._send().outcome
         except (RequestRefused, NeverEnded) as error:
             refused = isinstance(error, RequestRefused)
-            block.lose(self.id, error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
+            self._lose(error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
             return
         except EngageError as error:
             self.pending = None
             block.lose_body(Fault(reason=error.fault.reason, where=block.id))
             return
         if not isinstance(outcome, BehaviorOutcome):
-            block.lose(self.id, Fault(reason=f"control ended it with a {type(outcome).__name__}"))
+            self._lose(Fault(reason=f"control ended it with a {type(outcome).__name__}"))
             return
         block.spoken.end(outcome)
         if outcome.status == "lapsed":  # the body has gone home: nothing of this block can be as planned
@@ -151,7 +153,12 @@ class BehaviorRun:
         if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
             block.reach(end, at, by_body=outcome.status == "done")
         else:
-            block.lose(self.id, loss(outcome), at_rest=outcome.status != "failed")
+            self._lose(loss(outcome), at_rest=outcome.status != "failed")
+
+    def _lose(self, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+        assert self.behavior is not None
+        fault = replace(fault, line=fault.line or self.behavior.line)
+        self._block.lose(self.id, fault, kind, at_rest=at_rest)
 
     def _at_once(self) -> None:
         now = self._block.bus.now()
@@ -190,7 +197,7 @@ class BehaviorRun:
             facts = block.decisions.facts
             decision = await block.recognition.decision(event, block.plan.block, pending, facts)
         except RequestRefused as error:
-            block.lose(event.id, error.fault, kind="CANNOT_CREATE_BEHAVIOR")
+            self._lose(error.fault, "CANNOT_CREATE_BEHAVIOR")
         else:
             end = Point(event.id, "end")
             block.reach(end, max(began, decision.at), by_body=decision.by_recognition)

@@ -273,7 +273,8 @@ class BlockPerformance:
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
-                self.lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
+                line = self.plan.chains[id].behavior.line
+                self.lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue", line=line))
                 return True
         return False
 
@@ -332,7 +333,8 @@ class BlockPerformance:
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
-                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=f"{self.id}: {id}")))
+                where = f"{self.id}: {id}"
+                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=where, line=fault.line)))
         self._let_go(id)
         self.plan_again()
 
