@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
+from engage_hri.schemas.behaviors import Event, Gaze, Gesture, Mark, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.net.petri_net import Place
+from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
@@ -229,3 +230,24 @@ def test_a_word_that_cannot_wait_goes_on_and_the_instant_fires_with_the_last() -
     assert decisions.net.instants[word] == 12.0
     assert decisions.net.instants[plan.at[Point("s", "end")]] == 12.0
     assert decisions.net.passed[plan.at[Point("s", "end")]] == 11.5
+
+
+def test_an_event_that_is_decided_before_its_instant_fires_leaves_the_initial_marking() -> None:
+    made = block(
+        (
+            Speech(id="s", text="one two"),
+            Event(id="e", kind="directed_gaze", responder="human", objects=("blue-square",)),
+        ),
+        together("s:start", "e:start"),
+    )
+    plan = plan_block(made, [FakeBody().estimate(made.behaviors[0])])
+    net = RunningNet(plan.net, plan.members, plan.at)
+    net.start(0.0)
+    for id in ("e", "s"):
+        net.begin(id, 0.0)
+    for number, point in enumerate((Point("e", "start"), Point("e", "end"), Point("s", "start"), Point("s", "end"))):
+        net.reach(point, number / 10)
+
+    assert any(place.kind == "idle" and place.behavior == "e" for place in plan.net.places)
+    assert net.is_over
+    assert net.marking == plan.net.initial
