@@ -21,7 +21,7 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
-from tests.realizer.stage import block
+from tests.realizer.stage import after, block
 
 LATE: Seconds = 100.0
 BODY = FakeBody()
@@ -218,6 +218,15 @@ def test_words_that_are_said_wait_for_nothing() -> None:
     made.reach("b1", "s:start")
 
     assert syncs(made, "g:end", "b1:s") == []
+
+
+def test_what_is_left_of_an_instant_waits_though_a_word_has_passed_it() -> None:
+    made = World()
+    made.add(block((ARM,), id="b0"))
+    made.add(block((WORDS, timed(OTHER_ARM, stroke_end="s:m")), after("b0:g:relax", "s:m"), id="b1"))
+    made.reach("b1", "s:start", "s:m", "h:start", "h:ready", "h:stroke_start", "h:stroke")
+
+    assert sorted(syncs(made, "g:relax", "b1:h")) == ["end", "relax", "stroke_end"]
 
 
 def test_nobody_waits_for_what_has_been() -> None:

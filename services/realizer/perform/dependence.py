@@ -145,14 +145,14 @@ class _Followed:
         """
         if name not in self.out:
             plan, waiting = self.plans[name], self._waiting(name)
-            net, past = plan.net, self._past(name)
+            net = plan.net
             is_open = [not waiting.isdisjoint(transition.points) for transition in net.transitions]
             out: dict[int, list[tuple[int, Seconds]]] = defaultdict(list)
             ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
             for number in range(len(net.transitions) - 1):
                 out[number].append((len(net.transitions) - 1, 0.0))  # the end waits for all that is tied, too
             for tie in ties:
-                if tie.kind in UNAWAITED or tie.target in past or not tie.target:
+                if tie.kind in UNAWAITED or not tie.target:
                     continue
                 if isinstance(tie, Place):
                     is_awaited = is_open[tie.source] or not (tie.kind == "phase" or tie.after in plan.chains)
@@ -162,22 +162,6 @@ class _Followed:
                     out[tie.source].append((tie.target, seconds))
             self.out[name] = out
         return self.out[name]
-
-    def _past(self, name: str) -> Set[int]:
-        """Transitions of a block that nothing waits for any more, also of what was tied to other blocks there."""
-        plan, reached = self.plans[name], self.live_blocks.reached(name)
-        net, found = plan.net, set[int]()
-        for number, transition in enumerate(net.transitions[:-1]):  # numbered as they can fire
-            own = all(
-                self.live_blocks.is_past(each) if is_foreign(each.behavior) else each in reached
-                for each in transition.points
-                if each.behavior
-            )
-            before = (net.places[each] for each in net.inputs[number])
-            has_begun = number or BLOCK_START in reached
-            if has_begun and own and all(each.source in found for each in before if each.kind not in UNAWAITED):
-                found.add(number)
-        return found
 
 
 def _least(tie: Place | Bound, plan: Plan) -> Seconds:
