@@ -10,6 +10,9 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.services.realizer.plan.assembly import Assembler
 from engage_hri.services.realizer.plan.handover import Arrangement
+from engage_hri.services.realizer.plan.known import Known, holders_of, qualified
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
@@ -345,3 +348,19 @@ async def test_blocks_that_queue_for_the_voice_are_planned_in_few_rounds(
 
     assert [each.status for each in outcomes] == ["done"] * 12
     assert rounds < 12 * 12
+
+
+def test_who_takes_a_part_after_a_stroke_by_plan_waits_for_that_stroke() -> None:
+    """The stroke may turn out slow: the earlier block is late then, and the later one is not to take its arm."""
+    body = FakeBody()
+    other = plan_block(block((RIGHT,), id="a"), [body.estimate(RIGHT)])
+    kept = frozenset(other.constrained)
+    holders = holders_of("a", other.chains, other.estimates, other.natural, kept, (), lambda id: 1, {})
+    times = {qualified("a", point): other.predicted(point) - 1.0 for point in other.chains["q"].points}
+    known = Known(blocks={"a": other.block}, points=times, holders=dict(holders))
+    later = timed(Gesture(id="r", lexeme="BEAT", mode="RIGHT_HAND"), start="0.75")
+
+    plan = plan_block(block((later,), id="b"), [body.estimate(later)], known=known)
+
+    assert times[Point("a:q", "stroke_end")] < 0.75 < times[Point("a:q", "end")]
+    assert [str(point) for point in plan.foreign] == ["a:q:stroke_end"]
