@@ -3,7 +3,7 @@
 import asyncio
 import sys
 from collections.abc import AsyncIterator, Iterable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -11,7 +11,6 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline import roster
@@ -48,9 +47,6 @@ class Options(Written, Simulated, Listening):
 def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
     config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
-    if options.in_one and config.bus.keys:
-        reason = "one process has the keys of one holder, and may do what that one may"
-        raise InputRefused(Fault(reason=reason, where="--in-one", advice="leave it out, or the keys"))
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         run_until_signal(_up(options, config, outputs, console))
@@ -69,8 +65,12 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
         live = options.task and console.is_terminal and not options.quiet
         with scene_view(console, config.robot, bus.now(), live) as show:
             sinks = (show, tallying, outputs) if options.task else (outputs,)
-            serving = in_one(services, hub, console) if services else _each(options, config, console)
-            async with following(bus, sinks), serving as life, asyncio.TaskGroup() as group:
+            async with AsyncExitStack() as stack:
+                await stack.enter_async_context(following(bus, sinks))
+                hubs = await _hubs(options, config, services, hub, stack)
+                serving = in_one(services, hubs, console) if services else _each(options, config, console)
+                life = await stack.enter_async_context(serving)
+                group = await stack.enter_async_context(asyncio.TaskGroup())
                 holding = group.create_task(claim.held_until(life.up), name="claim")
                 await life.over.wait()
                 holding.cancel()
@@ -107,12 +107,21 @@ async def _each(options: Options, config: Config, console: Console) -> AsyncIter
         yield Life(arrivals.complete, children[TASK].ended if options.task else asyncio.Event())
 
 
+async def _hubs(
+    options: Options, config: Config, names: Iterable[str], hub: Hub, stack: AsyncExitStack
+) -> dict[str, Hub]:
+    """The hub of each service in this process: `hub`, or one of its own with its keys."""
+    if not config.bus.keys:
+        return dict.fromkeys(names, hub)
+    return {name: await stack.enter_async_context(await options.open(config.bus, name)) for name in names}
+
+
 @asynccontextmanager
-async def in_one(services: Mapping[str, Service], hub: Hub, console: Console) -> AsyncIterator[Life]:
-    """Run the services in this process, on this hub. The error that ends one of them is raised."""
+async def in_one(services: Mapping[str, Service], hubs: Mapping[str, Hub], console: Console) -> AsyncIterator[Life]:
+    """Run the services in this process, each on its hub. The error that ends one of them is raised."""
     arrivals, over = Arrivals(services, console), asyncio.Event()
     task = {TASK: ending(services[TASK], over)} if TASK in services else {}
-    async with running(hub, {**services, **task}):
+    async with running(hubs, {**services, **task}):
         for name in services:
             arrivals(name)
         yield Life(arrivals.complete, over)

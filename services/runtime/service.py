@@ -99,12 +99,16 @@ def installed_version() -> str:
 
 
 @asynccontextmanager
-async def running(hub: Hub, services: Mapping[str, Service]) -> AsyncIterator[None]:
-    """Run services in this process. The body of `async with` starts when all are ready, and its end stops them."""
+async def running(hub: Hub | Mapping[str, Hub], services: Mapping[str, Service]) -> AsyncIterator[None]:
+    """Run services in this process. The body of `async with` starts when all are ready, and its end stops them.
+
+    hub: that of all, or of each by name.
+    """
+    hubs = dict.fromkeys(services, hub) if isinstance(hub, Hub) else hub
     standing = {name: asyncio.Event() for name in services}
     async with asyncio.TaskGroup() as group:
         tasks = [
-            group.create_task(_serve_for_ever(hub, name, service, standing[name]), name=f"service {name}")
+            group.create_task(_serve_for_ever(hubs[name], name, service, standing[name]), name=f"service {name}")
             for name, service in services.items()
         ]
         try:

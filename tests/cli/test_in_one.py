@@ -9,9 +9,10 @@ from rich.console import Console
 
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.commandline.certificates import initialize
 from engage_hri.services.commandline.up import TASK, in_one
 from engage_hri.services.runtime.service import Ready
-from tests.bus.places import free_endpoint
+from tests.bus.places import OWN_ADDRESS, free_endpoint
 from tests.cli.command import GOOD_BLOCK, start
 from tests.cli.test_processes import PATIENCE, children, line, stopped, strangers
 
@@ -43,15 +44,42 @@ async def test_it_performs_what_is_played_in_one_process_and_ends_with_ctrl_c(tm
 
 
 @pytest.mark.real_time
-async def test_one_process_has_the_keys_of_one_holder(tmp_path: Path) -> None:
-    up = await start("up", "--in-one", "--set", f'bus.keys="{tmp_path}"')
-    async with asyncio.timeout(PATIENCE):
-        out, err = await up.communicate()
+async def test_with_keys_each_service_in_the_process_has_its_own(tmp_path: Path) -> None:
+    ring, endpoint = tmp_path / "ring", free_endpoint().replace("tcp/", "tls/")
+    initialize(ring, "closed", [("manager", "alice")], [OWN_ADDRESS], 2)
+    (tmp_path / "block.xml").write_text(GOOD_BLOCK)
+    where = ("--robot", "closed", "--connect", endpoint, "--keys")
+    router = await start("router", "--listen", endpoint, "--keys", ring)
+    up = await start("up", "--in-one", *where, ring)
+    try:
+        await line(up, "all services are up", log=False)
+        play = await start("play", *where, ring / "alice", tmp_path / "block.xml")
+        async with asyncio.timeout(PATIENCE):
+            out, _ = await play.communicate()
 
-    assert (up.returncode, out) == (2, b"")
-    assert err.decode() == (
-        "--in-one: one process has the keys of one holder, and may do what that one may (leave it out, or the keys)\n"
-    )
+        assert play.returncode == 0
+        assert b"block hello: done" in out
+        assert children(up.pid) == []
+    finally:
+        codes = [await stopped(each) for each in (up, router)]
+
+    assert codes == [0, 0]
+
+
+@pytest.mark.real_time
+async def test_the_keys_of_one_holder_are_not_those_of_the_services(tmp_path: Path) -> None:
+    ring, endpoint = tmp_path / "ring", free_endpoint().replace("tcp/", "tls/")
+    initialize(ring, "closed", [("manager", "alice")], [OWN_ADDRESS], 2)
+    router = await start("router", "--listen", endpoint, "--keys", ring)
+    up = await start("up", "--in-one", "--robot", "closed", "--connect", endpoint, "--keys", ring / "alice")
+    try:
+        async with asyncio.timeout(PATIENCE):
+            _, err = await up.communicate()
+    finally:
+        await stopped(router)
+
+    assert up.returncode == 2
+    assert "control: the keys are those of 'alice', not of 'control'" in err.decode()
 
 
 async def lives(bus: Bus, ready: Ready, *, seconds: float, fails: bool = False) -> None:
@@ -64,7 +92,7 @@ async def lives(bus: Bus, ready: Ready, *, seconds: float, fails: bool = False) 
 async def test_the_task_is_over_when_its_service_ends() -> None:
     services = {"control": partial(lives, seconds=100.0), TASK: partial(lives, seconds=7.0)}
     loop = asyncio.get_running_loop()
-    async with MemoryHub() as hub, in_one(services, hub, Console(quiet=True)) as life:
+    async with MemoryHub() as hub, in_one(services, dict.fromkeys(services, hub), Console(quiet=True)) as life:
         assert life.up.is_set()
         await life.over.wait()
 
@@ -74,7 +102,7 @@ async def test_the_task_is_over_when_its_service_ends() -> None:
 async def test_a_service_that_crashes_ends_all() -> None:
     services = {"control": partial(lives, seconds=100.0), "realizer": partial(lives, seconds=7.0, fails=True)}
     with pytest.raises(ExceptionGroup) as raised:
-        async with MemoryHub() as hub, in_one(services, hub, Console(quiet=True)) as life:
+        async with MemoryHub() as hub, in_one(services, dict.fromkeys(services, hub), Console(quiet=True)) as life:
             await life.over.wait()
 
     assert raised.group_contains(KeyError, match="lost", depth=1)

@@ -33,6 +33,7 @@ from engage_hri.services.bus.zenoh.session import (
     QOS,
     RENDEZVOUS,
     ROUTER_WITH_KEYS,
+    RUST_PLACE,
     STREAM_QOS,
     LoopBridge,
     open_client,
@@ -183,7 +184,10 @@ class ZenohHub(Hub):
         self.peers.close()
         for publisher in self._publishers.values():
             publisher.undeclare()  # type: ignore[no-untyped-call]
-        self.session.close()  # type: ignore[no-untyped-call]
+        try:
+            self.session.close()  # type: ignore[no-untyped-call]
+        except zenoh.ZError as error:  # a link that is stuck at the other end: all that is ours has been given back
+            LOG.warning("the bus could not be closed in time: %s", RUST_PLACE.sub("", str(error)))
 
     # -- publishing ---------------------------------------------------------------------------------------------
 
