@@ -1,8 +1,12 @@
 """Reading of the sentence about points that wait for each other in a circle: each step as two points and seconds."""
 
 import re
+from math import inf
 
+UNSAID = inf
+"""Seconds of a step of which it is not said how long it takes."""
 STEPS = (
+    (r"(?P<behavior>\S+) lasts from (?P<since>.+) to (?P<to>.+)", 1),
     (r"(?P<behavior>\S+) takes (?P<seconds>\S+) s from (?P<since>.+) to (?P<to>.+)", 1),
     (r"(?P<behavior>\S+) takes at most (?P<seconds>\S+) s from (?P<to>.+) to (?P<since>.+)", -1),
     (r"(?P<to>.+) is (at least )?(?P<seconds>\S+) s after (?P<since>.+)", 1),
@@ -25,7 +29,7 @@ def _step(text: str) -> Step:
         if (found := re.fullmatch(form, text)) and not (sign > 0 and " at most " in text):
             names = found.groupdict()
             since, to = (tuple(names[end].split(" = ")) for end in ("since", "to"))
-            return since, to, sign * float(names.get("seconds") or 0.0)
+            return since, to, UNSAID if " lasts from " in text else sign * float(names.get("seconds") or 0.0)
     raise AssertionError(f"not a step: {text!r}")
 
 

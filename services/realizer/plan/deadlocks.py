@@ -183,7 +183,7 @@ def _deadlock(circle: Circle, net: PetriNet, orders: Sequence[Order], classes: C
     ties = [tie for tie, _ in circle]
     lines = sorted({line for tie in ties for line in tie.lines} | _lines_of_instants(ties, net, orders, classes))
     fault = Fault(
-        reason=f"these points wait for each other in a circle: {way_round(net, circle)}",
+        reason=f"these points wait for each other in a circle: {way_round(net, circle, is_timed=False)}",
         where=block,
         line=lines[0] if lines else 0,
         advice="leave one of them out" + (f"; see lines {', '.join(map(str, lines))}" if len(lines) > 1 else ""),
@@ -191,8 +191,11 @@ def _deadlock(circle: Circle, net: PetriNet, orders: Sequence[Order], classes: C
     return BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
 
 
-def way_round(net: PetriNet, circle: Circle) -> str:
-    """Words for each tie of a circle; phases of a behavior that follow one another are said as one."""
+def way_round(net: PetriNet, circle: Circle, *, is_timed: bool = True) -> str:
+    """Words for each tie of a circle; phases of a behavior that follow one another are said as one.
+
+    is_timed: False if it is a circle however long its behaviors take; then it is not said how long they do.
+    """
     ours = [_phase_of(tie) for tie, _ in circle]
     first = next((number for number, id in enumerate(ours) if not id or id != ours[number - 1]), 0)
     said = []
@@ -200,7 +203,8 @@ def way_round(net: PetriNet, circle: Circle) -> str:
         ties = list(run)
         if id:
             since, to = (net.transitions[end].name for end in (ties[0][0].source, ties[-1][0].target))
-            said.append(f"{id} takes {_seconds(sum(seconds for _, seconds in ties))} from {since} to {to}")
+            long = f"takes {_seconds(sum(seconds for _, seconds in ties))}" if is_timed else "lasts"
+            said.append(f"{id} {long} from {since} to {to}")
         else:
             said += [_said(net, tie, seconds) for tie, seconds in ties]
     return ", ".join(said)
