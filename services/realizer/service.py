@@ -28,7 +28,7 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
-from engage_hri.services.realizer.perform.live import Ending, Live, told
+from engage_hri.services.realizer.perform.live import Ending, Live, absence, told
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance
@@ -125,7 +125,7 @@ class _Realizer:
         with self.desk.serving(request):
             performance = next((each for each in self.performing() if each.id == block), None)
             if performance is None or not performance.is_going_on(behavior):
-                self.desk.refuse(request.id, Fault(reason="it is not being performed", where=f"{block}: {behavior}"))
+                self.desk.refuse(request.id, absence(block, behavior, self.live.values()))
                 return
             self.desk.accept(request.id)
             was_done = await performance.interrupt(behavior)

@@ -42,7 +42,10 @@ async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() ->
             still = "still held: b, as a part of more that is held (`engage watch --only holds` says what)"
             assert await said(await start("steer", "continue", "b", *where)) == (0, still, "")
             code, _, error = await said(await start("steer", "hold", "b", "wave", *where))
-            assert (code, error) == (2, "b: wave: it is not being performed")
+            assert (code, error) == (
+                2,
+                "b: wave: it is not being performed: block 'b' has no behavior 'wave' (known: beat)",
+            )
             assert not performing.done()  # the robot is held still
             assert await said(await start("steer", "continue", *where)) == (0, "continued: b", "")
             assert (await asyncio.wait_for(performing, PATIENCE)).status == "done"

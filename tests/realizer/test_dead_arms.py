@@ -65,7 +65,7 @@ async def test_an_arm_that_comes_after_all_is_told_with_the_constraint_and_by_ho
     assert skew > 1.0
     assert len(late) == 2
     assert "overdue" in late[0]
-    assert late[1].endswith(f"stroke came {skew:.2f} s later than it should: r:stroke = s:end")
+    assert late[1].endswith(f"stroke came {skew:.2f} s later than it should be: r:stroke = s:end")
 
 
 @pytest.mark.parametrize("seconds", [0.8, 1.5, None])

@@ -173,7 +173,7 @@ async def test_who_is_too_late_for_what_came_before_it_says_so() -> None:
 
     assert (seen.times()["p:stroke"], seen.times()["s:m"]) == (2.0, 1.75)
     assert [(each.kind, each.behavior, each.message) for each in seen.warnings()] == [
-        ("LATE", "p", "stroke came 0.75 s later than it should: p:stroke+0.5 = s:m")
+        ("LATE", "p", "stroke came 0.75 s later than it should be: p:stroke+0.5 = s:m")
     ]
 
 

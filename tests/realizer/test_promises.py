@@ -80,7 +80,7 @@ async def test_what_should_have_come_before_a_point_of_another_block_that_is_fas
 
     assert instants(seen)["two:q:stroke"] > instants(seen)["one:s:end"] - 0.5 + 0.1
     assert warned(seen) == [("two", "q", "LATE")]
-    assert "later than it should: q:stroke = one:s:end-0.5" in seen.warnings()[0].message
+    assert "later than it should be: q:stroke = one:s:end-0.5" in seen.warnings()[0].message
 
 
 @pytest.mark.parametrize("ref", ["one:s:m1", "one:bml:start"])
@@ -91,7 +91,7 @@ async def test_what_is_past_as_a_block_begins_is_told_at_once(ref: str) -> None:
 
     assert warning.at is not None
     assert (warning.behavior, warning.kind, warning.at.seconds) == ("t", "LATE", 1.5)
-    assert f"later than it should: t:start = {ref}" in warning.message
+    assert f"later than it should be: t:start = {ref}" in warning.message
     assert len(seen.warnings()) == 1
 
 
@@ -100,7 +100,7 @@ async def test_an_order_with_a_point_of_another_block_that_is_past_is_told() -> 
     seen, _ = await told((0.0, block((WORDS,), id="one")), (1.5, tied))
 
     assert [(each.behavior, each.kind) for each in seen.warnings()] == [("h", "LATE")]
-    assert "1.50 s later than it should: h:start <= one:s:m1" in seen.warnings()[0].message
+    assert "1.50 s later than it should be: h:start <= one:s:m1" in seen.warnings()[0].message
 
 
 LATE_XML = """<bml id="b">
@@ -128,7 +128,7 @@ async def test_what_is_late_is_told_with_the_line_that_asks_for_it(said: str, me
 
     (warning,) = [each for each in seen.warnings() if each.kind == "LATE" and "should" in each.message]
     assert re.fullmatch(
-        rf"line 5: stroke came \d\.\d\d s later than it should: {re.escape(message)}", warning.message
+        rf"line 5: stroke came \d\.\d\d s later than it should be: {re.escape(message)}", warning.message
     )
 
 

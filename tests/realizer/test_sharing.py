@@ -246,7 +246,7 @@ async def test_a_stroke_that_has_been_made_too_early_is_told() -> None:
 
     assert instants(seen)["two:q:stroke"] < 5.0 - 0.1
     assert warned(seen) == [("two", "q", "LATE")]
-    assert "earlier than it should: q:stroke = one:bml:end+0.25" in seen.warnings()[0].message
+    assert "earlier than it should be: q:stroke = one:bml:end+0.25" in seen.warnings()[0].message
 
 
 async def test_the_first_prediction_knows_what_another_block_expects() -> None:
@@ -280,7 +280,7 @@ async def test_a_point_that_is_expected_after_a_fixed_time_is_not_waited_for() -
 
     planned = seen.warnings()[0]
     assert (planned.block, planned.kind) == ("two", "LATE")
-    assert "earlier than it should: f:stroke = one:s:end" in planned.message
+    assert "earlier than it should be: f:stroke = one:s:end" in planned.message
     assert outcomes[1].dropped == ()
     times = instants(seen)
     assert (times["two:f:start"], times["two:f:relax"]) == (1.0, 1.5)

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 from msgspec import Struct
@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.services.realizer.perform.live_blocks import as_told
 
 Status = Literal["done", "failed", "interrupted"]
@@ -27,6 +28,19 @@ def told(fault: Fault) -> Fault:
     """The fault with the ids of blocks for their names."""
     texts = {"reason": fault.reason, "where": fault.where, "advice": fault.advice}
     return replace(fault, **{field: as_told(text) for field, text in texts.items()})
+
+
+def absence(block: str, behavior: str, live: Iterable["Live"]) -> Fault:
+    """Fault that a block, or a behavior of it, is not being performed. live: all live blocks."""
+    where, named = f"{block}: {behavior}" if behavior else block, {each.id: each for each in live}
+    if block not in named:
+        reason, advice = f"no live block is called {block!r}", suggestion(block, named, "none is live")
+    elif behavior not in (known := {each.id for each in named[block].block.behaviors}):
+        reason = f"block {block!r} has no behavior {behavior!r}"
+        advice = suggestion(behavior, known, "it has no behaviors")
+    else:
+        reason, advice = "it has ended, or was dropped, or its block has yet to begin", ""
+    return Fault(reason=f"it is not being performed: {reason}", where=where, advice=advice)
 
 
 class Live:

@@ -12,7 +12,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.holding import Holds, Named
-from engage_hri.services.realizer.perform.live import Ending, Live
+from engage_hri.services.realizer.perform.live import Ending, Live, absence
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.requests.ends import RequestDesk
@@ -54,9 +54,10 @@ class Steering:
             performances = [each for each in self._performances.values() if each.id == block]
             going_on = any(each.is_going_on(behavior) for each in performances) if behavior else concerned
             if isinstance(request, SteerPerformance) and not (block and going_on):
-                where = f"{block}: {behavior}" if behavior else block
-                advice = "" if block else f"what is for the whole robot is `steer_robot`, on {keys.ROBOT}"
-                self._desk.refuse(request.id, Fault(reason="it is not being performed", where=where, advice=advice))
+                fault = absence(block, behavior, self._live.values())
+                if not block:
+                    fault = Fault(reason="names no block", advice=f"the whole robot: `steer_robot`, on {keys.ROBOT}")
+                self._desk.refuse(request.id, fault)
                 return
             self._desk.accept(request.id)
             match request.to:

@@ -40,7 +40,7 @@ class Broken(Struct, frozen=True):
 
     def told(self, verb: str) -> str:
         """The sentence of a warning, with its place. verb: `came`, or `is planned`."""
-        reason = f"{self.point.sync} {verb} {self.seconds:.2f} s {self.direction} than it should: {self.said}"
+        reason = f"{self.point.sync} {verb} {self.seconds:.2f} s {self.direction} than it should be: {self.said}"
         return at_line(self.line, reason)
 
 

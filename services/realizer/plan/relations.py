@@ -174,9 +174,8 @@ class _Reader:
             return Term(Point(behavior.id, sync), ref.offset, text, line)  # It is dropped with its behavior.
         strokes = behavior.repetition if isinstance(behavior, Head) else 1
         if not self._has(behavior, sync) or ref.repetition > strokes:
-            return Problem(
-                "PARSING_FAILURE", f"{where}: {type_name(behavior)} has no sync point {text!r}", behavior.id
-            )
+            lacks = f"{where}: {self._lacks(behavior, text, ref.sync)}"
+            return Problem("PARSING_FAILURE", lacks, behavior.id)
         return Term(Point(behavior.id, sync), ref.offset, text, line, ref.repetition)
 
     def _has(self, behavior: Behavior, sync: str) -> bool:
@@ -185,11 +184,18 @@ class _Reader:
         is_known = spelled is not None and sync in self.points[behavior.id]
         return is_known or isinstance(behavior, Unknown)
 
+    def _lacks(self, behavior: Behavior, text: str, sync: str) -> str:
+        """Say that the behavior has no such point, and which was meant. text: what is written."""
+        kind = type_name(behavior)
+        spelled = (dialect_sync(each, kind, self.block.dialect) for each in self.points[behavior.id])
+        advice = suggestion(sync, [each for each in spelled if each is not None])
+        return f"{kind} has no sync point {text!r} ({advice})"
+
     def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
         """The term for a point of another block, spelled as in this one."""
         if ref.block not in self.elsewhere:
             advice = suggestion(ref.block, self.elsewhere, "none is live")
-            advice = f"a block can be named from its request to its end; {advice}"
+            advice = f"only blocks that came earlier can be named, until they end; {advice}"
             raise self.refusal(f"{text!r}: no live block is called {ref.block!r}", where, line, advice)
         other = self.elsewhere[ref.block]
         if ref.block not in self.theirs:
@@ -274,7 +280,7 @@ class _Reader:
             if self._has(behavior, sync):
                 other = self.term(timing.ref, behavior.id, behavior.line)
             else:
-                other = Problem("PARSING_FAILURE", f"{type_name(behavior)} has no sync point {timing.sync!r}")
+                other = Problem("PARSING_FAILURE", self._lacks(behavior, timing.sync, timing.sync))
             if isinstance(other, Problem) and isinstance(behavior, Speech) and behavior.id not in self.required:
                 message = at_line(behavior.line, f"{other.message}; it is ignored")
                 self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
