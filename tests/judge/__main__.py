@@ -157,6 +157,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     kinds.add_argument("--streams", dest="kind", action="store_const", const="streams", help="several blocks each")
     kinds.add_argument("--sentences", dest="kind", action="store_const", const="sentences", help="untimed sentences")
     kinds.add_argument("--webs", dest="kind", action="store_const", const="webs", help="blocks tied to each other")
+    kinds.add_argument("--crowds", dest="kind", action="store_const", const="crowds", help="many small blocks")
     parser.set_defaults(kind="alone")
     parser.add_argument("--faults", action="store_true", help="a body that is slow, stalls, fails, loses reports")
     parser.add_argument("--holds", action="store_true", help="parts of the stories are held for a while")

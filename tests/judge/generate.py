@@ -6,12 +6,13 @@ from typing import Any, Literal
 from xml.sax.saxutils import escape
 
 from tests.judge import reading
+from tests.judge.crowds import crowd
 from tests.judge.parts import Element, Made, offset
 from tests.judge.story import Deed, DeedKind, Story
 from tests.judge.webs import web
 
-Kind = Literal["alone", "streams", "sentences", "webs"]
-KINDS: tuple[Kind, ...] = ("alone", "streams", "sentences", "webs")
+Kind = Literal["alone", "streams", "sentences", "webs", "crowds"]
+KINDS: tuple[Kind, ...] = ("alone", "streams", "sentences", "webs", "crowds")
 TARGETS = ("cup", "box", "lamp", "human")
 SENTENCES = (
     "This one here.",
@@ -37,7 +38,7 @@ def story(seed: int, number: int, kind: Kind, *, faults: bool = False, holds: bo
     """A story. holds: the same, and parts of it are held for a while."""
     name = f"{seed}/{kind}/{number}"
     chance = Random(name)
-    make = {"alone": _alone, "streams": _stream, "sentences": _sentences, "webs": web}[kind]
+    make = {"alone": _alone, "streams": _stream, "sentences": _sentences, "webs": web, "crowds": crowd}[kind]
     deeds = make(chance)
     if holds:
         deeds = _with_holds(Random(f"{name}/holds"), deeds)
