@@ -1,4 +1,4 @@
-"""Random stories of many small blocks that come together, tied, and are disturbed: each story is of one of `_KINDS`."""
+"""Random stories of many small blocks that come together, tied and disturbed: each story is one of `_KINDS`."""
 
 from collections.abc import Callable, Sequence
 from random import Random
