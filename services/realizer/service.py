@@ -123,15 +123,18 @@ class _Realizer:
         """End one behavior of a block, and answer what came of it."""
         block, behavior = request.block, request.behavior
         with self.desk.serving(request):
-            performance = next((each for each in self.performing() if each.id == block), None)
-            if performance is None or not performance.is_going_on(behavior):
+            live = next((each for each in self.live.values() if each.id == block), None)
+            if live is None or not self.steering.is_going_on(live, behavior):
                 self.desk.refuse(request.id, absence(block, behavior, self.live.values()))
                 return
             self.desk.accept(request.id)
-            was_done = await performance.interrupt(behavior)
-            said = performance.spoken.of(behavior)
-            text = said.text if said is not None else ""
-            end = BehaviorInterrupted(id=request.id, block=block, behavior=behavior, spoken=text, was_done=was_done)
+            end = BehaviorInterrupted(id=request.id, block=block, behavior=behavior)
+            if (performance := self.performances.get(live.request.id)) is None:
+                live.taken_out[behavior] = ""
+            else:
+                was_done = await performance.interrupt(behavior)
+                said = performance.spoken.of(behavior)
+                end = replace(end, spoken=said.text if said is not None else "", was_done=was_done)
             self.desk.end(end)
 
     def _hear_word(self, word: WordSpoken) -> None:

@@ -17,11 +17,12 @@ from engage_hri.schemas.behaviors import (
     Speech,
     Wait,
 )
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, Steer
+from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import block, stage
-from tests.realizer.steering import interrupt
+from tests.realizer.steering import interrupt, steered
 from tests.realizer.test_sharing import MORE, RIGHT, WORDS, instants, mispredicted, told
 
 SMILE = FaceLexeme(id="f", lexeme="SMILE")
@@ -167,3 +168,40 @@ async def test_a_part_is_not_taken_by_plan_from_a_block_whose_end_the_taker_wait
         await asyncio.wait_for(asyncio.gather(*(each.outcome for each in asked)), 60.0)
 
     assert seen.warnings() == []
+
+
+@pytest.mark.parametrize("to", ["hold", "stop"])
+async def test_a_behavior_of_a_block_that_waits_is_held_or_taken_out_before_it_begins(to: Steer) -> None:
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=1.0),), id="one"))
+        second = seen.ask(appended(MORE, Head(id="n", lexeme="NOD"), id="two"))
+        await asyncio.sleep(0.5)
+        await steered(seen, to, "two", "t")
+        with pytest.raises(RequestRefused, match="block 'two' has no behavior 'tt'"):
+            await steered(seen, to, "two", "tt")
+        await asyncio.sleep(4.5)
+        assert "two:n:end" in instants(seen)
+        assert "two:t:start" not in instants(seen)
+        if to == "hold":
+            await steered(seen, "continue", "two", "t")
+        await asyncio.gather(first.outcome, second.outcome)
+
+    outcome = second.outcome.result()
+    assert isinstance(outcome, BlockOutcome)
+    assert (outcome.status, outcome.interrupted) == ("done", ("t",) if to == "stop" else ())
+    assert instants(seen).get("two:t:start") == (5.0 if to == "hold" else None)
+
+
+async def test_a_behavior_of_a_block_that_waits_is_interrupted_once() -> None:
+    async with stage() as seen:
+        first = seen.ask(block((Wait(id="w", duration=1.0),), id="one"))
+        second = seen.ask(appended(MORE, Head(id="n", lexeme="NOD"), id="two"))
+        await asyncio.sleep(0.5)
+        said = await interrupt(seen.requests, "two", "t").outcome
+        assert isinstance(said, BehaviorInterrupted)
+        assert (said.spoken, said.was_done) == ("", False)
+        with pytest.raises(RequestRefused, match="it has ended, or was"):
+            await steered(seen, "stop", "two", "t")
+        await asyncio.gather(first.outcome, second.outcome)
+
+    assert [(each.block, each.behavior, each.kind) for each in seen.warnings()] == [("two", "t", "INTERRUPTED")]

@@ -71,12 +71,14 @@ class Reporter:
         """Earliest time for the next prediction."""
 
     def started(self, plan: Plan, began: Seconds) -> None:
-        """Tell that the block has begun. The problems of this plan are told apart from that."""
+        """Tell that the block has begun, when its points are expected, and the problems of its plan."""
         self._given_up = frozen((id, said) for id, all in plan.given_up.items() for said in all)
         self._character = plan.block.character_id
         at = self._bus.stamp(self._no_earlier(began))
         self._say(BlockProgress(block=self._block, progress="start", at=at, character_id=self._character))
         self._predict(plan, began, {point: plan.predicted(point) for point in _points(plan)})
+        for problem in plan.problems:
+            self.warn(problem.kind, problem.message, problem.behavior)
 
     def now(self) -> Seconds:
         """Present loop time."""

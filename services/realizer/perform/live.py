@@ -39,7 +39,7 @@ def absence(block: str, behavior: str, live: Iterable["Live"]) -> Fault:
         reason = f"block {block!r} has no behavior {behavior!r}"
         advice = suggestion(behavior, known, "it has no behaviors")
     else:
-        reason, advice = "it has ended, or was dropped, or its block has yet to begin", ""
+        reason, advice = "it has ended, or was dropped or interrupted", ""
     return Fault(reason=f"it is not being performed: {reason}", where=where, advice=advice)
 
 
@@ -68,11 +68,17 @@ class Live:
         """Blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
         self.ended_by: Live | None = None
         """The leader that it ends with."""
+        self.taken_out: dict[str, str] = {}
+        """Behaviors that were interrupted before it has begun, each with the reason if one was given."""
         self._followers: list[Live] = []
         for leader in self.leaders:
             leader._followers.append(self)
             if leader.ending.done():
                 self._end_with(leader)
+
+    def has_yet(self, behavior: str) -> bool:
+        """True if a behavior is to be performed when it begins."""
+        return behavior not in self.taken_out and any(each.id == behavior for each in self.block.behaviors)
 
     def settle(self) -> None:
         """Let blocks that came later be planned."""

@@ -7,6 +7,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.blocks import Block, BlockOutcome, SpokenText
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.perform.live_blocks import as_told
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.relations import DROPPED
 
 _BEHAVIORS = ("BEHAVIOR_TYPE_NOT_SUPPORTED", "CUSTOM_BEHAVIOR_NOT_SUPPORTED")
 """Kinds of the notes about behaviors without an id, which no list of a block's behaviors has."""
@@ -50,3 +52,9 @@ def _nothing_performed(block: Block, dropped: Mapping[str, str], id: str) -> Fau
     left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
     whys = [*(f"{id}: {why.removeprefix(f'{id}: ')}" if why else id for id, why in dropped.items()), *left_out]
     return Fault(reason=as_told(f"no behavior of it came to its end ({'; '.join(whys)})"), where=id)
+
+
+def reasons(plan: Plan) -> dict[str, str]:
+    """Behaviors that a plan has dropped, each with the reason."""
+    why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
+    return {id: why.get(id, "") for id in plan.dropped}

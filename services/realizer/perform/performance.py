@@ -26,7 +26,7 @@ from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.held_block import HeldBlock
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.net_stream import NetStream
-from engage_hri.services.realizer.perform.outcome import completed
+from engage_hri.services.realizer.perform.outcome import completed, reasons
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
@@ -34,7 +34,6 @@ from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.plan.phases import ARMS
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
@@ -66,8 +65,7 @@ class BlockPerformance:
         self.report = Reporter(shared.bus, live.id, shared.config.skew)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
-        why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
-        self._dropped = {id: why.get(id, "") for id in plan.dropped}
+        self._dropped = reasons(plan)
         """Behaviors that were dropped, each with the reason."""
         self.interrupted: dict[str, str] = {}
         """Behaviors that are ended on request, each with the reason if one was given."""
@@ -98,8 +96,6 @@ class BlockPerformance:
         self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free)
         self.held.begin()
         self.report.started(self.plan, began)
-        for problem in self.plan.problems:
-            self.report.warn(problem.kind, problem.message, problem.behavior)
         self.report.unkept(self.plan)
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(block, behavior)
@@ -115,6 +111,7 @@ class BlockPerformance:
                 with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign)):
                     self.ties.begin()
                     self.held.tell()
+                    self._take_out(self._live.taken_out)
                     self.take_in()
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
@@ -151,17 +148,21 @@ class BlockPerformance:
 
     async def interrupt(self, behavior: str, reason: str = "") -> bool:
         """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
-        task, run = self._tasks[behavior], self._runs[behavior]
-        self.interrupted[behavior] = reason
-        if run.pending is not None and run.is_by_body:
+        if (run := self._runs[behavior]).pending is not None and run.is_by_body:
+            self.interrupted[behavior] = reason
             self.body.abort(behavior)
-            await asyncio.wait([task])
+            await asyncio.wait([self._tasks[behavior]])
         else:
-            task.cancel()
-            self._requests.cancel(self.body.id(behavior), "interrupted")
-            self.lose(behavior, Fault(reason="interrupted"))
+            self._take_out({behavior: reason})
             self.take_in()
         return behavior not in self._dropped and self.decisions.facts.has_ended(behavior)
+
+    def _take_out(self, behaviors: Mapping[str, str]) -> None:
+        for behavior in sorted(behaviors.keys() & self._tasks.keys()):  # Others were dropped before.
+            self.interrupted[behavior] = behaviors[behavior]
+            self._tasks[behavior].cancel()
+            self._requests.cancel(self.body.id(behavior), "interrupted")
+            self.lose(behavior, Fault(reason="interrupted"))
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """Take a report of the body about a behavior of this block."""
@@ -216,10 +217,8 @@ class BlockPerformance:
             _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
             for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
                 self._requests.cancel(self.body.id(moving[task]), "its block has ended")
-        if self._outcome.status == "done":
-            self.decisions.net.let_go()
-        else:
-            self.decisions.net.clear()
+        net, is_done = self.decisions.net, self._outcome.status == "done"
+        (net.let_go if is_done else net.clear)()
         self._net.end()
         if ending.status == "failed":
             self._go_home(self.parts_used)
@@ -333,8 +332,8 @@ class BlockPerformance:
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
-                where = f"{self.id}: {id}"
-                self._live.stop(Ending("failed", Fault(reason=fault.reason, where=where, line=fault.line)))
+                said = Fault(reason=fault.reason, where=f"{self.id}: {id}", line=fault.line)
+                self._live.stop(Ending("failed", said))
         self._let_go(id)
         self.plan_again()
 

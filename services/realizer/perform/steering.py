@@ -51,8 +51,7 @@ class Steering:
         block, behavior = ("", "") if isinstance(request, SteerRobot) else (request.block, request.behavior)
         with self._desk.serving(request):
             concerned = self._concerned(block)
-            performances = [each for each in self._performances.values() if each.id == block]
-            going_on = any(each.is_going_on(behavior) for each in performances) if behavior else concerned
+            going_on = any(self.is_going_on(live, behavior) for live in concerned) if behavior else concerned
             if isinstance(request, SteerPerformance) and not (block and going_on):
                 fault = absence(block, behavior, self._live.values())
                 if not block:
@@ -72,6 +71,11 @@ class Steering:
             is_stuck = request.to == "continue" and self._holds.is_within(block, behavior)
             blocks = () if is_stuck else tuple(live.id for live in concerned)
             self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
+
+    def is_going_on(self, live: Live, behavior: str) -> bool:
+        """True if the behavior is performed, or is to be when its block begins."""
+        performance = self._performances.get(live.request.id)
+        return live.has_yet(behavior) if performance is None else performance.is_going_on(behavior)
 
     def tell(self) -> None:
         """Publish what is held now."""
@@ -129,9 +133,12 @@ class Steering:
 
     async def _stop(self, concerned: list[Live], behavior: str, reason: str) -> None:
         if behavior:
-            performed = [self._performances.get(live.request.id) for live in concerned]
-            going_on = [each for each in performed if each is not None and each.is_going_on(behavior)]
-            await asyncio.gather(*[each.interrupt(behavior, reason) for each in going_on])
+            going_on = [live for live in concerned if self.is_going_on(live, behavior)]
+            performed = [self._performances.get(live.request.id) for live in going_on]
+            for live, performance in zip(going_on, performed, strict=True):
+                if performance is None:
+                    live.taken_out[behavior] = reason
+            await asyncio.gather(*[each.interrupt(behavior, reason) for each in performed if each is not None])
             return
         _interrupt(concerned, reason)
         if concerned:
