@@ -72,13 +72,23 @@ def test_until_it_is_known_what_a_hold_has_cost_it_accounts_for_as_much_as_it_la
     held = HeldUp()
     before = Outlook({A: 5.0, B: 5.0})
     held.hold(before, 1.0)
-    assert held.between(A, B, 0.0, 0.5) == 0.0  # it came before
-    assert held.between(A, B, 0.0, 3.0) == pytest.approx(2.0 + STANDING)
+    assert held.between(A, B, 0.0, 99.0, 0.5) == 0.0  # it came before
+    assert held.between(A, B, 0.0, 99.0, 3.0) == pytest.approx(2.0 + STANDING)
     held.let_go(4.0, {"a": 2})
-    assert held.between(A, B, 0.0, 20.0) == pytest.approx(3.0 + STANDING)
+    assert held.between(A, B, 0.0, 99.0, 20.0) == pytest.approx(3.0 + STANDING)
     assert not held.is_settled(4.2, {"a": 3})
     assert not held.is_settled(9.0, {"a": 2})
     assert held.is_settled(9.0, {"a": 3})
+
+
+def test_what_was_late_before_a_hold_is_not_late_for_it() -> None:
+    held = HeldUp()
+    held.hold(Outlook({A: 5.0, B: 4.0}), 1.0)
+    held.let_go(1.0, {})
+
+    assert held.between(A, B, 0.0, 1.25, 6.0) == 0.25
+    assert held.between(A, B, 0.0, 0.75, 6.0) == 0.0
+    assert held.between(A, B, 0.5, 2.0, 6.0) == STANDING
 
 
 def test_then_it_accounts_for_what_is_expected_to_be_later_than_it_was() -> None:
@@ -87,11 +97,11 @@ def test_then_it_accounts_for_what_is_expected_to_be_later_than_it_was() -> None
     held.let_go(4.0, {})
     held.settle(Outlook({A: 8.0, B: 6.0, C: 7.0}))
 
-    assert held.between(A, B, 0.0, 9.0) == 2.0
-    assert held.between(A, B, 0.5, 9.0) == 1.5
-    assert held.between(B, A, 0.0, 9.0) == 0.0
-    assert held.between(A, C, 0.0, 9.0) == 0.0  # it was expected to be as late before
-    assert held.between(A, Point("nobody", "end"), 0.0, 9.0) == 0.0
+    assert held.between(A, B, 0.0, 99.0, 9.0) == 2.0
+    assert held.between(A, B, 0.5, 99.0, 9.0) == 1.5
+    assert held.between(B, A, 0.0, 99.0, 9.0) == 0.0
+    assert held.between(A, C, 0.0, 99.0, 9.0) == 0.0  # it was expected to be as late before
+    assert held.between(A, Point("nobody", "end"), 0.0, 99.0, 9.0) == 0.0
 
 
 def test_holds_add_up() -> None:
@@ -101,7 +111,7 @@ def test_holds_add_up() -> None:
         held.let_go(since + 1.0, {})
         held.settle(Outlook({A: since + 1.0, B: since / 10.0}))
 
-    assert held.between(A, B, 0.0, 20.0) == pytest.approx(2.0)
+    assert held.between(A, B, 0.0, 99.0, 20.0) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(("longest", "comes"), [(2.0, 1.5), (1.25, 1.25), (1.0, 1.0)])

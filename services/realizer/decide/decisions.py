@@ -180,7 +180,8 @@ class Decisions:
         """The same without the seconds for which holds account."""
         times = self.facts.reached | {ORIGIN: self.began}
         early, late = times[broken.early], times[broken.late]
-        held = self.held_up.between(broken.late, broken.early, late - early - broken.seconds, max(early, late))
+        allowed, last = late - early - broken.seconds, max(early, late)
+        held = self.held_up.between(broken.late, broken.early, allowed, broken.seconds, last)
         return replace(broken, seconds=broken.seconds - held)
 
     # -- decisions -----------------------------------------------------------------------------------------------

@@ -65,19 +65,19 @@ class HeldUp:
 
     # -- what it accounts for ------------------------------------------------------------------------------------
 
-    def between(self, point: Point, other: Point, allowed: Seconds, at: Seconds) -> Seconds:
-        """Seconds by which `point` is later than `allowed` after another point, for holds.
+    def between(self, point: Point, other: Point, allowed: Seconds, late: Seconds, at: Seconds) -> Seconds:
+        """Seconds for which holds account, of those by which `point` is later than `allowed` after another point.
 
-        at: when the later of them came.
+        late: these. at: when the later of the two points came.
         """
-        late = [(one.apart(point, other), after.apart(point, other)) for one, after in self._costs]
-        return self._open(at) + sum(_more(one - allowed, after - allowed) for one, after in late)
-
-    def _open(self, at: Seconds) -> Seconds:
-        """Seconds by which what came at that time may be late for the hold whose effect is not known yet."""
+        apart = [(one.apart(point, other), after.apart(point, other)) for one, after in self._costs]
+        known = sum(_more(one - allowed, after - allowed) for one, after in apart)
         if self._before is None or at <= self._began:
-            return 0.0
-        return self._lasted + (0.0 if self._since is None else max(0.0, at - self._since)) + STANDING
+            return known
+        # The effect of this one is not known yet. What was expected to be late before it is not late for it.
+        lasted = self._lasted + (0.0 if self._since is None else max(0.0, at - self._since))
+        already = max(0.0, self._before.apart(point, other) - allowed - known)
+        return known + min(lasted + STANDING, max(0.0, late - known - already))
 
 
 def _more(before: Seconds, after: Seconds) -> Seconds:
