@@ -53,6 +53,10 @@ class Grants(Observer):
         self._wakes: list[tuple[Seconds, int]] = []
         self._dirty: set[int] = set()
         """Instants that something has changed for."""
+        self._takes: dict[str, list[str]] = {}
+        """Behaviors of the block that take parts of others by plan, and whose."""
+        for id, (taker, _) in plan.successors.items():
+            self._takes.setdefault(taker, []).append(id)
         self._pauses = _pauses(plan)
         self._tied = fixed_times(plan.net)
         self._known_stuck: tuple[object, Stuck] | None = None
@@ -140,11 +144,20 @@ class Grants(Observer):
             self._grant(transition, may_pass)
         begun = self._facts.begun
         beginning = [each.behavior for each in members if each.kind == "start" and each.behavior not in begun]
+        beginning = [each for each in beginning if not self._is_to_take(each, transition)]
         if missing or not all(self._is_free(each) for each in beginning):
             return []  # Where another block is in the way, it is planned again.
         for member in members:
             self._grant(transition, member)
         return beginning
+
+    def _is_to_take(self, behavior: str, transition: int) -> bool:
+        """True if a behavior that begins here takes a part of another one that has yet to make what it has to here.
+
+        By plan that takes no time, as it looks already where it is to look. But it has come only when it is measured.
+        """
+        points = [self._plan.kept[id] for id in self._takes.get(behavior, ())]
+        return any(self._plan.at.get(each) == transition and each not in self._facts.reached for each in points)
 
     def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Stuck:
         """Find what is stuck now, if these points of other blocks are; anew when anything has happened."""

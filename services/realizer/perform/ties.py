@@ -152,12 +152,19 @@ class Ties:
         return not met
 
     def _may_take(self, name: str) -> bool:
-        """True if the part of this behavior of another block is taken by plan, and it has made what it has to."""
+        """True if the part of this behavior of another block is taken by plan, and it has made what it has to.
+
+        A look to whose way home somebody has been tied since is not taken: it lasts.
+        """
         block, _, id = name.partition(":")
         if name not in self._owner.decisions.plan.takes or (other := self._performances.get(block)) is None:
             return False
-        needed = other.decisions.plan.kept.get(id)
-        return needed is None or needed in other.decisions.facts.reached
+        plan, reached = other.decisions.plan, other.decisions.facts.reached
+        awaited = {point.behavior for point in self._live_blocks.named(block) if point not in reached}
+        if id in plan.natural and id in awaited:
+            return False
+        needed = plan.kept.get(id)
+        return needed is None or needed in reached
 
     def known(self) -> Known:
         """Other blocks, and what of this one has begun, as known now. Times from this block's start.

@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.handover import Handover, Turn
+from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Impossible
@@ -63,32 +63,6 @@ def clashes(
             among = frozenset(chains[earlier].points + chains[later].points)
             losses[lost] = Loss(lost, reason, chains[lost].points, among, turn)
             stays[lost] = later if lost == earlier else earlier
-    return list(losses.values())
-
-
-def at_once(
-    at: Mapping[Point, int],
-    handovers: Mapping[str, tuple[Handover, ...]],
-    chains: Mapping[str, Chain],
-    required: Collection[str],
-) -> list[Loss]:
-    """Losses where a behavior is to take a part in the very instant in which another begins to use it.
-
-    By plan that takes no time, as it looks already where it is to look. But its stroke has come only when it is
-    measured, and the other would not wait for that. at: the transition of each point. handovers: see `Arrangement`.
-    """
-    rank = {id: number for number, id in enumerate(chains)}
-    losses: dict[str, Loss] = {}
-    for earlier, takers in handovers.items():
-        begins = chains[earlier].points[0]
-        for later, kept in takers:
-            free = {earlier, later}.difference(required)
-            is_new = losses.keys().isdisjoint((earlier, later))
-            if free and is_new and kept != begins and at[begins] == at[kept] == at[Point(later, "start")]:
-                lost = max(free, key=rank.__getitem__)
-                reason = f"cannot be on time: {later} would have to wait for {kept}"
-                among = frozenset(chains[earlier].points + chains[later].points)
-                losses[lost] = Loss(lost, reason, chains[lost].points, among, (later, kept))
     return list(losses.values())
 
 

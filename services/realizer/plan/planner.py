@@ -18,7 +18,7 @@ from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
-from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, at_once, clashes, judge
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
 from engage_hri.services.realizer.plan.instants import Classes
@@ -257,8 +257,6 @@ class _Planner:
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
-            if losses := at_once(assembly.at, arrangement.handovers, self.chains, self.relations.required):
-                raise Losses(losses)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
