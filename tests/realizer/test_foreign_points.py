@@ -8,7 +8,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.nets import Fired
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.perform.net_message import described, firings, tokens
-from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.known import BLOCK_END, Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
@@ -127,3 +127,12 @@ def test_tokens_and_firings_keep_their_numbers_and_their_order() -> None:
     assert tokens(bytes((0, 1, 0, 2, 1))) == (1, 3, 4)
     assert tokens(b"") == ()
     assert firings({3: 0.5, 1: 0.25}) == (Fired(transition=3, time=0.5), Fired(transition=1, time=0.25))
+
+
+def test_a_point_that_waits_for_one_of_this_block_is_expected_after_it_and_no_earlier_than_before() -> None:
+    own, theirs, ended = Point("w", "start"), Point("other:x", "start"), Point("other:x", "end")
+    waiting = {theirs: {own: 0.5}, ended: {BLOCK_END: 0.25, own: 0.5}}
+    known = Known(points={theirs: 1.0, ended: 1.5}, awaiting=waiting)
+
+    assert known.in_truth((), {own: 2.0}, 4.0) == {own: 2.0, theirs: 2.5, ended: 4.25}
+    assert known.in_truth((), {own: 0.25}, 0.5) == {own: 0.25, theirs: 1.0, ended: 1.5}
