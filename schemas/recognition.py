@@ -117,6 +117,8 @@ class EventOutcome(Outcome, frozen=True, kw_only=True, tag="event_outcome", omit
     state: EventState
     at: Stamp
     delay: Seconds | None = None
+    delay_error: Seconds | None = 0.0
+    """Greatest error of `delay`: `ConnectionEvent.delay_error`."""
     response: Action | None = None
 
 

@@ -169,7 +169,9 @@ class _Recognition:
                     self.desk.accept(id)
                 case Refused(id=id, fault=fault):
                     self.desk.refuse(id, fault)
-                case EventOutcome() | TurnOutcome():
+                case EventOutcome():
+                    self.desk.end(self._clock_errors.marked_as(result, changes))
+                case TurnOutcome():
                     self.desk.end(result)
                 case Forgotten(actor=actor):
                     changes.append(result)

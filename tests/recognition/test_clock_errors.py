@@ -4,11 +4,12 @@ import asyncio
 from functools import partial
 from math import inf
 
+import msgspec
 import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan
-from engage_hri.schemas.recognition import ConnectionEvent, EventState
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, EventState
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -45,6 +46,17 @@ def test_a_delay_keeps_its_error_until_its_event_ends_and_only_what_is_older_is_
     errors.heard("ann", 101.0, 9.0)
     assert errors.marked(event("completed", 0.5)).delay_error == pytest.approx(0.3)
     assert errors.marked(event("succeeded", 0.5)).delay_error == pytest.approx(9.0)  # another one, with its id
+
+
+def test_the_answer_to_who_asked_for_an_event_has_the_error_of_that_event() -> None:
+    errors = ClockErrors("robot")
+    errors.heard("ann", 100.0, 0.25)
+    changes = [errors.marked(event("succeeded", 0.5)), errors.marked(event("failed", None, id="2"))]
+    outcome = EventOutcome(id="r", event="1", state="succeeded", at=Stamp("own", 100.0), delay=0.5)
+
+    assert errors.marked_as(outcome, changes).delay_error == 0.25
+    assert errors.marked_as(msgspec.structs.replace(outcome, delay=None), changes).delay_error == 0.0
+    assert errors.marked_as(msgspec.structs.replace(outcome, event="3"), changes).delay_error == 0.0
 
 
 def test_an_error_that_is_not_known_is_told_as_none() -> None:

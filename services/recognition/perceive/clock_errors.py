@@ -5,11 +5,12 @@ wrong as its two ends together, of which one is the robot's and one the person's
 """
 
 from collections import OrderedDict
+from collections.abc import Sequence
 from math import isfinite
 
 import msgspec
 
-from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome
 from engage_hri.schemas.units import Seconds
 
 KEPT: Seconds = 120.0
@@ -51,6 +52,14 @@ class ClockErrors:
         if event.state in ENDINGS:
             del self._delays[event.id]
         return msgspec.structs.replace(event, delay_error=error)
+
+    def marked_as(self, outcome: EventOutcome, changes: Sequence[object]) -> EventOutcome:
+        """Add the error of its event to an outcome. changes: the last changes, with that of its event."""
+        events = (each for each in reversed(changes) if isinstance(each, ConnectionEvent))
+        event = next((each for each in events if each.id == outcome.event), None)
+        if outcome.delay is None or event is None:
+            return outcome
+        return msgspec.structs.replace(outcome, delay_error=event.delay_error)
 
     def _worst(self, actor: str, since: int) -> Seconds:
         return max((error for second, error in self._errors.get(actor, {}).items() if second >= since), default=0.0)
