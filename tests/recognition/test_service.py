@@ -11,7 +11,7 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import Requester, RequestRefused
@@ -46,6 +46,20 @@ async def test_directed_gaze_is_decided_by_the_look_of_the_person(hub: MemoryHub
 
     assert isinstance(outcome, EventOutcome)
     assert (outcome.state, outcome.delay, outcome.at) == ("succeeded", 0.75, Stamp("loop", at + 0.75))
+
+
+async def test_the_outcome_tells_how_wrong_its_delay_can_be(hub: MemoryHub, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(MemoryBus, "error", lambda bus, clock: 0.25)
+    bus = hub.join("realizer")
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pending = requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square"))
+        await pending.accepted
+        hub._loop.call_later(0.75, perceive, bus, "blue-square")
+        outcome = await pending.outcome
+
+    assert isinstance(outcome, EventOutcome)
+    assert outcome.delay_error == 0.5  # that of the person and that of the robot
 
 
 async def test_directed_gaze_fails_at_its_limit_after_the_last_anchor(hub: MemoryHub):
