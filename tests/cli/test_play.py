@@ -186,7 +186,7 @@ def test_failing_at_run_time_is_exit_code_3(engage: Engage, files: dict[str, Pat
     assert result.code == 3
     warning, failed = result.err.splitlines()
     assert warning.startswith("! EXECUTION_FAILURE must:p: ")
-    assert failed.startswith(f"{path}: must: ")
+    assert failed.startswith(f"{path}:1: must: p: ")
 
 
 def test_what_only_pointing_could_mean_fails_if_it_is_out_of_reach(engage: Engage, tmp_path: Path) -> None:
