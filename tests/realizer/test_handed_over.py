@@ -25,6 +25,8 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import PerformBehavior
 from engage_hri.services.control.config import Variability
+from engage_hri.services.realizer.plan.handover import entering
+from engage_hri.services.realizer.plan.phases import chain
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.puppet import bml, puppet
@@ -260,3 +262,13 @@ def test_of_two_who_take_an_arm_each_the_first_ends_what_both_arms_did(sooner: H
 
     assert (at(made, "p:relax"), at(made, "p:end")) == (1.75, 1.75)
     assert [at(made, f"{hand[0]}:start") for hand in hands] == [1.75 if hand == sooner else 2.0 for hand in hands]
+
+
+def test_of_those_that_start_together_who_has_begun_takes_its_parts_first() -> None:
+    looks = {id: chain(Gaze(id=id, target=id), None) for id in ("one", "two", "three")}
+    times = {point: float(number) for each in looks.values() for number, point in enumerate(each.points)}
+    rounds = dict.fromkeys(times, 0)
+
+    assert entering(looks, (), times, rounds) == ("one", "two", "three")
+    assert entering(looks, (), times, rounds, begun={"three"}) == ("three", "one", "two")
+    assert entering(looks, {"two"}, times, rounds, ranked=("one", "two", "three"), begun={"three"})[0] == "three"
