@@ -12,7 +12,7 @@ from typing import Any
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.foresee.experience import Experience
+from engage_hri.services.realizer.foresee.experience import SHORT, Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.net.facts import Facts
@@ -180,8 +180,8 @@ class Foresight(Observer):
         number = self._facts.next_number(point.behavior)
         if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
-        if performer(chain.behavior) == "body":
-            before, natural = chain.points[number - 1], chain.segments[number - 1].natural
+        before, natural = chain.points[number - 1], chain.segments[number - 1].natural
+        if natural >= SHORT and performer(chain.behavior) == "body":
             if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
                 return  # it was to be cut short
             since = self._facts.reached[before]

@@ -173,6 +173,8 @@ class Facts:
 
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""
+        if not self._holds:  # asked at every point
+            return 0.0
         return sum(_overlap(first, last, since, until) for first, last in self._holds_of(behavior, until))
 
     def _holds_of(self, behavior: str, until: Seconds) -> list[tuple[Seconds, Seconds]]:

@@ -97,7 +97,8 @@ class BehaviorRun:
         if isinstance(message, SyncPointArrived):
             block.arrive(point, at)
         else:
-            arrived = facts.plausible(point, bus.local(message.arrived), at)
+            same = message.arrived == message.at
+            arrived = at if same else facts.plausible(point, bus.local(message.arrived), at)
             block.reach(point, at, arrived=arrived, by_body=True)
 
     async def perform(self) -> None:
