@@ -27,7 +27,7 @@ PATIENCE = 20.0
 PAUSE = 0.4
 """Seconds between two meetings of eyes."""
 TIMES = 5
-SLACK = 0.010
+SLACK = 0.006
 """Seconds: by what the clocks drift until they are measured again, and what processes need to answer."""
 
 

@@ -196,6 +196,8 @@ def test_what_a_block_says_is_read_as_it_was_meant(case: Said) -> None:
     assert found.equals == case.relations.equals
     assert found.orders == case.relations.orders
     assert found.required == case.relations.required
+    lacking = [each.message for each in found.problems if "has no sync point" in each.message]
+    assert all(len(ADVICE.findall(each)) == 1 for each in lacking)
     without_advice = [replace(each, message=ADVICE.sub("", each.message)) for each in found.problems]
     assert without_advice == list(case.relations.problems)
     assert found.unusable == case.relations.unusable
@@ -319,11 +321,12 @@ def test_a_wait_that_nothing_ends_ends_at_once_with_a_warning(
 
 
 def test_bml_1_0_has_fewer_points_of_a_gaze_and_spells_them_otherwise() -> None:
-    for ref, sync in (("g:ready", "stroke"), ("g:relax", "relax"), ("g:strokeStart", None)):
+    advice = {"g:strokeStart": "did you mean 'start'?", "g:strokeEnd": "known: end, ready, relax, start"}
+    for ref, sync in (("g:ready", "stroke"), ("g:relax", "relax"), ("g:strokeStart", None), ("g:strokeEnd", None)):
         constraint = Constraint(operators=(Synchronize(ref=ref, syncs=("w:end",)),))
         block = Block(id="b", behaviors=BEHAVIORS, constraints=(constraint,), dialect="bml-1.0")
         found = finished(relation_steps(block))
         points = [term.point for term in found.equals[0].terms]
         assert points == [*([Point("g", sync)] if sync else []), Point("w", "end")]
-        words = f"constraint 1: gaze has no sync point {ref!r} (did you mean 'start'?); it is ignored"
+        words = f"constraint 1: gaze has no sync point {ref!r} ({advice.get(ref)}); it is ignored"
         assert [each.message for each in found.problems] == ([] if sync else [words])
