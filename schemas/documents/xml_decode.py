@@ -161,7 +161,7 @@ class _Document:
         behind = [child for child in parent if child.tail and child.tail.strip() and not self._speaks_on(child)]
         text = (parent.text or "").strip()
         if words := " ".join([*([text] if text else ()), *(str(child.tail).strip() for child in behind)]):
-            line = self._source.line_of_text(*([parent] if text else behind[:1]), is_behind=not text)
+            line = self._source.line_of_text(parent if text else behind[0], is_behind=not text)
             self._note(f"text {words[:40]!r} outside of speech", line)
         for element in parent:
             namespace, local = split(str(element.tag))

@@ -89,9 +89,9 @@ class Source:
 
     def line_of_text(self, element: etree._Element, *, is_behind: bool = False) -> int:
         """The line on which the text of an element begins, or that behind the element."""
-        text = element.tail if is_behind else element.text
+        text = str((element.tail if is_behind else element.text) or "")
         since = _last_line(element) if is_behind else cast(int, element.sourceline or 0)
-        return since + (text or "").partition((text or "").strip())[0].count("\n")
+        return since + text[: len(text) - len(text.lstrip())].count("\n")
 
     def refusal(
         self, reason: str, element: etree._Element | None = None, *, line: int = 0, advice: str = ""
@@ -196,12 +196,9 @@ def _declaring(text: str, prefixes: Set[str]) -> str:
 
 def _last_line(element: etree._Element) -> int:
     """The line on which the end tag of an element begins."""
-    last, behind = element, element.text or ""
-    for last in element.iterchildren(reversed=True):
-        behind = last.tail or ""
-        break
-    since = cast(int, element.sourceline or 0) if last is element else _last_line(last)
-    return since + behind.count("\n")
+    if len(element):
+        return _last_line(element[-1]) + str(element[-1].tail or "").count("\n")
+    return cast(int, element.sourceline or 0) + str(element.text or "").count("\n")
 
 
 def _start_lines(text: str) -> Iterator[int]:

@@ -128,13 +128,11 @@ class _Realizer:
                 self.desk.refuse(request.id, absence(block, behavior, self.live.values()))
                 return
             self.desk.accept(request.id)
-            end = BehaviorInterrupted(id=request.id, block=block, behavior=behavior)
-            if (performance := self.performances.get(live.request.id)) is None:
-                live.taken_out[behavior] = ""
-            else:
-                was_done = await performance.interrupt(behavior)
-                said = performance.spoken.of(behavior)
-                end = replace(end, spoken=said.text if said is not None else "", was_done=was_done)
+            performance = self.performances.get(live.request.id)
+            was_done = await self.steering.interrupt(live, behavior)
+            said = None if performance is None else performance.spoken.of(behavior)
+            text = said.text if said is not None else ""
+            end = BehaviorInterrupted(id=request.id, block=block, behavior=behavior, spoken=text, was_done=was_done)
             self.desk.end(end)
 
     def _hear_word(self, word: WordSpoken) -> None:

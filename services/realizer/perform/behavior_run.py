@@ -134,14 +134,14 @@ class BehaviorRun:
             outcome = await self._send().outcome
         except (RequestRefused, NeverEnded) as error:
             refused = isinstance(error, RequestRefused)
-            self._lose(error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
+            self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
             return
         except EngageError as error:
             self.pending = None
             block.lose_body(Fault(reason=error.fault.reason, where=block.id))
             return
         if not isinstance(outcome, BehaviorOutcome):
-            self._lose(Fault(reason=f"control ended it with a {type(outcome).__name__}"))
+            self.lose(Fault(reason=f"control ended it with a {type(outcome).__name__}"))
             return
         block.spoken.end(outcome)
         if outcome.status == "lapsed":  # the body has gone home: nothing of this block can be as planned
@@ -154,9 +154,10 @@ class BehaviorRun:
         if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
             block.reach(end, at, by_body=outcome.status == "done")
         else:
-            self._lose(loss(outcome), at_rest=outcome.status != "failed")
+            self.lose(loss(outcome), at_rest=outcome.status != "failed")
 
-    def _lose(self, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+    def lose(self, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+        """Give it up: it cannot be finished. The fault gets the line of the behavior."""
         assert self.behavior is not None
         fault = replace(fault, line=fault.line or self.behavior.line)
         self._block.lose(self.id, fault, kind, at_rest=at_rest)
@@ -198,7 +199,7 @@ class BehaviorRun:
             facts = block.decisions.facts
             decision = await block.recognition.decision(event, block.plan.block, pending, facts)
         except RequestRefused as error:
-            self._lose(error.fault, "CANNOT_CREATE_BEHAVIOR")
+            self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR")
         else:
             end = Point(event.id, "end")
             block.reach(end, max(began, decision.at), by_body=decision.by_recognition)

@@ -217,8 +217,10 @@ class BlockPerformance:
             _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
             for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
                 self._requests.cancel(self.body.id(moving[task]), "its block has ended")
-        net, is_done = self.decisions.net, self._outcome.status == "done"
-        (net.let_go if is_done else net.clear)()
+        if self._outcome.status == "done":
+            self.decisions.net.let_go()
+        else:
+            self.decisions.net.clear()
         self._net.end()
         if ending.status == "failed":
             self._go_home(self.parts_used)
@@ -272,8 +274,7 @@ class BlockPerformance:
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
-                line = self.plan.chains[id].behavior.line
-                self.lose(id, Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue", line=line))
+                self._runs[id].lose(Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
                 return True
         return False
 

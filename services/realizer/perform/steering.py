@@ -53,10 +53,8 @@ class Steering:
             concerned = self._concerned(block)
             going_on = any(self.is_going_on(live, behavior) for live in concerned) if behavior else concerned
             if isinstance(request, SteerPerformance) and not (block and going_on):
-                fault = absence(block, behavior, self._live.values())
-                if not block:
-                    fault = Fault(reason="names no block", advice=f"the whole robot: `steer_robot`, on {keys.ROBOT}")
-                self._desk.refuse(request.id, fault)
+                nameless = Fault(reason="names no block", advice=f"the whole robot: `steer_robot`, on {keys.ROBOT}")
+                self._desk.refuse(request.id, absence(block, behavior, self._live.values()) if block else nameless)
                 return
             self._desk.accept(request.id)
             match request.to:
@@ -76,6 +74,16 @@ class Steering:
         """True if the behavior is performed, or is to be when its block begins."""
         performance = self._performances.get(live.request.id)
         return live.has_yet(behavior) if performance is None else performance.is_going_on(behavior)
+
+    async def interrupt(self, live: Live, behavior: str, reason: str = "") -> bool:
+        """End a behavior that is going on, or take it out if its block has yet to begin.
+
+        Returns once it has ended: True if it came to its end.
+        """
+        if (performance := self._performances.get(live.request.id)) is not None:
+            return await performance.interrupt(behavior, reason)
+        live.taken_out[behavior] = reason
+        return False
 
     def tell(self) -> None:
         """Publish what is held now."""
@@ -134,11 +142,7 @@ class Steering:
     async def _stop(self, concerned: list[Live], behavior: str, reason: str) -> None:
         if behavior:
             going_on = [live for live in concerned if self.is_going_on(live, behavior)]
-            performed = [self._performances.get(live.request.id) for live in going_on]
-            for live, performance in zip(going_on, performed, strict=True):
-                if performance is None:
-                    live.taken_out[behavior] = reason
-            await asyncio.gather(*[each.interrupt(behavior, reason) for each in performed if each is not None])
+            await asyncio.gather(*[self.interrupt(live, behavior, reason) for live in going_on])
             return
         _interrupt(concerned, reason)
         if concerned:

@@ -160,8 +160,8 @@ class Ties:
         if name not in self._owner.decisions.plan.takes or (other := self._performances.get(block)) is None:
             return False
         plan, reached = other.decisions.plan, other.decisions.facts.reached
-        awaited = {point.behavior for point in self._live_blocks.named(block) if point not in reached}
-        if id in plan.natural and id in awaited:
+        named = self._live_blocks.named(block)
+        if id in plan.natural and any(each.behavior == id and each not in reached for each in named):
             return False
         needed = plan.kept.get(id)
         return needed is None or needed in reached
