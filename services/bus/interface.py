@@ -349,6 +349,10 @@ class Hub(ABC):
     def join(self, name: str, role: str = "manager") -> Bus:
         """Add a participant; returns its view of the bus. Names are unique on a robot's bus."""
 
+    def called(self, name: str) -> str:
+        """Name that a participant gets who asks for this one. Keys may give another."""
+        return name
+
     @abstractmethod
     async def wait_until_free(self, *names: str) -> None:
         """Wait until no other participant has these names: one that has died may seem alive for a while.

@@ -28,11 +28,12 @@ Service = Callable[[Bus, Ready], Coroutine[Any, Any, None]]
 
 async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
     """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+    called = hub.called(name)
+    if called != name:
+        reason = f"the keys are those of {called.removesuffix(f'-{name}')!r}, not of {name!r}"
+        raise InputRefused(Fault(reason=reason, where=name, advice="give it the folder of its own keys"))
     await hub.wait_until_free(name)
     bus = hub.join(name, role=name if name in keys.ROLES else "manager")
-    if bus.name != name:
-        reason = f"the keys are those of {bus.name.removesuffix(f'-{name}')!r}, not of {name!r}"
-        raise InputRefused(Fault(reason=reason, where=name, advice="give it the folder of its own keys"))
     joined = bus.stamp()
     since: Stamp | None = None
 

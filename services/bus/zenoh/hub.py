@@ -141,9 +141,11 @@ class ZenohHub(Hub):
             self._link, host=own.host, python=own.python, loop=own.loop, wall=own.wall
         )  # fmt: skip
 
+    def called(self, name: str) -> str:
+        return name if self.rights is None else self.rights.called(name)
+
     def join(self, name: str, role: str = "manager") -> "ZenohBus":
-        if self.rights is not None:
-            name, role = self.rights.called(name), self.rights.holder.role
+        name, role = self.called(name), role if self.rights is None else self.rights.holder.role
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
         self._buses[name] = bus = ZenohBus(self, name, role)
