@@ -249,6 +249,9 @@ class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behavio
     """rpc: realizer or generation -> control, answered with `Estimates` in the same order."""
 
     items: tuple[EstimateItem, ...]
+    others: tuple[EstimateItem, ...] = ()
+    """Behaviors of other blocks that move the body meanwhile, with their times; the answer does not have them. One
+    without a time of its start is under way. A body that can rehearse lets them move, too."""
 
 
 class Estimates(Struct, frozen=True, kw_only=True, tag="estimates", omit_defaults=True):

@@ -120,7 +120,8 @@ class _Control:
             raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
         refused = [_refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
-        estimates = iter(self._body.rehearse(known, self._world))
+        others = [item for item in question.others if _refused(item.behavior) is None]
+        estimates = iter(self._body.rehearse(known, self._world, others))
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def describe(self, question: Message) -> Message:

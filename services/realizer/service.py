@@ -63,7 +63,7 @@ class _Realizer:
         self.steering = Steering(bus, self.desk, config, self.live, self.performances, self.live_blocks)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,
-            self.steering.forget,
+            self.steering.forget, self.planning.estimates,
         )  # fmt: skip
 
     # -- what arrives ---------------------------------------------------------------------------------------------

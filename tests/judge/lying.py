@@ -58,8 +58,10 @@ class LyingBody(Body):
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         return self._body.estimate(behavior, pose, world)
 
-    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
-        return self._body.rehearse(items, world)
+    def rehearse(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Sequence[Estimate]:
+        return self._body.rehearse(items, world, others)
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         lies, chance = self._lies, self._chance

@@ -51,8 +51,10 @@ class Asked(SimulatedBody):
         self.questions: list[tuple[EstimateItem, ...]] = []
         self.answers: list[tuple[Estimate, ...]] = []
 
-    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
-        answer = tuple(super().rehearse(items, world))
+    def rehearse(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Sequence[Estimate]:
+        answer = tuple(super().rehearse(items, world, others))
         self.questions.append(tuple(items))
         self.answers.append(answer)
         return answer

@@ -76,12 +76,15 @@ class SimulatedBody(Body):
                 return wait_estimate(behavior, duration or 0.0, self._torso.pose(world, pose))
         return self._torso.estimate(behavior, pose, world)
 
-    def rehearse(self, items: Sequence[EstimateItem], world: World) -> Sequence[Estimate]:
+    def rehearse(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Sequence[Estimate]:
         moving = [item for item in items if item.times]
         if self._torso.misbelieved or not moving:
-            return super().rehearse(items, world)
+            return super().rehearse(items, world, others)
         clock = Clock(self._loop.time())
-        told = dict(zip(map(id, moving), rehearsed(beside(self._torso, clock, world), clock, moving), strict=True))
+        copy = beside(self._torso, clock, world)
+        told = dict(zip(map(id, moving), rehearsed(copy, clock, moving, others), strict=True))
         return [told.get(id(item)) or self.estimate(item.behavior, item.pose, world) for item in items]
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

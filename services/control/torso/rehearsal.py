@@ -218,20 +218,29 @@ class _Part:
         return replace(phase, natural=natural, shortest=share * natural, longest=longest)
 
 
-def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tuple[Estimate, ...]:
+def rehearsed(
+    torso: Torso, clock: Clock, items: Sequence[EstimateItem], others: Sequence[EstimateItem] = ()
+) -> tuple[Estimate, ...]:
     """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made.
 
-    A pose counts for the parts that none of the others moves before.
+    A pose counts for the parts that none of the others moves before. others: behaviors that move the torso, too, and
+    are not told; one without a time of its start is under way.
     """
+    count, items = len(items), [*items, *others]
     began = clock.at
     times: list[Mapping[str, Seconds]] = [
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
     passing = [{each.sync for each in item.times if each.through} for item in items]
-    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times)]
-    heapify(events)
+    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times) if START in at]
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
+    for number in range(count, len(items)):
+        if START not in times[number] and (run := _under_way(torso, items[number])) is not None:
+            part = parts[number] = _go_on(torso, run, times[number], passing[number])
+            moved.update(run.course.parts)
+            events += [(until, RELEASE, number, sync) for sync, until in part.waits.items()]
+    heapify(events)
     told: dict[int, Estimate] = {}
     awaited: dict[int, Seconds] = {}
     """When each paced behavior passes its next point, by its number."""
@@ -256,12 +265,28 @@ def rehearsed(torso: Torso, clock: Clock, items: Sequence[EstimateItem]) -> tupl
                 for sync, until in begun.waits.items():
                     heappush(events, (until, RELEASE, number, sync))
         for each, part in parts.items():
-            part.foresee(torso, clock.at)
+            if each < count:
+                part.foresee(torso, clock.at)
             if (due := part.next_due()) is not None and due != awaited.get(each):
                 awaited[each] = due
                 heappush(events, (max(due, clock.at), RELEASE, each, ""))
-    told |= {number: part.told() for number, part in parts.items()}
-    return tuple([told[number] for number in range(len(items))])
+    told |= {number: part.told() for number, part in parts.items() if number < count}
+    return tuple([told[number] for number in range(count)])
+
+
+def _under_way(torso: Torso, item: EstimateItem) -> Run | None:
+    """The run of a behavior that is under way."""
+    return next((run for run in torso.runs.values() if run.behavior == item.behavior and not run.is_over), None)
+
+
+def _go_on(torso: Torso, run: Run, times: Mapping[str, Seconds], passing: Container[str]) -> _Part:
+    """Let a behavior that is under way go on up to the first point where it has to wait."""
+    coming = [point for point in run.pending if point.sync in times]
+    waits = {point.held_with: times[point.sync] for point in coming if point.held_with and point.sync not in passing}
+    run.authority.extend(_through(run.behavior, list(waits)))
+    if not run.holding:
+        torso.extend(run)
+    return _Part(run, Estimate(behavior=run.behavior.id, feasible=True), waits, ())
 
 
 def _begin(

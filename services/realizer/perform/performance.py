@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 
 from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
+from engage_hri.schemas.body import Estimate, SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import BLOCK_ITSELF
@@ -28,9 +28,11 @@ from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.net_stream import NetStream
 from engage_hri.services.realizer.perform.outcome import completed, reasons
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
+from engage_hri.services.realizer.perform.rehearsing import Rehearsing
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.perform.ties import Ties
+from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.phases import ARMS
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -75,6 +77,7 @@ class BlockPerformance:
         self._timer = Timer(self.take_in)
         self._afterwards = Afterwards(self.take_in)
         self._soon = Alarm(self.take_in)
+        self.rehearsing = Rehearsing(self, shared.others, shared.bus.now, shared.ask)
         self.leaders: Collection[str] = ()
         self._untold: list[News] = []
         self._needs_replan = False
@@ -113,9 +116,11 @@ class BlockPerformance:
                     self.held.tell()
                     self._take_out(self._live.taken_out)
                     self.take_in()
+                    self._look_again()
+                    rehearsing = tasks.create_task(self.rehearsing.run(), name=f"{block}: rehearsing")
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
-                for task in self._tasks.values():
+                for task in (rehearsing, *self._tasks.values()):
                     task.cancel()
         finally:
             self._close()
@@ -350,20 +355,38 @@ class BlockPerformance:
             self.report.warn("EXECUTION_FAILURE", str(fault))
         self._live.stop(Ending("failed", fault))
 
-    def replan(self) -> None:
-        """Go on as if what was dropped, or vanished elsewhere, had never been written."""
+    def plan_with(self, estimates: Iterable[Estimate]) -> None:
+        """Plan what is left with other estimates, unless that costs a behavior."""
+        self.replan(tuple(estimates))
+
+    def replan(self, estimates: Collection[Estimate] = ()) -> None:
+        """Go on as if what was dropped, or vanished elsewhere, had never been written.
+
+        estimates: to plan with, unless that costs a behavior; empty: those of before.
+        """
         self._tell()  # A behavior of which something is to be told may not be in the new plan.
         self._needs_replan = False
         gone, so_far, known = (*self._dropped, *self.ties.gone), self.decisions.plan, self.ties.known()
         # Blocks that came later were planned around the arms that this one has chosen.
         chosen = {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
         try:
-            plan = plan_block(so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=chosen)
+            plan = plan_block(
+                so_far.block,
+                estimates or so_far.estimates.values(),
+                dropped=gone,
+                known=known,
+                barred=chosen,
+                turns=so_far.turns if estimates else frozenset(),
+            )
         except InputRefused as error:
-            self._live.fail(error.fault)
+            if not estimates:
+                self._live.fail(error.fault)
+            return
+        if estimates and (not set(plan.dropped) <= {*gone, *so_far.dropped} or plan.takes != so_far.takes):
             return
         self.decisions.replan(plan)
         self.ties.renew()
+        self._look_again()
         # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.
         for id in tuple(self._dropped):
             self._shared.live_blocks.lose(self.plan.block.id, id)
@@ -378,6 +401,15 @@ class BlockPerformance:
                 if self._runs[problem.behavior].pending is not None:
                     self.body.abort(problem.behavior)
                 self.lose(problem.behavior, Fault(reason=problem.message), problem.kind)
+
+    def _look_again(self) -> None:
+        """Have all blocks that move the body rehearse again what is to come: this one is planned anew."""
+        for each in self._shared.others():
+            each.rehearsing.look_again()
+
+    def known(self) -> Known:
+        """Other live blocks, as known now."""
+        return self.ties.known()
 
     # -- parts of the body -------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Hand, Speech
 from engage_hri.schemas.blocks import Block, PerformBlock
-from engage_hri.schemas.body import BodyPose, Estimate, EstimateBehaviors, EstimateItem, Estimates, PlannedTime
+from engage_hri.schemas.body import Estimate, EstimateBehaviors, Estimates
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.services.bus.interface import Bus
@@ -16,6 +16,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, may_share, parts_of
 from engage_hri.services.realizer.perform.live import Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
@@ -24,7 +25,7 @@ from engage_hri.services.realizer.plan.planner import plan_steps
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.plan.steps import Steps, T
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.points import Point
 
 SLICE = 512
 """Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
@@ -61,7 +62,7 @@ class Planning:
         named = frozenset(point for point in relations.named if is_foreign(point.behavior))
         block = validated(block)
         question = question_about(block)
-        estimates = await self._estimates(block, question)
+        estimates = await self.estimates(block, question)
         await self._earlier(live, named)
         live.is_planning = True
         waits = bool(live.earlier) and block.composition != "MERGE"
@@ -70,8 +71,8 @@ class Planning:
     async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Plan a block that had to wait: by now the body and the other blocks are elsewhere."""
         known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
-        question = question_about(plan.block, poses_before(plan, known), planned_times(plan, known))
-        estimates = await self._estimates(plan.block, question)
+        question = self._question(plan, known)
+        estimates = await self.estimates(plan.block, question)
         return await self._agreed(plan.block, question, estimates, elsewhere, plan.foreign)
 
     async def _agreed(
@@ -105,16 +106,23 @@ class Planning:
                 if rounds.settled is None:
                     raise
                 return rounds.settled
-            about_plan = question_about(plan.block, poses_before(plan, known), planned_times(plan, known))
+            about_plan = self._question(plan, known)
             if plan.block is chosen:
-                told = rounds.answer(about_plan) or await self._estimates(chosen, about_plan)
+                told = rounds.answer(about_plan) or await self.estimates(chosen, about_plan)
                 if (agreed := rounds.close(plan, about_plan, told)) is not None:
                     return agreed
             else:
-                chosen, rounds = plan.block, Rounds(about_plan, await self._estimates(plan.block, about_plan))
+                chosen, rounds = plan.block, Rounds(about_plan, await self.estimates(plan.block, about_plan))
             if refused := hands_refused(block, chosen, rounds.estimates):
                 barred |= refused
                 chosen, rounds = block, Rounds(question, first)
+
+    def _question(self, plan: Plan, known: Known) -> EstimateBehaviors:
+        """The question to the body about a plan, beside what it does for the other blocks."""
+        times = planned_times(plan, known)
+        question = question_about(plan.block, poses_before(plan, known), times)
+        moving = meanwhile(self._performing(), parts_moved(plan, times), self._bus.now()) if known.holders else ()
+        return replace(question, others=moving)
 
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""
@@ -126,21 +134,21 @@ class Planning:
         ]:
             await asyncio.wait([awaited[0].settled])
 
-    async def planned(self, block: Block, others: Iterable[Live]) -> None:
+    async def planned(self, block: Block, rivals: Iterable[Live]) -> None:
         """Wait until those are planned that are being planned now, and that a block may share parts with."""
-        while awaited := [each for each in others if each.is_planning and may_share(block, each.block)]:
+        while awaited := [each for each in rivals if each.is_planning and may_share(block, each.block)]:
             await asyncio.wait([awaited[0].settled])
 
     def _known(
         self, block: Block, elsewhere: Mapping[str, Block], named: Collection[Point], estimates: Iterable[Estimate]
     ) -> Known:
         now = self._bus.now()
-        parts, others = parts_of(block.behaviors, estimates), list(self._performing())
-        performing = {each.decisions.plan.block.id for each in others}
+        parts, performed = parts_of(block.behaviors, estimates), list(self._performing())
+        performing = {each.decisions.plan.block.id for each in performed}
         asker = Asker(block.id, now, now, named, parts, elsewhere, performing=performing)
-        return knowledge(asker, others, self._live_blocks)
+        return knowledge(asker, performed, self._live_blocks)
 
-    async def _estimates(self, block: Block, question: EstimateBehaviors) -> tuple[Estimate, ...]:
+    async def estimates(self, block: Block, question: EstimateBehaviors) -> tuple[Estimate, ...]:
         """Estimates of the body for behaviors of a block. Raises BlockRefused."""
         if not question.items:
             return ()
@@ -163,24 +171,6 @@ class Planning:
 async def planned_alone(bus: Bus, block: Block, config: RealizerConfig) -> Plan:
     """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
     return await Planning(bus, config, LiveBlocks(), list).plan(Live(PerformBlock(id="plan", block=block), ()))
-
-
-def question_about(
-    block: Block, before: Mapping[str, BodyPose] = {}, times: Mapping[str, tuple[PlannedTime, ...]] = {}
-) -> EstimateBehaviors:
-    """The question to the body about the behaviors of a block that it performs.
-
-    before: poses in which behaviors start; without one, from where the body is now. times: when they are planned to
-    begin and to wait, in the order in which they begin.
-    """
-    behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
-    rank = {id: number for number, id in enumerate(times)}
-    behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
-    items = [
-        EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
-        for behavior in behaviors
-    ]
-    return EstimateBehaviors(items=tuple(items))
 
 
 async def unhurried(steps: Steps[T]) -> T:

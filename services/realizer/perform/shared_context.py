@@ -12,6 +12,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.perform.rehearsing import Ask, Rehearsing
 from engage_hri.services.realizer.perform.ties import Tied
 from engage_hri.services.requests.ends import Requester
 
@@ -45,6 +46,8 @@ class Presence:
 class Moving(Tied, Protocol):
     """A performance, as the others and the reports of the body see it."""
 
+    rehearsing: Rehearsing
+
     @property
     def parts_moving(self) -> set[str]: ...
     def containing(self) -> Containing: ...
@@ -56,7 +59,7 @@ class SharedContext(Struct, frozen=True):
 
     routes: for the id of each request to the body, the performance that sent it. others: all performances, in the
     order in which they began. live_blocks: for ties between blocks. over: told of each block and behavior of it that
-    is held and has ended.
+    is held and has ended. ask: asks the body about behaviors of a block.
     """
 
     bus: Bus
@@ -67,3 +70,4 @@ class SharedContext(Struct, frozen=True):
     others: Callable[[], Iterable[Moving]]
     live_blocks: LiveBlocks
     over: Callable[[str, str], None]
+    ask: Ask

@@ -52,13 +52,14 @@ def plan_block(
     dropped: Iterable[str] = (),
     known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
+    turns: frozenset[Turn] = frozenset(),
 ) -> Plan:
     """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
     dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
-    cannot be done.
+    cannot be done. turns: those to begin with.
     """
-    return finished(plan_steps(block, estimates, dropped=dropped, known=known, barred=barred))
+    return finished(plan_steps(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns))
 
 
 def plan_steps(

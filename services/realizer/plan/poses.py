@@ -1,6 +1,6 @@
 """Questions to the body about a plan: the poses in which behaviors start, and when they begin, wait and hurry."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from math import inf
 
@@ -66,21 +66,31 @@ def planned_times(plan: Plan, known: Known = NOTHING) -> dict[str, tuple[Planned
     order = plan.begun_in_order(plan.chains)
     order.sort(key=lambda id: round(plan.predicted(plan.chains[id].points[0]), 6))
     moving = [id for id in order if (estimate := plan.estimates.get(id)) is not None and estimate.parts]
-    times = {id: _times(plan, id, known) for id in moving if plan.estimates[id].parts != ("voice",)}
+    times = {
+        id: behavior_times(plan, id, known, plan.predicted) for id in moving if plan.estimates[id].parts != ("voice",)
+    }
     used = [part for id in times for part in plan.estimates[id].parts]
+    used += [part for each in known.holders.values() for part in each.chain.parts]
     if len(set(used)) == len(used) and "torso" not in used and all(len(each) == 1 for each in times.values()):
         return {}
     return times
 
 
-def _times(plan: Plan, id: str, known: Known) -> tuple[PlannedTime, ...]:
+def behavior_times(
+    plan: Plan, id: str, known: Known, at: Callable[[Point], Seconds], reached: int = 0
+) -> tuple[PlannedTime, ...]:
+    """Times at which a behavior begins, waits, hurries and dawdles, without those of the points that it has reached.
+
+    at: when a point of the plan comes. reached: number of the behavior's points that have been.
+    """
     chain = plan.chains[id]
-    times = [PlannedTime(sync=chain.points[0].sync, at=plan.predicted(chain.points[0]))]
-    taken, (_, cut) = _taken(plan, id), plan.successors.get(id, ("", None))
+    times = [] if reached else [PlannedTime(sync=chain.points[0].sync, at=at(chain.points[0]))]
+    taken, (_, cut) = _taken(plan, id, at), plan.successors.get(id, ("", None))
     is_lost = False
-    for (since, to), segment in zip(pairwise(chain.points), chain.segments, strict=True):
+    left = max(0, reached - 1)
+    for (since, to), segment in list(zip(pairwise(chain.points), chain.segments, strict=True))[left:]:
         is_lost = is_lost or to == cut
-        begins, comes = plan.predicted(since), plan.predicted(to)
+        begins, comes = at(since), at(to)
         surplus = comes - begins - segment.natural
         if segment.hold and is_lost:  # It may not pass: it waits there until it is cut.
             times.append(PlannedTime(sync=to.sync, at=taken + CUT))
@@ -91,8 +101,8 @@ def _times(plan: Plan, id: str, known: Known) -> tuple[PlannedTime, ...]:
         is_due = _is_met_there(plan, to, known, begins) if segment.hold else is_just_in_time
         if abs(surplus) > NOTICEABLE or is_due:
             is_slower = EPSILON < surplus <= slack(plan, to)
-            at = comes + (APART if id in plan.natural else 0.0)
-            times.append(PlannedTime(sync=to.sync, at=at, through=is_slower))
+            when = comes + (APART if id in plan.natural else 0.0)
+            times.append(PlannedTime(sync=to.sync, at=when, through=is_slower))
     return tuple(times)
 
 
@@ -106,15 +116,15 @@ def _is_met_there(plan: Plan, hold: Point, known: Known, before: Seconds) -> boo
     return any(known.points.get(each.point, inf) > before for each in others)
 
 
-def _taken(plan: Plan, id: str) -> Seconds:
+def _taken(plan: Plan, id: str, at: Callable[[Point], Seconds]) -> Seconds:
     """Time at which another takes a part of this behavior. A shift takes nothing from what lies over it."""
     is_shift = plan.chains[id].type in SHIFTS
-    begun, parts = plan.predicted(plan.chains[id].points[0]), set(plan.chains[id].parts)
+    begun, parts = at(plan.chains[id].points[0]), set(plan.chains[id].parts)
     later = plan.entering[plan.entering.index(id) + 1 :]
     rivals = [plan.chains[each] for each in later if is_shift or plan.chains[each].type not in SHIFTS]
-    starts = [plan.predicted(each.points[0]) for each in rivals if parts & set(each.parts)]
+    starts = [at(each.points[0]) for each in rivals if parts & set(each.parts)]
     if id in plan.successors and is_foreign(successor := plan.successors[id][0]):
-        starts.append(plan.predicted(Point(successor, "start")))
+        starts.append(at(Point(successor, "start")))
     return min((start for start in starts if start >= begun), default=inf)
 
 

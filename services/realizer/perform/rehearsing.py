@@ -1,0 +1,103 @@
+"""Rehearsal of a block that is being performed, again and again: the body is asked what is to come takes by now.
+
+How long a behavior takes depends on where its parts are as it begins, so on the behaviors before it, of whatever
+block. Another block comes, something is dropped, parts change hands in another order: then the phases that the plan
+was made with are no longer true. Nothing waits for the answer.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from typing import Protocol
+
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, EstimateBehaviors
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.perform.knowledge import Performed
+from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about, times_ahead
+from engage_hri.services.realizer.plan.agreement import STRAIGHT, between, difference
+from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.poses import NOTICEABLE, poses_before
+
+MOST = 6
+"""Most questions in a row, each because of the answer to the one before."""
+PAUSE: Seconds = 0.1
+"""Seconds from the end of such a row to the next one at least: blocks may never agree with each other."""
+Ask = Callable[[Block, EstimateBehaviors], Awaitable[tuple[Estimate, ...]]]
+"""A question to the body about behaviors of a block. Raises EngageError."""
+
+
+class Rehearsed(Performed, Protocol):
+    """A block that is being performed."""
+
+    def known(self) -> Known:
+        """Other live blocks, as known now."""
+
+    def take_in(self, news: Callable[[], object]) -> None:
+        """Take in news and do what follows from it, unless the block is ending."""
+
+    def plan_with(self, estimates: Iterable[Estimate]) -> None:
+        """Plan what is left with other estimates, unless that costs a behavior."""
+
+
+class Rehearsing:
+    """The questions about one block."""
+
+    def __init__(
+        self, owner: Rehearsed, others: Callable[[], Iterable[Performed]], now: Callable[[], Seconds], ask: Ask
+    ) -> None:
+        """others: all performances, in the order in which they began."""
+        self._owner = owner
+        self._others = others
+        self._now = now
+        self._ask = ask
+        self._changed = asyncio.Event()
+
+    def look_again(self) -> None:
+        """Ask the body soon, and once, about all that has changed by then."""
+        self._changed.set()
+
+    async def run(self) -> None:
+        """Ask whenever something has changed, until cancelled."""
+        while True:
+            await self._changed.wait()
+            for number in range(MOST):
+                self._changed.clear()
+                await self._look(1.0 if number < STRAIGHT else 0.5)
+                if not self._changed.is_set():
+                    break
+            else:
+                await asyncio.sleep(PAUSE)
+
+    async def _look(self, weight: float) -> None:
+        """Ask, and plan with the answer if it says something else. weight: of the answer."""
+        plan = self._owner.decisions.plan
+        question = self._question(plan)
+        if not question.items:
+            return
+        try:
+            told = await self._ask(plan.block, question)
+        except EngageError:
+            return  # Nobody knows better.
+        if self._owner.decisions.plan is plan:
+            begun = self._owner.decisions.facts.begun
+            before = tuple(plan.estimates.values())
+            told = tuple([each for each in told if each.feasible and each.behavior not in begun])
+            if max(difference(before, told)) > NOTICEABLE:
+                better = {each.behavior: each for each in between(before, told, weight)}
+                self._owner.take_in(partial(self._owner.plan_with, {**plan.estimates, **better}.values()))
+
+    def _question(self, plan: Plan) -> EstimateBehaviors:
+        """The question about the behaviors that have yet to begin; without any, there is nothing to ask."""
+        now, begun = self._now(), self._owner.decisions.facts.begun
+        times = {id: each for id, each in times_ahead(self._owner, now).items() if id not in begun}
+        if not times:
+            return EstimateBehaviors(items=())
+        asked = question_about(plan.block, poses_before(plan, self._owner.known()), times)
+        items = tuple([each for each in asked.items if each.behavior.id in times])
+        moving = meanwhile(
+            self._others(), parts_moved(plan, times), now, lambda each, id: each is not self._owner or id not in times
+        )
+        return EstimateBehaviors(items=items, others=moving)
