@@ -243,6 +243,9 @@ class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Times of its start, of the hold points at which it has to wait, and of points that it has to reach faster or
     slower than by itself; empty: it is estimated by itself. The items of one question that have times are one plan: a
     body that can rehearse it estimates each from where the others will have brought its parts by then."""
+    reached: int = 0
+    """Number of its sync points that it has reached: the first of its times are theirs, and have passed. It is under
+    way then. Phases that are over count for nothing in its estimate."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):
@@ -250,8 +253,8 @@ class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behavio
 
     items: tuple[EstimateItem, ...]
     others: tuple[EstimateItem, ...] = ()
-    """Behaviors of other blocks that move the body meanwhile, with their times; the answer does not have them. One
-    without a time of its start is under way. A body that can rehearse lets them move, too."""
+    """Behaviors that move the body meanwhile, with their times: mostly of other blocks. They are not answered. A body
+    that can rehearse lets them move, too."""
 
 
 class Estimates(Struct, frozen=True, kw_only=True, tag="estimates", omit_defaults=True):

@@ -255,7 +255,7 @@ class Body(ABC):
         """Estimate the behaviors of a plan. Not overridden, each is estimated by itself from its pose.
 
         items: the behaviors, with the times at which they are to begin and to wait. others: behaviors of other plans
-        that move the body meanwhile, in the same way; one without a time of its start is under way.
+        that move the body meanwhile, in the same way.
         world: the entities that targets name, in metres.
         """
         return [self.estimate(item.behavior, item.pose, world) for item in items]

@@ -159,14 +159,22 @@ def _shown(term: Term, case: Case) -> str:
 
 
 def surprises(case: Case, block: str) -> list[tuple[float, str]]:
-    """How far each point was off the last prediction told before it, with its name; the farthest first."""
+    """How far each point was off the last prediction told before it, with its name; the farthest first.
+
+    What comes as another block comes nobody can foresee: that may have changed it.
+    """
     predictions = case.record.predictions(block)
     if not predictions:
         return []
     found = []
+    comings = [deed.at for deed in case.story.deeds if deed.kind == "perform" and deed.block != block]
     for each in case.record.points(block):
         at = each.at.seconds
-        told = [message for when, message in predictions if when < at - EXACT] or [predictions[0][1]]
+        if any(-EXACT < at - coming < EXACT for coming in comings):
+            continue
+        told = [message for when, message in predictions if when < at - EXACT]
+        # Points of the block's first instant are told with the first predictions.
+        told = told or [message for when, message in predictions if when <= at] or [predictions[0][1]]
         planned = {
             (point.behavior, point.sync): (message.at.seconds if message.at else 0.0) + point.time
             for message in told
@@ -188,9 +196,15 @@ def foreseeable(case: Case) -> list[str]:
 
 def _lost_on_the_way(case: Case, block: str) -> bool:
     began = case.times[Place(block, "", "start")]
+    named = {(term.place.block, term.place.behavior) for each in case.blocks[block].relations for term in each.terms}
+    concerned = {block, *(other for other, _ in named if other in case.blocks)}
     return any(
-        each.kind != "LATE" and (block, each.behavior) in case.lost and (each.at is None or each.at.seconds > began)
-        for each in case.record.warnings(block)
+        each.kind != "LATE"
+        and (other, each.behavior) in case.lost
+        and (other == block or (other, each.behavior) in named)
+        and (each.at is None or each.at.seconds > began)
+        for other in concerned
+        for each in case.record.warnings(other)
     )
 
 

@@ -224,7 +224,7 @@ def rehearsed(
     """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made.
 
     A pose counts for the parts that none of the others moves before. others: behaviors that move the torso, too, and
-    are not told; one without a time of its start is under way.
+    are not told.
     """
     count, items = len(items), [*items, *others]
     began = clock.at
@@ -232,16 +232,21 @@ def rehearsed(
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
     passing = [{each.sync for each in item.times if each.through} for item in items]
-    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times) if START in at]
+    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times) if not items[number].reached]
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
-    for number in range(count, len(items)):
-        if START not in times[number] and (run := _under_way(torso, items[number])) is not None:
+    told: dict[int, Estimate] = {}
+    for number, item in enumerate(items):
+        if item.reached and (run := _under_way(torso, item)) is not None:
             part = parts[number] = _go_on(torso, run, times[number], passing[number])
             moved.update(run.course.parts)
             events += [(until, RELEASE, number, sync) for sync, until in part.waits.items()]
+        elif item.reached:
+            told[number] = torso.estimate(item.behavior, None, torso.world)
+    for number, part in parts.items():
+        if number < count:
+            part.foresee(torso, clock.at)
     heapify(events)
-    told: dict[int, Estimate] = {}
     awaited: dict[int, Seconds] = {}
     """When each paced behavior passes its next point, by its number."""
     begun_at = -inf
@@ -286,7 +291,11 @@ def _go_on(torso: Torso, run: Run, times: Mapping[str, Seconds], passing: Contai
     run.authority.extend(_through(run.behavior, list(waits)))
     if not run.holding:
         torso.extend(run)
-    return _Part(run, Estimate(behavior=run.behavior.id, feasible=True), waits, ())
+    part = _Part(run, torso.estimate(run.behavior, None, torso.world), waits, ())
+    pending = {point.sync for point in run.pending}
+    now = torso.clock.time()
+    part.passed = {p.sync: times.get(p.sync, now) for p in run.course.points if p.sync not in pending}
+    return part
 
 
 def _begin(

@@ -14,18 +14,26 @@ from engage_hri.services.realizer.points import performer
 
 
 def question_about(
-    block: Block, before: Mapping[str, BodyPose] = {}, times: Mapping[str, tuple[PlannedTime, ...]] = {}
+    block: Block,
+    before: Mapping[str, BodyPose] = {},
+    times: Mapping[str, tuple[PlannedTime, ...]] = {},
+    reached: Callable[[str], int] = lambda behavior: 0,
 ) -> EstimateBehaviors:
     """The question to the body about the behaviors of a block that it performs.
 
     before: poses in which behaviors start; without one, from where the body is now. times: when they are planned to
-    begin and to wait, in the order in which they begin.
+    begin and to wait, in the order in which they begin. reached: number of points that a behavior has reached.
     """
     behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
     rank = {id: number for number, id in enumerate(times)}
     behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
     items = [
-        EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
+        EstimateItem(
+            behavior=behavior,
+            pose=before.get(behavior.id),
+            times=times.get(behavior.id, ()),
+            reached=reached(behavior.id),
+        )
         for behavior in behaviors
     ]
     return EstimateBehaviors(items=tuple(items))
@@ -44,7 +52,11 @@ def meanwhile(
     """
     matters = {*parts, "torso"}
     return tuple([
-        EstimateItem(behavior=with_planned_hand(each.decisions.plan.chains[id]), times=times)
+        EstimateItem(
+            behavior=with_planned_hand(each.decisions.plan.chains[id]),
+            times=times,
+            reached=each.decisions.facts.next_number(id),
+        )
         for each in performed
         if not each.is_ending
         for id, times in times_ahead(each, now).items()
@@ -54,9 +66,9 @@ def meanwhile(
 
 
 def times_ahead(performed: Performed, now: Seconds) -> dict[str, tuple[PlannedTime, ...]]:
-    """When behaviors begin, wait, hurry and dawdle from now on, in the order in which they begin.
+    """When behaviors began or begin, wait, hurry and dawdle, in seconds from now, in the order in which they begin.
 
-    Of those that move the body and have not ended; empty for one that is under way and waits no more.
+    Of those that move the body and have not ended.
     """
     decisions = performed.decisions
     plan, facts, expected = decisions.plan, decisions.facts, decisions.foresight.times(now)

@@ -10,6 +10,8 @@ from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate, EstimateBehaviors
 from engage_hri.schemas.faults import EngageError
@@ -82,20 +84,38 @@ class Rehearsing:
         except EngageError:
             return  # Nobody knows better.
         if self._owner.decisions.plan is plan:
-            begun = self._owner.decisions.facts.begun
             before = tuple(plan.estimates.values())
-            told = tuple([each for each in told if each.feasible and each.behavior not in begun])
+            told = tuple([self._ahead(plan, each) for each in told if each.feasible])
             if max(difference(before, told)) > NOTICEABLE:
                 better = {each.behavior: each for each in between(before, told, weight)}
                 self._owner.take_in(partial(self._owner.plan_with, {**plan.estimates, **better}.values()))
 
+    def _ahead(self, plan: Plan, told: Estimate) -> Estimate:
+        """The estimate that a behavior has in the plan, with the phases to the points that it has yet to reach."""
+        facts, id = self._owner.decisions.facts, told.behavior
+        known = plan.estimates[id]
+        reached = {point.sync for point in plan.chains[id].points[: facts.next_number(id)]}
+        if id not in facts.begun or [each.to for each in known.phases] != [each.to for each in told.phases]:
+            return told if id not in facts.begun else known
+        pairs = zip(known.phases, told.phases, strict=True)
+        return replace(known, phases=tuple([old if new.to in reached else new for old, new in pairs]))
+
     def _question(self, plan: Plan) -> EstimateBehaviors:
-        """The question about the behaviors that have yet to begin; without any, there is nothing to ask."""
-        now, begun = self._now(), self._owner.decisions.facts.begun
-        times = {id: each for id, each in times_ahead(self._owner, now).items() if id not in begun}
+        """The question about the behaviors that have yet to end; without any, there is nothing to ask.
+
+        Those that are told when to be where are not asked about: they take the time that they are told to take.
+        """
+        now, decisions = self._now(), self._owner.decisions
+        facts, paces = decisions.facts, decisions.foresight.paces
+        times = {
+            id: each
+            for id, each in times_ahead(self._owner, now).items()
+            if id not in facts.begun or (facts.next_number(id) and not paces.get(id) and not facts.is_held(id))
+        }
         if not times:
             return EstimateBehaviors(items=())
-        asked = question_about(plan.block, poses_before(plan, self._owner.known()), times)
+        poses = poses_before(plan, self._owner.known())
+        asked = question_about(plan.block, poses, times, facts.next_number)
         items = tuple([each for each in asked.items if each.behavior.id in times])
         moving = meanwhile(
             self._others(), parts_moved(plan, times), now, lambda each, id: each is not self._owner or id not in times

@@ -79,12 +79,12 @@ def planned_times(plan: Plan, known: Known = NOTHING) -> dict[str, tuple[Planned
 def behavior_times(
     plan: Plan, id: str, known: Known, at: Callable[[Point], Seconds], reached: int = 0
 ) -> tuple[PlannedTime, ...]:
-    """Times at which a behavior begins, waits, hurries and dawdles, without those of the points that it has reached.
+    """Times of the points that a behavior has reached; then those at which it begins, waits, hurries and dawdles.
 
-    at: when a point of the plan comes. reached: number of the behavior's points that have been.
+    at: when a point of the plan comes, or came. reached: number of the behavior's points that have been.
     """
     chain = plan.chains[id]
-    times = [] if reached else [PlannedTime(sync=chain.points[0].sync, at=at(chain.points[0]))]
+    times = [PlannedTime(sync=point.sync, at=at(point)) for point in chain.points[: max(1, reached)]]
     taken, (_, cut) = _taken(plan, id, at), plan.successors.get(id, ("", None))
     is_lost = False
     left = max(0, reached - 1)
