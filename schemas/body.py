@@ -245,7 +245,7 @@ class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
     body that can rehearse it estimates each from where the others will have brought its parts by then."""
     reached: int = 0
     """Number of its sync points that it has reached: the first of its times are theirs, and have passed. It is under
-    way then. Phases that are over count for nothing in its estimate."""
+    way then. Phases that are over count for nothing in its estimate; it has none if it moves nothing."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):

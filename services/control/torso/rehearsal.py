@@ -242,7 +242,9 @@ def rehearsed(
             moved.update(run.course.parts)
             events += [(until, RELEASE, number, sync) for sync, until in part.waits.items()]
         elif item.reached:
-            told[number] = torso.estimate(item.behavior, None, torso.world)
+            told[number] = Estimate(
+                behavior=item.behavior.id, feasible=True
+            )  # It moves nothing: a shift beneath a look.
     for number, part in parts.items():
         if number < count:
             part.foresee(torso, clock.at)

@@ -28,17 +28,21 @@ from engage_hri.services.realizer.points import Point, frozen
 
 NOTICEABLE: Seconds = 0.1
 """Seconds that people notice between what they see and hear; a prediction that moves by less is not told again."""
+PLANNED: Seconds = 0.002
+"""The same for the predictions of another plan: they are no mere consequence of what was measured."""
 
 AGAIN: Seconds = 0.001
 """Seconds between predictions, for each point that the last one told: the cost grows with their number."""
 
 
-def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds]) -> bool:
+def moved_noticeably(
+    old: Mapping[Point, Seconds], new: Mapping[Point, Seconds], noticeable: Seconds = NOTICEABLE
+) -> bool:
     """True if a point of `new` is not in `old`, or has moved by more than people notice.
 
     Points that `new` lacks have been, or were dropped: other feedback says so.
     """
-    return any(point not in old or abs(time - old[point]) > NOTICEABLE for point, time in new.items())
+    return any(point not in old or abs(time - old[point]) > noticeable for point, time in new.items())
 
 
 class News(NamedTuple):
@@ -65,6 +69,8 @@ class Reporter:
         """Time of the latest message; none after it has an earlier one."""
         self._told: dict[Point, Seconds] = {}
         """The last prediction of each point, in seconds from the block's start."""
+        self._plan: Plan | None = None
+        """The plan of which predictions were told last."""
         self._given_up: frozenset[tuple[str, str]] = frozen()
         """Times that speeches have given up, as the block says them, that were warned of."""
         self.not_before = 0.0
@@ -72,6 +78,7 @@ class Reporter:
 
     def started(self, plan: Plan, began: Seconds) -> None:
         """Tell that the block has begun, when its points are expected, and the problems of its plan."""
+        self._plan = plan
         self._given_up = frozen((id, said) for id, all in plan.given_up.items() for said in all)
         self._character = plan.block.character_id
         at = self._bus.stamp(self._no_earlier(began))
@@ -92,8 +99,9 @@ class Reporter:
         """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
         ours = {point: times[point] for point in _points(plan) if point in times}
         self.not_before = self._bus.now() + AGAIN * len(ours)
-        if moved_noticeably(self._told, ours):
+        if moved_noticeably(self._told, ours, NOTICEABLE if plan is self._plan else PLANNED):
             self._predict(plan, began, ours)
+        self._plan = plan
 
     def _predict(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
         self._told.update(times)

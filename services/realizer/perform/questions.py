@@ -14,27 +14,36 @@ from engage_hri.services.realizer.points import performer
 
 
 def question_about(
-    block: Block,
-    before: Mapping[str, BodyPose] = {},
-    times: Mapping[str, tuple[PlannedTime, ...]] = {},
-    reached: Callable[[str], int] = lambda behavior: 0,
+    block: Block, before: Mapping[str, BodyPose] = {}, times: Mapping[str, tuple[PlannedTime, ...]] = {}
 ) -> EstimateBehaviors:
     """The question to the body about the behaviors of a block that it performs.
 
     before: poses in which behaviors start; without one, from where the body is now. times: when they are planned to
-    begin and to wait, in the order in which they begin. reached: number of points that a behavior has reached.
+    begin and to wait, in the order in which they begin.
     """
     behaviors = [behavior for behavior in block.behaviors if performer(behavior) == "body"]
     rank = {id: number for number, id in enumerate(times)}
     behaviors.sort(key=lambda behavior: rank.get(behavior.id, len(rank)))
     items = [
-        EstimateItem(
-            behavior=behavior,
-            pose=before.get(behavior.id),
-            times=times.get(behavior.id, ()),
-            reached=reached(behavior.id),
-        )
+        EstimateItem(behavior=behavior, pose=before.get(behavior.id), times=times.get(behavior.id, ()))
         for behavior in behaviors
+    ]
+    return EstimateBehaviors(items=tuple(items))
+
+
+def question_about_rest(
+    performed: Performed, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]]
+) -> EstimateBehaviors:
+    """The same about behaviors of a block that is being performed: those with `times`."""
+    plan, facts = performed.decisions.plan, performed.decisions.facts
+    items = [
+        EstimateItem(
+            behavior=with_planned_hand(plan.chains[id]),
+            pose=before.get(id),
+            times=each,
+            reached=facts.next_number(id),
+        )
+        for id, each in times.items()
     ]
     return EstimateBehaviors(items=tuple(items))
 

@@ -17,7 +17,7 @@ from engage_hri.schemas.body import Estimate, EstimateBehaviors
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.perform.knowledge import Performed
-from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about, times_ahead
+from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about_rest, times_ahead
 from engage_hri.services.realizer.plan.agreement import STRAIGHT, between, difference
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
@@ -115,9 +115,8 @@ class Rehearsing:
         if not times:
             return EstimateBehaviors(items=())
         poses = poses_before(plan, self._owner.known())
-        asked = question_about(plan.block, poses, times, facts.next_number)
-        items = tuple([each for each in asked.items if each.behavior.id in times])
+        asked = question_about_rest(self._owner, poses, times)
         moving = meanwhile(
             self._others(), parts_moved(plan, times), now, lambda each, id: each is not self._owner or id not in times
         )
-        return EstimateBehaviors(items=items, others=moving)
+        return replace(asked, others=moving)
