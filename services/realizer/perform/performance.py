@@ -116,7 +116,7 @@ class BlockPerformance:
                     self.held.tell()
                     self._take_out(self._live.taken_out)
                     self.take_in()
-                    self._look_again()
+                    self._look_again(self)
                     rehearsing = tasks.create_task(self.rehearsing.run(), name=f"{block}: rehearsing")
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
@@ -402,10 +402,11 @@ class BlockPerformance:
                     self.body.abort(problem.behavior)
                 self.lose(problem.behavior, Fault(reason=problem.message), problem.kind)
 
-    def _look_again(self) -> None:
-        """Have all blocks that move the body rehearse again what is to come: this one is planned anew."""
+    def _look_again(self, but: object = None) -> None:
+        """Have all blocks rehearse again what is to come: the plan of this one is new."""
         for each in self._shared.others():
-            each.rehearsing.look_again()
+            if each is not but:
+                each.rehearsing.look_again()
 
     def known(self) -> Known:
         """Other live blocks, as known now."""
