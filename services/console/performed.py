@@ -41,7 +41,7 @@ HANDS: Mapping[Hand, str] = {
 
 
 class Deed(NamedTuple):
-    """What the robot does in a behavior. sync: when it is seen, in the spelling of the block's dialect."""
+    """Words for what the robot does in a behavior. sync: when it is seen, in the spelling of the block's dialect."""
 
     sync: str
     words: str

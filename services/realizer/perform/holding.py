@@ -34,7 +34,7 @@ class Holds:
         return sorted(self._since.items(), key=lambda each: each[1])
 
     def around(self, block: str, behavior: str) -> Named | None:
-        """What is held of which this is a part, the smallest such: it goes on only when that does. None: nothing."""
+        """The smallest of what is held of which this is a part: it goes on only when that does. None: nothing."""
         named = (block, behavior)
         wholes = [held for held in self._since if held != named and _is_part(named, held)]
         return max(wholes, default=None)

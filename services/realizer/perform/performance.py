@@ -34,6 +34,7 @@ from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.plan.phases import ARMS
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
@@ -55,14 +56,13 @@ class BlockPerformance:
         self.plan = plan
         self._shared = shared
         self.bus = shared.bus
-        self._requests = shared.requests
-        self._config = shared.config
+        self._requests, self._config = shared.requests, shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
         self._net = NetStream(shared.bus, live.id)
-        self.report = Reporter(shared.bus, live.id, shared.config.skew)
+        self.report = Reporter(shared.bus, live.id, shared.config.skew, Spelling(plan.block, live.elsewhere))
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
@@ -274,6 +274,7 @@ class BlockPerformance:
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
+                sync = self.report.spelling.sync(Point(id, sync))
                 self._runs[id].lose(Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
                 return True
         return False
