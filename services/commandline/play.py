@@ -238,6 +238,7 @@ async def _perform(
     """
     worst = DONE
     for thing in source.things:
+        job.warnings.ask(thing.id)
         try:
             outcome = await _submit(thing, robot, patience)
         except EngageError as error:

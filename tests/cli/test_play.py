@@ -233,6 +233,23 @@ def test_the_log_says_each_thing_that_the_robot_does_when_it_is_seen(engage: Eng
     assert told[3:] == ["0:06.0  robot shows the face SMILE"]
 
 
+def test_a_block_whose_id_is_taken_is_refused_in_one_line_without_its_id_twice(
+    engage: Engage, files: dict[str, Path]
+) -> None:
+    result = engage(*PLAY, "--at", "0,0.5", files["long"], files["long"])
+
+    (refusal,) = result.err.splitlines()
+    assert refusal.startswith(f"{files['long']}: long: a block of this id is still being performed (")
+    assert result.code == 2
+
+
+def test_a_warning_about_a_behavior_names_it_once(engage: Engage, tmp_path: Path) -> None:
+    (tmp_path / "x.xml").write_text('<bml id="b"><gesture id="g" lexeme="NOBODYS"/></bml>')
+    result = engage(*PLAY, tmp_path / "x.xml")
+
+    assert result.err.splitlines()[0].startswith("! CANNOT_CREATE_BEHAVIOR b:g: line 1: no gesture 'NOBODYS'")
+
+
 def test_an_id_that_names_an_emoji_is_printed_as_it_is(engage: Engage, tmp_path: Path) -> None:
     (tmp_path / "x.xml").write_text('<bml id="b"><wait id="x" duration="0.1"/></bml>')
     result = engage(*PLAY, "-v", tmp_path / "x.xml")

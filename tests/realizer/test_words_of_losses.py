@@ -1,4 +1,4 @@
-"""Words about what is lost, as the author of a block reads them: who is in the way, which lines say so, what to do."""
+"""Words about what is lost, as the author of a block reads them: who is in the way, which lines, what to do."""
 
 import re
 

@@ -179,7 +179,7 @@ class BlockPerformance:
     def fail(self, behavior: str, fault: Fault) -> None:
         """End the block as failed, and say that it is because of this behavior."""
         self._tell()
-        self.report.warn("EXECUTION_FAILURE", str(fault), behavior)
+        self.report.warn("EXECUTION_FAILURE", fault.within(self.id, behavior), behavior)
         self._live.fail(Fault(reason=fault.reason, where=f"{self.id}: {behavior}"))
 
     def follow(self, points: Iterable[Point]) -> None:
@@ -325,12 +325,12 @@ class BlockPerformance:
         if id in self._dropped or self._ending.done():
             return
         self._tell()
-        self._dropped[id] = str(fault)
+        self._dropped[id] = why = fault.within(self.id, id)
         if id in self.interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self.report.interrupted(id, self.spoken.of(id), self.interrupted[id])
         else:
-            self.report.warn(kind, str(fault), id)
+            self.report.warn(kind, why, id)
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
@@ -348,7 +348,7 @@ class BlockPerformance:
         """End the block: what performs it is gone."""
         if not self._ending.done():
             self._tell()
-            self.report.warn("EXECUTION_FAILURE", str(fault))
+            self.report.warn("EXECUTION_FAILURE", fault.within(self.id))
         self._live.stop(Ending("failed", fault))
 
     def replan(self) -> None:

@@ -138,7 +138,8 @@ class _Planner:
             self.dropped[behavior.id] = None
         elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
             kind = unsupported.kind_of(estimate.warning)
-            self._drop(behavior.id, kind, str(estimate.fault or "the body cannot do it"))
+            fault = estimate.fault or Fault(reason="the body cannot do it")
+            self._drop(behavior.id, kind, fault.within(self.block.id, behavior.id))
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
             if estimate and estimate.degraded:
