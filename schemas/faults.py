@@ -29,7 +29,10 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
 
     def within(self, *names: str) -> str:
-        """Write it where these names, one after the other, are told already: without them in its place."""
+        """Write it without the beginning of its place that is told already.
+
+        names: of a block and a behavior, one after the other.
+        """
         left = self.where.split(": ")
         for name in names:
             if left and left[0] == name:
