@@ -6,6 +6,7 @@ import pytest
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.test_losses import planned
 
 ONE_POINT_0 = '<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0">\n{}\n</bml>'
@@ -93,3 +94,15 @@ def test_of_a_phase_that_cannot_last_so_long_the_way_round_is_told() -> None:
         "n:ready is 2 s after bml:start, n takes at most 0.312 s from n:start to n:ready, "
         "n:start is 1 s after bml:start; the behavior is dropped (give it less time, or leave out one of its times)"
     ]
+
+
+def test_contradicting_offsets_are_told_with_the_points_as_they_are_written() -> None:
+    said = """<head id="n" lexeme="NOD" strokeEnd="s:end+0.5"/><speech id="s"><text>so</text></speech>
+<constraint id="c"><synchronize><sync ref="n:strokeEnd"/><sync ref="s:end + 1"/></synchronize></constraint>"""
+    block = decode_xml(ONE_POINT_0.format(said))
+    assert isinstance(block, Block)
+
+    with pytest.raises(BlockRefused) as refused:
+        planned(block)
+    assert "n:strokeEnd is already 1 s after s:end (" in str(refused.value)
+    assert "stroke_end" not in str(refused.value)
