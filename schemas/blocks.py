@@ -116,9 +116,11 @@ class PerformanceSteered(Outcome, frozen=True, kw_only=True, tag="performance_st
     """evt: realizer -> requester: what was asked for has been commanded; of a stop, it has ended.
 
     blocks: ids of the live blocks that it concerns; none, if what was to continue is held as a part of more.
+    held_with: that more, of which it is a part: its block, or the whole robot. Empty: it is held no longer.
     """
 
     blocks: tuple[str, ...] = ()
+    held_with: Literal["", "block", "robot"] = ""
 
 
 class SpokenText(Struct, frozen=True, kw_only=True, omit_defaults=True):

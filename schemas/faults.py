@@ -1,7 +1,7 @@
 """Faults (reason, place, advice) as a message, and the small hierarchy of exceptions that carry them."""
 
 from msgspec import Struct
-from msgspec.structs import force_setattr
+from msgspec.structs import force_setattr, replace
 
 
 class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
@@ -27,6 +27,17 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
             text = getattr(self, name)
             if isinstance(text, str) and not text.isascii():
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
+
+    def within(self, *names: str) -> str:
+        """Write it without the beginning of its place that is told already.
+
+        names: of a block and a behavior, one after the other.
+        """
+        left = self.where.split(": ")
+        for name in names:
+            if left and left[0] == name:
+                del left[0]
+        return str(replace(self, where=": ".join(left)))
 
     def __str__(self) -> str:
         place = ", ".join(part for part in (self.where, f"line {self.line}" if self.line else "") if part)

@@ -17,6 +17,10 @@ class Hold(Struct, frozen=True, kw_only=True, omit_defaults=True):
     block: str = ""
     behavior: str = ""
 
+    def holds(self, other: "Hold") -> bool:
+        """True if what the other holds is the same as what this one holds, or a part of it."""
+        return not self.block or (self.block == other.block and self.behavior in ("", other.behavior))
+
 
 class Held(Struct, frozen=True, kw_only=True, tag="held", omit_defaults=True):
     """state: realizer. All holds that are in force, the oldest first; none: nothing is held.

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas import allowed
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.documents.xml_decode import decode_xml
@@ -133,7 +134,8 @@ def _struct(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
         thing = msgspec.convert({**parsed, "type": kind.__struct_config__.tag}, kind)
     except msgspec.ValidationError as error:
         reason, _, where = str(error).partition(" - at `$")
-        raise _refusal(reason, f"{path}{where.rstrip('`')}", source, "see docs/protocol.md") from error
+        told = allowed.advice(kind, where, parsed) if reason.startswith("Invalid enum value") else ""
+        raise _refusal(reason, f"{path}{where.rstrip('`')}", source, told or "see docs/protocol.md") from error
     except RecursionError as error:
         raise _refusal("nested too deep", path, source) from error
     _refuse_unknown_keys(parsed, thing, path, source)

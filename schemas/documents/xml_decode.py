@@ -20,8 +20,8 @@ from typing import Any
 import msgspec
 from lxml import etree
 
+from engage_hri.schemas import allowed, vocabulary
 from engage_hri.schemas import behaviors as of
-from engage_hri.schemas import vocabulary
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
@@ -378,7 +378,9 @@ class _Document:
             what = f"no {grammar.attribute(missing[1])}" if missing else f"{grammar.attribute(field)}: {reason}"
             local = local_name(element)
             name = f"<{local} id={raw['id']!r}>" if raw.get("id") else f"<{local}>"
-            raise self._source.refusal(f"{name}: {what}", element, advice=grammar.choices(kind, field)) from error
+            raise self._source.refusal(
+                f"{name}: {what}", element, advice=allowed.advice(kind, f".{field}", raw)
+            ) from error
 
 
 def _ties(element: etree._Element) -> list[of.Timing]:

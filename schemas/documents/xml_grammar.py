@@ -242,9 +242,3 @@ def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
         with suppress(ValueError):
             return float(value)
     return value
-
-
-def choices(kind: type[msgspec.Struct], field: str) -> str:
-    """Advice that lists the values of a field, if it has only a few."""
-    values = [str(value) for value in get_args(_hints(kind).get(field)) if isinstance(value, str | int)]
-    return f"one of {', '.join(values)}" if values else ""

@@ -1,6 +1,7 @@
 """Holding, continuing and ending what the robot performs, for its collaboration manager."""
 
 from abc import ABC, abstractmethod
+from typing import Literal
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import (
@@ -66,7 +67,8 @@ class Steering(ABC):
     async def resume(self, block: str = "", behavior: str = "", *, timeout: Seconds | None = None) -> tuple[str, ...]:
         """Let what is held go on from where it is; returns the ids of the blocks.
 
-        A block lets go all its behaviors, an empty `block` everything. Arguments and errors as in `hold`.
+        A block lets go all its behaviors, an empty `block` everything. Arguments and errors as in `hold`; it is also
+        refused (InputRefused) if it is held still, because all of its block is, or the whole robot.
         """
         return await self._steer("continue", block, behavior, timeout)
 
@@ -87,4 +89,15 @@ class Steering(ABC):
         else:
             outcome = await self._ask(keys.ROBOT, SteerRobot(id=id, to=to), timeout)
         assert isinstance(outcome, PerformanceSteered)
+        if outcome.held_with:
+            raise InputRefused(_still_held(block, behavior, outcome.held_with))
         return outcome.blocks
+
+
+def _still_held(block: str, behavior: str, held_with: Literal["block", "robot"]) -> Fault:
+    where = f"{block}: {behavior}" if behavior else block
+    if held_with == "robot":
+        advice = "let the robot go on: `engage steer continue`, or `resume()`"
+        return Fault(reason="still held, because the whole robot is", where=where, advice=advice)
+    advice = f"let the block go on: `engage steer continue {block}`, or `resume({block!r})`"
+    return Fault(reason=f"still held, because all of block {block} is", where=where, advice=advice)

@@ -198,6 +198,8 @@ async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
 
     def tell(message: Message, at: Seconds) -> None:
         if job.played.concerns(message):
+            if deed := job.played.deed(message):
+                log.say(f"{hub.robot} {deed}", at)
             log(message, at)
             job.warnings(message, at)
             job.prose(message, at)
@@ -236,6 +238,7 @@ async def _perform(
     """
     worst = DONE
     for thing in source.things:
+        job.warnings.ask(thing.id)
         try:
             outcome = await _submit(thing, robot, patience)
         except EngageError as error:

@@ -12,6 +12,7 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.sources import Thing
+from engage_hri.services.console.performed import deeds
 
 GRACE: Seconds = 0.5
 """Time after its limit in which the end of an event must arrive."""
@@ -22,6 +23,7 @@ class Played:
 
     def __init__(self, things: Iterable[Thing]) -> None:
         things = tuple(things)
+        self._deeds = {name: deed for thing in things for name, deed in deeds(thing).items()}
         self.blocks = frozenset(thing.id for thing in things)
         self._announced = frozenset(
             (thing.id, behavior.id)
@@ -57,6 +59,14 @@ class Played:
             case _:
                 return
         self._changed.set()
+
+    def deed(self, message: Message) -> str:
+        """Words for what the robot does at a sync point, besides what actions tell of; empty: nothing."""
+        if isinstance(message, SyncPointProgress):
+            deed = self._deeds.get((message.block, message.behavior))
+            if deed is not None and deed.sync == message.sync:
+                return deed.words
+        return ""
 
     def concerns(self, message: Message) -> bool:
         """Tell whether a message is about the played things, and so to be written and told."""

@@ -1,5 +1,8 @@
 """Result of each fragment as a line of prose, once its connection events are decided; and warnings."""
 
+from collections import Counter
+from collections.abc import Callable
+
 from msgspec.structs import replace
 from rich.console import Console
 
@@ -61,29 +64,44 @@ class Warnings:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._begun: set[str] = set()
+        self._asked: Counter[str] = Counter()
+        """Blocks that were asked for and have not started, by id: how many of that id."""
         self._held: list[WarningFeedback] = []
         self.count = 0
 
     def __call__(self, message: Message, at: Seconds) -> None:
         match message:
-            case WarningFeedback(block=block):
+            case WarningFeedback():
                 self.count += 1
                 self._held.append(message)
-                if not block or block in self._begun:
-                    self.finish()
             case BlockProgress(progress="start", block=str() as block):
                 self._begun.add(block)
-                self.finish()
+                self._asked[block] -= bool(self._asked[block])
+        self._print(lambda block: block in self._begun and not self._asked[block])
+
+    def ask(self, block: str) -> None:
+        """Hold warnings of this id from now on: they may be about a block that is refused."""
+        self._asked[block] += 1
 
     def refused(self, block: str) -> None:
-        """Drop the waiting warnings of a block, as its refusal has told them."""
-        self._held = [each for each in self._held if each.block != block]
+        """Drop the waiting warnings of a block, as its refusal has told them.
+
+        If another one of that id is performed, what is about behaviors is that one's.
+        """
+        self._asked[block] -= 1
+        is_alone = block not in self._begun and not self._asked[block]
+        self._held = [each for each in self._held if each.block != block or (each.behavior and not is_alone)]
 
     def finish(self) -> None:
         """Print the waiting warnings."""
-        for each in self._held:
+        self._print(lambda block: True)
+
+    def _print(self, is_told: Callable[[str], bool]) -> None:
+        """Print the warnings of these blocks, and those of none."""
+        told = [each for each in self._held if not each.block or is_told(each.block)]
+        self._held = [each for each in self._held if each not in told]
+        for each in told:
             self._console.print(wording.warning(each), markup=False, highlight=False, soft_wrap=True)
-        self._held.clear()
 
 
 def strict_refusal(warnings: int) -> InputRefused:

@@ -42,8 +42,4 @@ async def _steer(options: Options, config: Config) -> None:
         blocks = await steer(options.block, options.behavior, timeout=PATIENCE)
     what = f"{options.block}: {options.behavior}" if options.behavior else ", ".join(blocks)
     coming = "; so is what comes, until `engage steer continue`" if options.to == "hold" and not options.block else ""
-    if options.to == "continue" and options.block and not blocks:
-        what = f"{options.block}: {options.behavior}" if options.behavior else options.block
-        print(f"still held: {what}, as a part of more that is held (`engage watch --only holds` says what)")
-        return
     print(f"{VERBS[options.to]}: {what or 'nothing is being performed'}{coming}")

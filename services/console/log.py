@@ -83,7 +83,12 @@ def holds(before: Scene, after: Scene, at: Seconds) -> Iterator[str]:
             already = f"for {wording.seconds(at - each.since)} already and " if at - each.since > NOTICED else ""
             yield f"held: {wording.held(each.hold)}, {already}for at most {wording.seconds(each.until - at)}"
     for each in before.held:
-        if each.hold not in left:
+        if each.hold in left:
+            continue
+        if wholes := [wording.held(hold) for hold in left if hold.holds(each.hold)]:
+            verb = "is" if len(wholes) == 1 else "are"
+            yield f"still held: {wording.held(each.hold)}, because {' and '.join(wholes)} {verb}"
+        else:
             yield f"no longer held: {wording.held(each.hold)}, after {wording.seconds(at - each.since)}"
 
 

@@ -138,11 +138,24 @@ def where(net: NetInView, place: NetPlace) -> str:
         return f"{place.behavior} from {since} to {to}"
     if place.behavior and place.kind == "order" and not place.lag:
         if place.source == 0:
-            return f"{place.behavior} waits for its start"
+            return f"{place.behavior} waits for its start{_awaited(net, place)}"
         if place.target == len(net.transitions) - 1:
             return f"{place.behavior} waits for the end of the block"
     lag = f" {seconds(place.lag)}" if place.lag else ""
     return f"{place.kind}{lag} from {source.name} to {target.name}"
+
+
+def _awaited(net: NetInView, place: NetPlace) -> str:
+    """Say after which instants a behavior is to start, and with which points of others; nothing if with none."""
+    before = {
+        each.source
+        for each in net.places
+        if each.target == place.target and each.source and each.kind not in ("idle", "phase")
+    }
+    after = [net.transitions[each].name for each in sorted(before)]
+    together = [str(each) for each in net.transitions[place.target].points if each.behavior != place.behavior]
+    said = (("after", after), ("with", together))
+    return "".join(f", {word} {' and '.join(names)}" for word, names in said if names)
 
 
 def sync_of(transition: NetTransition, behavior: str) -> str:

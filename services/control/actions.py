@@ -29,7 +29,7 @@ class ActionReporter:
             case Pointing(target=target):
                 action, targets, first, last = "point", (target,), "stroke_start", "stroke_end"
             case Head(lexeme=lexeme) if (known := _HEADS.get(lexeme.upper())) is not None:
-                action, targets, first, last = known, (), "start", "end"
+                action, targets, first, last = known, (), "stroke_start", "stroke_end"
             case Speech():
                 action, targets, first, last = "speak", (), "start", "end"
             case _:

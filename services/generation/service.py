@@ -108,7 +108,7 @@ class _Generation:
             case SyncPointProgress():
                 self._runner.feed(message, now)
             case Unreadable(id=id, fault=fault):
-                self._warn(id, "PARSING_FAILURE", str(fault))
+                self._warn(id, "PARSING_FAILURE", fault.within(id))
             case PeerGone(participant="control"):
                 self._runner.body_lost()
                 self._arbiter.body_lost()
@@ -140,7 +140,8 @@ class _Generation:
             self._runner.admit(request, world)
         except EngageError as error:
             self._refuse(request.id, error.fault)
-            self._warn(request.fragment.id, "PARSING_FAILURE", str(error.fault))
+            id = request.fragment.id
+            self._warn(id, "PARSING_FAILURE", error.fault.within(id))
 
     def _admit_early(self, now: Seconds) -> None:
         """Try again with the fragments that wait, now that the world is known or has changed."""

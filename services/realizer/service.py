@@ -244,7 +244,10 @@ class _Realizer:
         kind = error.kind if isinstance(error, BlockRefused) else "PARSING_FAILURE"
         block = live.request.block
         warning = WarningFeedback(
-            block=block.id or None, kind=kind, message=str(told(error.fault)), character_id=block.character_id
+            block=block.id or None,
+            kind=kind,
+            message=told(error.fault).within(block.id),
+            character_id=block.character_id,
         )
         self.bus.publish(keys.FEEDBACK, warning)
 
@@ -286,7 +289,7 @@ async def _result_or_stopped(stopped: asyncio.Future[Ending], work: Coroutine[An
 
 def unread(block: str, fault: Fault) -> WarningFeedback:
     """The warning about a message that came as a block and could not be read. block: its id; empty: not known."""
-    return WarningFeedback(block=block or None, kind="PARSING_FAILURE", message=str(fault))
+    return WarningFeedback(block=block or None, kind="PARSING_FAILURE", message=fault.within(block))
 
 
 async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:

@@ -215,6 +215,41 @@ def test_the_log_says_what_happens(engage: Engage, files: dict[str, Path]) -> No
     assert "block hello: done" in result.out
 
 
+def test_the_log_says_each_thing_that_the_robot_does_when_it_is_seen(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "all.xml"
+    path.write_text(
+        """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
+            <gesture id="wave" lexeme="WAVE" mode="LEFT_HAND" strokeStart="1"/>
+            <head id="n" lexeme="NOD" strokeStart="2"/>
+            <posture id="p" start="3" end="5"><pose part="ARMS" lexeme="ARMS_OPEN"/></posture>
+            <faceLexeme id="f" lexeme="SMILE" attackPeak="6" end="7"/></bml>"""
+    )
+    result = engage(*PLAY, path)
+
+    told = [line.strip() for line in result.out.splitlines() if " robot " in line]
+    assert (result.code, result.err) == (0, "")
+    assert told[:2] == ["0:01.0  robot makes the gesture WAVE with the left hand", "0:02.0  robot nods"]
+    assert told[2].endswith("robot takes the posture ARMS_OPEN ARMS")
+    assert told[3:] == ["0:06.0  robot shows the face SMILE"]
+
+
+def test_a_block_whose_id_is_taken_is_refused_in_one_line_without_its_id_twice(
+    engage: Engage, files: dict[str, Path]
+) -> None:
+    result = engage(*PLAY, "--at", "0,0.5", files["long"], files["long"])
+
+    (refusal,) = result.err.splitlines()
+    assert refusal.startswith(f"{files['long']}: long: a block of this id is still being performed (")
+    assert result.code == 2
+
+
+def test_a_warning_about_a_behavior_names_it_once(engage: Engage, tmp_path: Path) -> None:
+    (tmp_path / "x.xml").write_text('<bml id="b"><gesture id="g" lexeme="NOBODYS"/></bml>')
+    result = engage(*PLAY, tmp_path / "x.xml")
+
+    assert result.err.splitlines()[0].startswith("! CANNOT_CREATE_BEHAVIOR b:g: line 1: no gesture 'NOBODYS'")
+
+
 def test_an_id_that_names_an_emoji_is_printed_as_it_is(engage: Engage, tmp_path: Path) -> None:
     (tmp_path / "x.xml").write_text('<bml id="b"><wait id="x" duration="0.1"/></bml>')
     result = engage(*PLAY, "-v", tmp_path / "x.xml")

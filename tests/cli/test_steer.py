@@ -39,8 +39,11 @@ async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() ->
             with robot.feedback() as feedback:
                 performing = asyncio.create_task(robot.realize("b", [BEAT]))
                 assert await feedback.next(PATIENCE) is not None
-            still = "still held: b, as a part of more that is held (`engage watch --only holds` says what)"
-            assert await said(await start("steer", "continue", "b", *where)) == (0, still, "")
+            assert await said(await start("steer", "continue", "b", *where)) == (
+                2, "",
+                "b: still held, because the whole robot is "
+                "(let the robot go on: `engage steer continue`, or `resume()`)",
+            )  # fmt: skip
             code, _, error = await said(await start("steer", "hold", "b", "wave", *where))
             assert (code, error) == (
                 2,

@@ -23,6 +23,10 @@ async def test_what_the_robot_performs_is_held_goes_on_and_is_stopped(hub: Memor
                 match desk.take(received):
                     case SteerPerformance(id=id, block="nod"):
                         desk.refuse(id, Fault(reason="it is not being performed", where="nod"))
+                    case SteerPerformance(id=id, to="continue", behavior="speech-1"):
+                        desk.end(PerformanceSteered(id=id, held_with="block"))
+                    case SteerPerformance(id=id, to="continue", block="shake"):
+                        desk.end(PerformanceSteered(id=id, held_with="robot"))
                     case SteerRobot(id=id) | SteerPerformance(id=id) as request:
                         asked.append(replace(request, id="", requester="", life="", lease=0.0))
                         desk.end(PerformanceSteered(id=id, blocks=("wave",)))
@@ -33,6 +37,10 @@ async def test_what_the_robot_performs_is_held_goes_on_and_is_stopped(hub: Memor
             await robot.hold("nod")
         with pytest.raises(InputRefused, match="speech-1: a behavior without its block"):
             await robot.hold("", "speech-1")
+        with pytest.raises(InputRefused, match=r"wave: speech-1: still held, because all of block wave is .*wave"):
+            await robot.resume("wave", "speech-1")
+        with pytest.raises(InputRefused, match=r"shake: still held, because the whole robot is"):
+            await robot.resume("shake")
 
     assert blocks == [("wave",)] * 3
     assert asked == [

@@ -82,6 +82,20 @@ def test_it_is_told_what_is_held_and_when_it_is_held_no_longer() -> None:
     ]
 
 
+def test_what_is_let_go_and_held_still_as_a_part_of_more_is_not_said_to_be_free() -> None:
+    wave = Hold(block="b", behavior="wave", since=at(11.0), until=at(71.0))
+    block = Hold(block="b", since=at(12.0), until=at(72.0))
+    everything = Hold(since=at(13.0), until=at(73.0))
+    told = ((wave, block, everything), (block, everything), (everything,), ())
+    messages = tuple((Held(at=at(when), holds=holds), when) for when, holds in enumerate(told, 14))
+
+    assert lines(messages, Telling())[1:] == [
+        "0:05.0  still held: b: wave, because block b and everything are",
+        "0:06.0  still held: block b, because everything is",
+        "0:07.0  no longer held: everything, after 4.00 s",
+    ]
+
+
 def test_it_is_told_what_waits_since_nobody_renews_it() -> None:
     waiting = BodyHeld(at=at(13.0), holds=(Hold(block="b", behavior="wave", since=at(13.0), until=at(17.0)),))
 

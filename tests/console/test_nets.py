@@ -14,7 +14,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.console import nets
 from engage_hri.services.console.live import LiveNets, NetLog
 from engage_hri.services.console.net_drawing import drawing, legend, picture
-from engage_hri.services.console.nets import NetInView, feed, in_view, told
+from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
 
 AT = Stamp("clock", 0.0)
 GAZE, POINT, SPEECH = "gaze-1", "point-1", "speech-1"
@@ -106,6 +106,23 @@ speech-1    ┄┄┄┄┄┄┄┄┄○┄┄┄┄┄┄┄┄┄s───�
 series                                                  ├┄○┄┄┤
 series                                             ├┄┄┄┄○┄┄┄┄┤"""
     )
+
+
+def test_who_waits_for_its_start_is_told_with_what_it_waits_for() -> None:
+    net = in_view(
+        replace(
+            FIGURE_4_8,
+            places=(*FIGURE_4_8.places, place("order", 3, 4), place("series", 2, 4, SPEECH), place("series", 8, 9)),
+        )
+    )
+    assert net is not None
+
+    assert [where(net, each) for each in net.places[:3]] == [
+        "gaze-1 waits for its start",
+        "point-1 waits for its start, with gaze-1:stroke",
+        "speech-1 waits for its start, after gaze-1:stroke = point-1:start and point-1:ready, "
+        "with point-1:stroke_start",
+    ]
 
 
 def test_a_delay_has_its_seconds_and_its_token() -> None:

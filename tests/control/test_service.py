@@ -194,8 +194,8 @@ async def test_actions_follow_from_real_motion(hub: MemoryHub):
         ("began", "look", ("human",), gaze["end"]),
         ("began", "point", ("near-right",), point["stroke_start"]),
         ("ended", "point", ("near-right",), point["stroke_end"]),
-        ("began", "nod", (), head["start"]),
-        ("ended", "nod", (), head["end"]),
+        ("began", "nod", (), head["stroke_start"]),
+        ("ended", "nod", (), head["stroke_end"]),
         ("began", "speak", (), speech["start"]),
         ("ended", "speak", (), speech["end"]),
     ]

@@ -11,9 +11,10 @@ from msgspec import Struct, field
 from engage_hri.schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
-from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, way_round
+from engage_hri.services.realizer.plan.deadlocks import Loss, Losses
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.plan.words import way_round
 from tests.realizer.way_round import UNSAID, closed, read
 
 Operator = Synchronize | After | Before

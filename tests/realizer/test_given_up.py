@@ -88,7 +88,8 @@ def test_of_required_words_it_is_said_that_without_that_they_give_up_their_time(
         plan(example)
 
     assert refused.value.fault.advice == (
-        "it is required; without `required` x:end = 0.1 would be given up, and its words said"
+        "give it more time, or leave out one of its times; "
+        "it is required: without `required` x:end = 0.1 would be given up, and its words said"
     )
     made = plan(replace(example, behaviors=(replace(example.behaviors[0], required=False),)))
     assert (made.dropped, list(made.given_up["x"])) == ((), ["x:end = 0.1"])
@@ -99,5 +100,7 @@ def test_of_a_required_movement_it_is_said_that_without_that_it_is_dropped() -> 
     with pytest.raises(BlockRefused) as refused:
         plan(example)
 
-    assert refused.value.fault.advice == "it is required; without `required` it would be dropped"
+    assert refused.value.fault.advice == (
+        "give it more time, or leave out one of its times; it is required: without `required` it would be dropped"
+    )
     assert plan(replace(example, behaviors=(replace(example.behaviors[0], required=False),))).dropped == ("g",)

@@ -6,10 +6,12 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Gesture, Mark, Speech, Wait
+from engage_hri.schemas.blocks import PerformanceSteered
 from engage_hri.schemas.feedback import SyncPointProgress
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, after, block, stage, together
+from tests.realizer.steering import steer
 from tests.realizer.test_holding import BEAT, NOD, STORY, steered
 
 
@@ -98,7 +100,9 @@ async def test_a_part_of_what_is_held_does_not_go_on_alone(held: tuple[str, str]
         performing = seen.ask(block((BEAT,)))
         await seen.seen("beat:start")
         await steered(seen, "hold", *held)
-        assert await steered(seen, "continue", *named) == ()
+        outcome = await seen.requests.send(*steer("part", "continue", *named)).outcome
+        assert isinstance(outcome, PerformanceSteered)
+        assert (outcome.blocks, outcome.held_with) == ((), "block" if held[0] else "robot")
         await asyncio.sleep(5.0)
         assert not performing.outcome.done()
         assert await steered(seen, "continue", *held) == ("b",)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from engage_hri.schemas.behaviors import FaceLexeme, Wait
+from engage_hri.schemas.behaviors import FaceLexeme, Gesture, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.services.realizer.plan.promises import broken_by
@@ -140,6 +140,38 @@ async def test_what_is_overdue_is_told_with_the_line_of_the_behavior() -> None:
 
     (warning,) = [each for each in seen.warnings() if each.kind == "LATE"]
     assert re.fullmatch(r"line 2: stroke is \d\.\d s overdue", warning.message)
+
+
+async def test_who_comes_late_since_it_waits_for_a_part_is_told_with_who_has_that_and_until_when() -> None:
+    holder = timed(Gesture(id="p", lexeme="BEAT", mode="RIGHT_HAND"), stroke_end="5")
+    one = block((holder, Wait(id="w", duration=2.0)), id="one")
+    seen, _ = await told((0.0, one), (0.5, block((timed(RIGHT, stroke="one:w:end"),), id="two")))
+
+    (warning,) = seen.warnings()
+    assert (warning.block, warning.behavior, warning.kind) == ("two", "q", "LATE")
+    assert warning.message == (
+        "stroke is planned 4.25 s later than it should be: q:stroke = one:w:end; "
+        "it waits for its turn: one:p has the right arm until one:p:stroke_end"
+    )
+
+
+async def test_who_waited_longer_than_planned_is_told_with_who_had_the_part_as_the_block_spells_it() -> None:
+    written = decode_xml(
+        """<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0">
+          <gesture id="p" lexeme="BEAT" mode="RIGHT_HAND" start="0" end="3"/>
+          <gesture id="q" lexeme="BEAT" mode="RIGHT_HAND" strokeStart="4"/>
+        </bml>"""
+    )
+    assert isinstance(written, Block)
+    async with stage(FakeBody({"p": Script(durations=(0.5, 0.25, 0.5, 0.25, 0.25, 3.5))})) as seen:
+        await seen.perform(written)
+
+    (warning,) = [each for each in seen.warnings() if "should" in each.message and each.behavior == "q"]
+    assert re.fullmatch(
+        r"line 3: strokeStart came \d\.\d\d s later than it should be: q:strokeStart = 4; "
+        "it waited for its turn: p had the right arm until p:end",
+        warning.message,
+    )
 
 
 async def test_what_was_past_by_less_than_people_notice_is_not_told() -> None:

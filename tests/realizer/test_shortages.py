@@ -14,7 +14,11 @@ SHORT = [
     ('<gesture id="x" lexeme="BEAT" ready="{}"/>', 0.0, "from x:start to x:ready"),
     ('<gesture id="x" lexeme="BEAT" start="0" ready="{}"/>', 0.1, "from x:start to x:ready"),
     ('<head id="x" lexeme="NOD" start="0" end="{}"/>', 0.2, "from x:start to x:end"),
-    ('<faceLexeme id="x" lexeme="BLINK" amount="1" start="0" attackPeak="{}"/>', 0.01, "from x:start to x:ready"),
+    (
+        '<faceLexeme id="x" lexeme="BLINK" amount="1" start="0" attackPeak="{}"/>',
+        0.01,
+        "from x:start to x:attackPeak",
+    ),
 ]
 
 
@@ -41,7 +45,7 @@ ORDERS = [
     ('<wait id="n" start="3" end="1.5"/>', "start", "end"),
     ('<head id="n" lexeme="NOD" start="3" end="1.5"/>', "start", "end"),
     ('<head id="n" lexeme="NOD" stroke="3" relax="1.5"/>', "stroke", "relax"),
-    ('<head id="n" lexeme="NOD" ready="3" strokeEnd="1.5"/>', "ready", "stroke_end"),
+    ('<head id="n" lexeme="NOD" ready="3" strokeEnd="1.5"/>', "ready", "strokeEnd"),
 ]
 
 

@@ -21,6 +21,21 @@ from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, Open
 from engage_hri.schemas.units import Stamp
 
 
+@pytest.mark.parametrize(
+    ("where", "names", "told"),
+    [
+        ("b: g", ("b", "g"), "line 2: bad (mend it)"),
+        ("g", ("b", "g"), "line 2: bad (mend it)"),
+        ("b: constraint 1", ("b",), "constraint 1, line 2: bad (mend it)"),
+        ("beat", ("b", "g"), "beat, line 2: bad (mend it)"),
+        ("b: b", ("b", "b"), "line 2: bad (mend it)"),
+        ("", ("",), "line 2: bad (mend it)"),
+    ],
+)
+def test_a_fault_does_not_say_again_what_is_told_with_it(where: str, names: tuple[str, ...], told: str) -> None:
+    assert Fault(reason="bad", where=where, line=2, advice="mend it").within(*names) == told
+
+
 def at(seconds: float) -> Stamp:
     return Stamp("loop", seconds)
 

@@ -22,6 +22,10 @@ class Late(Struct, frozen=True):
     sync: str
     overdue: Seconds
 
+    @property
+    def point(self) -> Point:
+        return Point(self.behavior, self.sync)
+
 
 class Stalled(Struct, frozen=True):
     """`behavior` has been late for `sync` so long that it must be given up."""

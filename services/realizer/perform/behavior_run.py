@@ -21,6 +21,7 @@ from engage_hri.services.realizer.perform.recognition_link import RecognitionLin
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import EPSILON, Point, performer
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
 
@@ -154,7 +155,7 @@ class BehaviorRun:
         if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
             block.reach(end, at, by_body=outcome.status == "done")
         else:
-            self.lose(loss(outcome), at_rest=outcome.status != "failed")
+            self.lose(loss(outcome, Spelling(block.plan.block)), at_rest=outcome.status != "failed")
 
     def lose(self, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
         """Give it up: it cannot be finished. The fault gets the line of the behavior."""

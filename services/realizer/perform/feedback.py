@@ -24,6 +24,8 @@ from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.plan.relations import at_line
+from engage_hri.services.realizer.plan.waiting import waited_for
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
 NOTICEABLE: Seconds = 0.1
@@ -57,11 +59,12 @@ class News(NamedTuple):
 class Reporter:
     """The feedback of one block. It never goes back in time: what is told late gets the time of the last message."""
 
-    def __init__(self, bus: Bus, block: str, tolerance: Seconds) -> None:
+    def __init__(self, bus: Bus, block: str, tolerance: Seconds, spelling: Spelling) -> None:
         """tolerance: seconds by which a point may miss its instant before it is reported as late."""
         self._bus = bus
         self._block = block
         self._tolerance = tolerance
+        self.spelling = spelling
         self._late: set[Point] = set()
         """Instants of behaviors that were reported as late."""
         self._character = ""
@@ -142,7 +145,9 @@ class Reporter:
     def compare(self, decisions: Decisions, point: Point) -> None:
         """Warn if a point, reached now, and those before it have not come as the block says; also one of another."""
         for broken in decisions.broken(point):
-            self._broken(decisions.net.part_of[broken.point].point, broken, "came")
+            self._broken(
+                decisions.net.part_of[broken.point].point, broken, "came", decisions.plan, decisions.facts.reached
+            )
 
     def given_up(self, plan: Plan) -> None:
         """Warn of the times that speeches give up by a new plan: once of each."""
@@ -158,16 +163,20 @@ class Reporter:
             part = next(
                 each for each in plan.members[plan.at[broken.point]] if each.behavior == broken.point.behavior
             )
-            self._broken(part.point, broken, "is planned")
+            self._broken(part.point, broken, "is planned", plan, plan.times)
 
-    def _broken(self, instant: Point, broken: Broken, verb: str) -> None:
+    def _broken(self, instant: Point, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
+        """Warn of what is broken by more than is tolerated. times: of points that have come, or are planned."""
         if broken.seconds > self._tolerance:
-            self.late(instant, broken.told(verb))
+            late = broken.point.behavior if broken.direction == "later" else ""
+            is_past = verb == "came"
+            why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""
+            self.late(instant, broken.told(self.spelling.sync(broken.point), verb, why))
 
     def overdue(self, decisions: Decisions, late: Late) -> None:
         """Warn that a behavior takes too long. How much too late it comes in the end is told when it comes."""
-        line = decisions.plan.chains[late.behavior].behavior.line
-        self.warn("LATE", at_line(line, f"{late.sync} is {late.overdue:.1f} s overdue"), late.behavior)
+        line, sync = decisions.plan.chains[late.behavior].behavior.line, self.spelling.sync(late.point)
+        self.warn("LATE", at_line(line, f"{sync} is {late.overdue:.1f} s overdue"), late.behavior)
 
     def late(self, instant: Point, message: str) -> None:
         """Warn that a behavior is late for an instant: once for each."""

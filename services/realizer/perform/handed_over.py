@@ -5,6 +5,7 @@ from collections.abc import Container
 from engage_hri.schemas.body import BehaviorOutcome
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
 from engage_hri.services.realizer.points import Point
 
 
@@ -20,8 +21,9 @@ def has_lost_nothing(plan: Plan, outcome: BehaviorOutcome, reached: Container[Po
     return all(point in reached for point in points[: points.index(plan.kept[id]) + 1])
 
 
-def loss(outcome: BehaviorOutcome) -> Fault:
+def loss(outcome: BehaviorOutcome, spelling: Spelling = AS_IN_DRAFTS) -> Fault:
     """Reason why a behavior has not come to its end."""
     if outcome.status == "taken_over":
-        return Fault(reason=f"another behavior took its part after {outcome.passed or 'nothing of it'}")
+        passed = spelling.sync(Point(outcome.behavior, outcome.passed)) if outcome.passed else "nothing of it"
+        return Fault(reason=f"another behavior took its part after {passed}")
     return outcome.fault or Fault(reason=f"the body {outcome.status} it")

@@ -33,9 +33,11 @@ class Holds:
         """All holds, each with the time since when, the oldest first."""
         return sorted(self._since.items(), key=lambda each: each[1])
 
-    def is_within(self, block: str, behavior: str) -> bool:
-        """True if more than this is held: it goes on only when that does."""
-        return any(_is_part((block, behavior), held) and held != (block, behavior) for held in self._since)
+    def around(self, block: str, behavior: str) -> Named | None:
+        """The smallest of what is held of which this is a part: it goes on only when that does. None: nothing."""
+        named = (block, behavior)
+        wholes = [held for held in self._since if held != named and _is_part(named, held)]
+        return max(wholes, default=None)
 
     def earliest(self) -> Seconds | None:
         """Time since when something is held, the longest; None: nothing is."""

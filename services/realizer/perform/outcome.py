@@ -56,5 +56,5 @@ def _nothing_performed(block: Block, dropped: Mapping[str, str], id: str) -> Fau
 
 def reasons(plan: Plan) -> dict[str, str]:
     """Behaviors that a plan has dropped, each with the reason."""
-    why = {each.behavior: each.message.removesuffix(DROPPED) for each in reversed(plan.problems)}
+    why = {each.behavior: each.message.partition(DROPPED)[0] for each in reversed(plan.problems)}
     return {id: why.get(id, "") for id in plan.dropped}

@@ -36,6 +36,7 @@ from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.phases import ARMS
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
@@ -57,14 +58,13 @@ class BlockPerformance:
         self.plan = plan
         self._shared = shared
         self.bus = shared.bus
-        self._requests = shared.requests
-        self._config = shared.config
+        self._requests, self._config = shared.requests, shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
         self._net = NetStream(shared.bus, live.id)
-        self.report = Reporter(shared.bus, live.id, shared.config.skew)
+        self.report = Reporter(shared.bus, live.id, shared.config.skew, Spelling(plan.block, live.elsewhere))
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
@@ -184,7 +184,7 @@ class BlockPerformance:
     def fail(self, behavior: str, fault: Fault) -> None:
         """End the block as failed, and say that it is because of this behavior."""
         self._tell()
-        self.report.warn("EXECUTION_FAILURE", str(fault), behavior)
+        self.report.warn("EXECUTION_FAILURE", fault.within(self.id, behavior), behavior)
         self._live.fail(Fault(reason=fault.reason, where=f"{self.id}: {behavior}"))
 
     def follow(self, points: Iterable[Point]) -> None:
@@ -279,6 +279,7 @@ class BlockPerformance:
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
+                sync = self.report.spelling.sync(Point(id, sync))
                 self._runs[id].lose(Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
                 return True
         return False
@@ -329,12 +330,12 @@ class BlockPerformance:
         if id in self._dropped or self._ending.done():
             return
         self._tell()
-        self._dropped[id] = str(fault)
+        self._dropped[id] = why = fault.within(self.id, id)
         if id in self.interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self.report.interrupted(id, self.spoken.of(id), self.interrupted[id])
         else:
-            self.report.warn(kind, str(fault), id)
+            self.report.warn(kind, why, id)
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
@@ -352,7 +353,7 @@ class BlockPerformance:
         """End the block: what performs it is gone."""
         if not self._ending.done():
             self._tell()
-            self.report.warn("EXECUTION_FAILURE", str(fault))
+            self.report.warn("EXECUTION_FAILURE", fault.within(self.id))
         self._live.stop(Ending("failed", fault))
 
     def plan_with(self, estimates: Iterable[Estimate]) -> None:

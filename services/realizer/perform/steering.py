@@ -66,9 +66,11 @@ class Steering:
                     self._holds.let_go(block, behavior)
                     await self._stop(concerned, behavior, "" if behavior else "stopped on request")
             self._apply()
-            is_stuck = request.to == "continue" and self._holds.is_within(block, behavior)
-            blocks = () if is_stuck else tuple(live.id for live in concerned)
-            self._desk.end(PerformanceSteered(id=request.id, blocks=blocks))
+            around = self._holds.around(block, behavior) if request.to == "continue" else None
+            if around is None:
+                self._desk.end(PerformanceSteered(id=request.id, blocks=tuple(live.id for live in concerned)))
+            else:
+                self._desk.end(PerformanceSteered(id=request.id, held_with="block" if around[0] else "robot"))
 
     def is_going_on(self, live: Live, behavior: str) -> bool:
         """True if the behavior is performed, or is to be when its block begins."""

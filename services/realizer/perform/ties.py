@@ -122,7 +122,8 @@ class Ties:
         for id, point in needed:
             is_needed = id in owner.decisions.plan.chains and id not in owner.interrupted
             if is_needed and not owner.decisions.facts.has_ended(id):
-                owner.fail(id, Fault(reason=f"{point}, which it is tied to, does not come, and the tie is required"))
+                tied = owner.report.spelling(point)
+                owner.fail(id, Fault(reason=f"{tied}, which it is tied to, does not come, and the tie is required"))
                 return
         owner.replan()
 

@@ -13,6 +13,7 @@ from engage_hri.services.realizer.plan.known import BLOCK_END, Known, block_of, 
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Awaited, Circle, Foresight, Impossible
 from engage_hri.services.realizer.plan.sharing import Waits
+from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling, other_part, taken
 from engage_hri.services.realizer.points import EPSILON, Point
 
 AFTER: Seconds = 0.001
@@ -88,6 +89,7 @@ def losses_to_others(
     turns: Iterable[Turn],
     chains: Mapping[str, Chain],
     known: Known,
+    spelling: Spelling = AS_IN_DRAFTS,
 ) -> list[Loss]:
     """Behaviors that have no time to wait until another block is done with their part, in document order.
 
@@ -101,7 +103,8 @@ def losses_to_others(
             among = frozenset(point for end in ends_of_ties for point in assembly.net.transitions[end].points)
             chain = chains[turn[0]]
             points = tuple(point for point in chain.points if chain.type == "speech" and point in among)
-            found[turn[0]] = Loss(turn[0], _taken(turn, chains, known), points, among, turn)
+            reason, advice = _taken(turn, chains, known, spelling)
+            found[turn[0]] = Loss(turn[0], reason, points, among, turn, advice)
     return [found[id] for id in chains if id in found]
 
 
@@ -110,17 +113,14 @@ def _turn(circle: Circle, ends: Mapping[tuple[int, int], Turn]) -> Turn | None:
     return next((ends[each] for each in series if each in ends), None)
 
 
-def _taken(turn: Turn, chains: Mapping[str, Chain], known: Known) -> str:
+def _taken(turn: Turn, chains: Mapping[str, Chain], known: Known, spelling: Spelling) -> tuple[str, str]:
+    """Reason and advice of the loss of a behavior that would have to wait for one of another block."""
     id, point = turn
     holder = known.holders[point.behavior].chain if point.behavior in known.holders else None
-    parts = [part for part in chains[id].parts if holder is None or part in holder.parts]
-    name = " and ".join(part.replace("_", " ") for part in parts)
-    return f"cannot be on time: {point.behavior} has the {name} until {point}{_when(point, known)}"
-
-
-def _when(point: Point, known: Known) -> str:
-    at = known.points.get(point)
-    return "" if at is None else f", {at:.2f} s after the start of the block"
+    held = holder.parts if holder is not None else chains[id].parts
+    parts = [part for part in chains[id].parts if part in held]
+    has = taken(point.behavior, parts, point, spelling, at=known.points.get(point))
+    return f"cannot be on time: {has}", other_part(id, chains[id].parts, held, spelling)
 
 
 def too_late(impossible: Impossible, assembly: Assembly) -> set[Point]:

@@ -355,3 +355,11 @@ def hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) ->
         and after.mode is not None
         and after.id in impossible
     }
+
+
+def with_hands(block: Block, hands: Mapping[str, Hand]) -> Block:
+    """The block with these hands for some of its behaviors."""
+    if not hands:
+        return block
+    chosen = [replace(each, mode=hand) if (hand := hands.get(each.id)) else each for each in block.behaviors]
+    return replace(block, behaviors=tuple(chosen))

@@ -3,6 +3,7 @@
 Synchronizations that share a point merge, whatever their number, direction and sign of offset.
 """
 
+import re
 from collections import defaultdict, deque
 from collections.abc import Collection
 
@@ -13,6 +14,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
+
+_OFFSET = re.compile(r"\s*[+-]\s*[0-9.]+(e[+-]?[0-9]+)?\s*$", re.IGNORECASE)
+"""Offset behind the point that a reference names: `+0.5`."""
 
 
 class Instant(Struct, frozen=True, gc=False):
@@ -120,7 +124,7 @@ class Classes:
     def _contradiction(self, first: Term, second: Term, known: Seconds, block: str) -> BlockRefused:
         chain = self._chain(first.point, second.point)
         lines = sorted({term.line for term in (first, second, *(term for _, term in chain))} - {0})
-        sooner, later = (first.point, second.point) if known >= 0 else (second.point, first.point)
+        sooner, later = map(_named, (first, second) if known >= 0 else (second, first))
         apart = f"{abs(round(known, 6)):g} s after {sooner}" if known else f"the same instant as {sooner}"
         said = ", ".join(f"{one.text} = {other.text}" for one, other in chain)
         why = f"{later} is already {apart} ({said})" if chain else "they are one sync point, with two offsets"
@@ -144,6 +148,11 @@ class Classes:
             chain.append(step[1])
             end = step[0]
         return chain[::-1]
+
+
+def _named(term: Term) -> str:
+    """Name of the point as the block spells it: what is written, without the offset."""
+    return str(ORIGIN) if term.point == ORIGIN else _OFFSET.sub("", term.text)
 
 
 def instants(classes: Classes, points: Collection[Point]) -> Steps[list[Instant]]:

@@ -6,7 +6,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Head, Pointing
+from engage_hri.schemas.behaviors import BlockBehavior, Event, Gesture, Hand, Head, Pointing
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -93,3 +93,10 @@ def natural_ends(chains: Mapping[str, Chain], relations: Relations) -> frozenset
         if each.type in ON_TARGET
         and not any(Point(id, sync) in constrained for sync in ("stroke_end", "relax", "end"))
     )
+
+
+def unawaited_events(chains: Mapping[str, Chain], relations: Relations) -> frozenset[str]:
+    """Events with a decision that nothing in the block waits for."""
+    events = {id for id, each in chains.items() if isinstance(each.behavior, Event)}
+    awaited = {point.behavior for point in relations.constrained if point.sync == "end"} if events else ()
+    return frozenset(events.difference(awaited))

@@ -28,7 +28,8 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     it the rest.
     entering: behaviors in the order in which they take their parts: of two that begin at one instant, too.
     rounds: for each behavior, how many events of the instant in which it begins are measured before it, in a row.
-    turns: behaviors that wait for a point of another before they take its part.
+    turns: behaviors that wait for a point of another before they take its part. holders: behaviors of other blocks
+    that are waited for in this way, with their parts.
     behaviors: those that will be performed, in document order. dropped: those that will not, with `problems`.
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: for each speech that lacks a time it should
@@ -56,6 +57,7 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     relations: Relations
     rounds: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
+    holders: Mapping[str, tuple[str, ...]] = {}
     broken: tuple[Broken, ...] = ()
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
@@ -68,6 +70,11 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     def predicted(self, point: Point) -> Seconds:
         """Seconds from the block's start to the point, if all goes as estimated."""
         return self.schedule[self.at[point]]
+
+    @property
+    def times(self) -> dict[Point, Seconds]:
+        """Seconds from the block's start to each point, if all goes as estimated."""
+        return {point: self.schedule[at] for point, at in self.at.items()}
 
     def begun_in_order(self, behaviors: Iterable[str]) -> list[str]:
         """Behaviors that begin at one instant in the order in which they are told: who waits for no measured event of

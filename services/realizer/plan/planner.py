@@ -10,7 +10,7 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Event, Hand, Unknown
+from engage_hri.schemas.behaviors import BlockBehavior, Hand, Unknown
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
@@ -20,20 +20,20 @@ from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points
+from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
-from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends
+from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
 from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import (
-    DROPPED,
     BlockRefused,
     Equal,
     Problem,
     Relations,
     Term,
+    as_dropped,
     at_line,
     relation_steps,
 )
@@ -42,6 +42,7 @@ from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
 
@@ -97,6 +98,7 @@ class _Planner:
         """Lasting behaviors, and those that they do not last for; see `Arrangement`."""
         self.waived: set[tuple[Point, Point]] = set()
         """Points of this block, each with one of another, that are waited for in a circle whatever is planned."""
+        self.spelling = Spelling(block, known.blocks)
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
@@ -137,7 +139,8 @@ class _Planner:
             self.dropped[behavior.id] = None
         elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
             kind = unsupported.kind_of(estimate.warning)
-            self._drop(behavior.id, kind, str(estimate.fault or "the body cannot do it"))
+            fault = estimate.fault or Fault(reason="the body cannot do it")
+            self._drop(behavior.id, kind, fault.within(self.block.id, behavior.id))
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
             if estimate and estimate.degraded:
@@ -148,19 +151,20 @@ class _Planner:
         """Expected end of a behavior that has begun, if it goes on at its natural pace."""
         return self.known.points[Point(id, "start")] + sum(each.natural for each in self.chains[id].segments)
 
-    def _refuse_if_required(self, id: str, reason: str, kind: WarningKind) -> None:
+    def _refuse_if_required(self, id: str, reason: str, kind: WarningKind, advice: str = "") -> None:
         if id in self.relations.required:
-            advice = "it is required; without `required` it would be dropped"
+            required = "it is required: without `required` it would be dropped"
+            advice = "; ".join(filter(None, (advice, required)))
             fault = Fault(reason=reason, where=f"{self.block.id}: {id}", line=self.lines[id], advice=advice)
             raise BlockRefused(fault, kind)
 
-    def _drop(self, id: str, kind: WarningKind, reason: str) -> None:
-        self._refuse_if_required(id, reason, kind)
+    def _drop(self, id: str, kind: WarningKind, reason: str, advice: str = "", line: int = 0) -> None:
+        self._refuse_if_required(id, reason, kind, advice)
         self.chains.pop(id, None)
         self.dropped[id] = None
         if futile := self.given_up.pop(id, None):
             self.problems = [each for each in self.problems if each not in futile.values()]
-        self.problems.append(Problem(kind, at_line(self.lines[id], f"{reason}{DROPPED}"), id))
+        self.problems.append(Problem(kind, at_line(line or self.lines[id], as_dropped(reason, advice)), id))
 
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
@@ -218,7 +222,7 @@ class _Planner:
     def _lose(self, loss: Loss) -> None:
         id = loss.behavior
         lost = self.chains[id]
-        self._drop(id, "IMPOSSIBLE_TO_SCHEDULE", loss.reason)
+        self._drop(id, "IMPOSSIBLE_TO_SCHEDULE", loss.reason, loss.advice, loss.line)
         if lost.type != "speech":
             self.depending[id] = lost, loss, self.problems[-1]
 
@@ -246,7 +250,7 @@ class _Planner:
         one is taken.
         """
         natural = natural_ends(self.chains, present)
-        waited_for = frozenset(self.chains) - self._unawaited_events(present)
+        waited_for = frozenset(self.chains) - unawaited_events(self.chains, present)
         self.turns = frozen(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
         arranged_anew = partial(Arrangement, natural, self.known.begun, early=self.early)
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
@@ -273,7 +277,8 @@ class _Planner:
             )
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
-            if losses := (yield from clashes(turns, self.chains, self.relations.required, classes)):
+            required = self.relations.required
+            if losses := (yield from clashes(turns, self.chains, required, classes, everywhere, self.spelling)):
                 raise Losses(losses)
             for part in portions(conflicts):
                 for conflict in part:
@@ -287,7 +292,7 @@ class _Planner:
             else:
                 arrangement = arranged
         return Plan(
-            block=self._block(),
+            block=with_hands(self.block, self.hands),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
             net=assembly.net,
             at=assembly.at,
@@ -301,6 +306,9 @@ class _Planner:
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=arranged.ranked,
             turns=self.turns,
+            holders={
+                name: given[name].parts for name in sorted({turn[1].behavior for turn in self.turns} & given.keys())
+            },
             rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             relations=present,
             constrained=present.constrained,
@@ -321,12 +329,6 @@ class _Planner:
         assert conflict.turn is not None
         is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
         return conflict.turn[0] not in self.known.begun and not is_settled
-
-    def _unawaited_events(self, present: Relations) -> frozenset[str]:
-        """Events with a decision that nothing in the block waits for."""
-        events = {id for id, each in self.chains.items() if isinstance(each.behavior, Event)}
-        awaited = {point.behavior for point in present.constrained if point.sync == "end"} if events else ()
-        return frozenset(events.difference(awaited))
 
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
@@ -353,7 +355,9 @@ class _Planner:
         except Impossible as impossible:
             if self.order.refute(impossible.circles, assembly.net):
                 raise Misordered from None
-            if taken := foresight.losses_to_others(impossible, assembly, arrangement.turns, self.chains, self.known):
+            if taken := foresight.losses_to_others(
+                impossible, assembly, arrangement.turns, self.chains, self.known, self.spelling
+            ):
                 raise Losses(taken) from None
             if early := foresight.lasting_for_ever(impossible, assembly, arrangement.lasting):
                 self.early |= early
@@ -371,7 +375,9 @@ class _Planner:
                 handovers = {each for takers in arrangement.handovers.values() for each in takers}
                 present, turns = assembler.relations, self.turns | self.order.turns | handovers
                 raise (
-                    yield from judge(impossible, assembly, self.chains, present, classes, self.block.id, turns)
+                    yield from judge(
+                        impossible, assembly, self.chains, present, classes, self.block.id, turns, self.spelling
+                    )
                 ) from None
             return (yield from self._solved(assembler, arrangement, classes))
 
@@ -389,11 +395,3 @@ class _Planner:
         id, hand = conflict.hand
         self.hands[id] = hand
         self.chains[id] = chain(replace(self.chains[id].behavior, mode=hand), self.estimates.get(id))
-
-    def _block(self) -> Block:
-        if not self.hands:
-            return self.block
-        chosen = [
-            replace(each, mode=hand) if (hand := self.hands.get(each.id)) else each for each in self.block.behaviors
-        ]
-        return replace(self.block, behaviors=tuple(chosen))

@@ -38,10 +38,13 @@ class Broken(Struct, frozen=True):
         """The way in which `point` is wrong."""
         return "later" if self.point == self.late else "earlier"
 
-    def told(self, verb: str) -> str:
-        """The sentence of a warning, with its place. verb: `came`, or `is planned`."""
-        reason = f"{self.point.sync} {verb} {self.seconds:.2f} s {self.direction} than it should be: {self.said}"
-        return at_line(self.line, reason)
+    def told(self, sync: str, verb: str, why: str = "") -> str:
+        """The sentence of a warning, with its place.
+
+        sync: the sync point of `point`, as the block spells it. verb: `came`, or `is planned`. why: the cause.
+        """
+        reason = f"{sync} {verb} {self.seconds:.2f} s {self.direction} than it should be: {self.said}"
+        return at_line(self.line, "; ".join(filter(None, (reason, why))))
 
 
 class _Same:

@@ -73,7 +73,12 @@ class Order(Struct, frozen=True, gc=False):
 
 
 DROPPED = "; the behavior is dropped"
-"""End of the message of a problem that costs a behavior."""
+"""End of the message of a problem that costs a behavior, but for an advice."""
+
+
+def as_dropped(reason: str, advice: str = "") -> str:
+    """The message of a problem that costs a behavior. advice: what to do about it."""
+    return f"{reason}{DROPPED} ({advice})" if advice else f"{reason}{DROPPED}"
 
 
 class Problem(Struct, frozen=True):
@@ -287,7 +292,7 @@ class _Reader:
                 continue  # Its words are not lost for the sake of a time.
             if isinstance(other, Problem):
                 self.unusable.add(behavior.id)
-                message = at_line(behavior.line, f"{other.message}{DROPPED}")
+                message = at_line(behavior.line, as_dropped(other.message))
                 self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
                 return
             own = Term(Point(behavior.id, sync), 0.0, f"{behavior.id}:{timing.sync}", behavior.line)
