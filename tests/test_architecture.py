@@ -42,6 +42,8 @@ SHELLS = {
     "services/realizer/perform/behavior_run.py",  # awaits sync points
     "services/realizer/perform/futures.py",  # resolves them
     "services/realizer/perform/planning.py",  # asks the body
+    "services/realizer/perform/rehearsing.py",  # asks it again
+    "services/realizer/perform/ends_of_runs.py",  # awaits the ends of behaviors
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/perform/live.py",  # resolved when a block has ended

@@ -36,6 +36,8 @@ MANY: dict[tuple[Kind, bool], int] = {
     ("alone", True): 15, ("streams", True): 10, ("webs", False): 40, ("webs", True): 20,
 }  # fmt: skip
 """Number of stories of each kind, without and with a body that has faults."""
+PREDICTED_BESIDE_OTHERS, OFF_BESIDE_OTHERS = 60, 0.1
+"""The same of stories with several blocks, and the share of blocks there."""
 PREDICTED, OTHERS = 400, 31
 """Number of single blocks of which the predictions are judged, and their seed."""
 HELD: dict[tuple[Kind, bool], int] = {
@@ -74,6 +76,17 @@ def test_points_of_a_single_block_come_when_predicted() -> None:
 
     assert len(worst) > PREDICTED / 2
     assert sum(seconds > EXACT for seconds in worst) <= OFF * len(worst), worst
+
+
+def test_points_of_blocks_in_streams_come_when_predicted_mostly() -> None:
+    """What others do changes a plan after it was made: more is off than of a block alone."""
+    worst = []
+    for number in range(PREDICTED_BESIDE_OTHERS):
+        story = generate.story(OTHERS, number, "streams")
+        worst += misses(Case(story, playing.play(story)))
+
+    assert len(worst) > PREDICTED_BESIDE_OTHERS / 2
+    assert sum(seconds > EXACT for seconds in worst) <= OFF_BESIDE_OTHERS * len(worst), worst
 
 
 @pytest.mark.contained

@@ -29,10 +29,11 @@ from engage_hri.services.control.body import (
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
+from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
-from engage_hri.services.control.torso.rehearsal import Clock, beside, rehearsed
+from engage_hri.services.control.torso.rehearsal import rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.voice import speaking

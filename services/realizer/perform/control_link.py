@@ -48,8 +48,12 @@ class ControlLink:
         return self._requests.send(keys.BEHAVIOR, perform)
 
     def abort(self, behavior: str) -> None:
-        """Cancel the request for a behavior."""
-        self._requests.cancel(self.id(behavior), "aborted")
+        """Stop a behavior."""
+        self.cancel(behavior, "aborted")
+
+    def cancel(self, behavior: str, reason: str) -> None:
+        """Cancel the request for a behavior, to whatever service performs it."""
+        self._requests.cancel(self.id(behavior), reason)
 
     def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
         """Send these parts home. behavior: the one that used them; empty: the whole block."""

@@ -21,6 +21,7 @@ from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.realizer.perform.control_link import ControlLink
+from engage_hri.services.realizer.perform.ends_of_runs import all_ended
 from engage_hri.services.realizer.perform.feedback import News, Reporter
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.held_block import HeldBlock
@@ -32,10 +33,8 @@ from engage_hri.services.realizer.perform.rehearsing import Rehearsing
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.perform.ties import Ties
-from engage_hri.services.realizer.plan.known import Known
-from engage_hri.services.realizer.plan.phases import ARMS
+from engage_hri.services.realizer.plan.again import planned_again, reestimated
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
@@ -58,7 +57,7 @@ class BlockPerformance:
         self.plan = plan
         self._shared = shared
         self.bus = shared.bus
-        self._requests, self._config = shared.requests, shared.config
+        self._config = shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
@@ -90,7 +89,7 @@ class BlockPerformance:
         """Cancel all that the block has asked for and take its parts home: its regular end has failed."""
         for id, run in self._runs.items():
             if run.pending is not None:
-                self._requests.cancel(self.body.id(id), "its block broke")
+                self.body.cancel(id, "its block broke")
         self._go_home(self.parts_used)
 
     async def run(self) -> BlockOutcome:
@@ -116,7 +115,7 @@ class BlockPerformance:
                     self.held.tell()
                     self._take_out(self._live.taken_out)
                     self.take_in()
-                    self._look_again(self)
+                    self._shared.rehearse(self.plan, but=self)
                     rehearsing = tasks.create_task(self.rehearsing.run(), name=f"{block}: rehearsing")
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
@@ -166,7 +165,7 @@ class BlockPerformance:
         for behavior in sorted(behaviors.keys() & self._tasks.keys()):  # Others were dropped before.
             self.interrupted[behavior] = behaviors[behavior]
             self._tasks[behavior].cancel()
-            self._requests.cancel(self.body.id(behavior), "interrupted")
+            self.body.cancel(behavior, "interrupted")
             self.lose(behavior, Fault(reason="interrupted"))
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
@@ -207,21 +206,7 @@ class BlockPerformance:
     async def _end_behaviors(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
-        moving = dict[asyncio.Task[None], str]()
-        for id, run in self._runs.items():
-            task = self._tasks[id]
-            if run.pending is None or task.done():
-                continue
-            if run.is_by_body:
-                moving[task] = id
-                if ending.status != "done" and not run.pending.outcome.done():
-                    self.body.abort(id)
-            elif ending.status != "done":
-                self._requests.cancel(self.body.id(id), f"block {ending.status}")
-        if moving:
-            _, stuck = await asyncio.wait(moving, timeout=self._config.abort)
-            for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
-                self._requests.cancel(self.body.id(moving[task]), "its block has ended")
+        await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort)
         if self._outcome.status == "done":
             self.decisions.net.let_go()
         else:
@@ -356,38 +341,31 @@ class BlockPerformance:
             self.report.warn("EXECUTION_FAILURE", fault.within(self.id))
         self._live.stop(Ending("failed", fault))
 
-    def plan_with(self, estimates: Iterable[Estimate]) -> None:
-        """Plan what is left with other estimates, unless that costs a behavior."""
-        self.replan(tuple(estimates))
-
-    def replan(self, estimates: Collection[Estimate] = ()) -> None:
-        """Go on as if what was dropped, or vanished elsewhere, had never been written.
-
-        estimates: to plan with, unless that costs a behavior; empty: those of before.
-        """
+    def replan(self) -> None:
+        """Go on as if what was dropped, or vanished elsewhere, had never been written."""
         self._tell()  # A behavior of which something is to be told may not be in the new plan.
         self._needs_replan = False
-        gone, so_far, known = (*self._dropped, *self.ties.gone), self.decisions.plan, self.ties.known()
-        # Blocks that came later were planned around the arms that this one has chosen.
-        chosen = {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
         try:
-            plan = plan_block(
-                so_far.block,
-                estimates or so_far.estimates.values(),
-                dropped=gone,
-                known=known,
-                barred=chosen,
-                turns=so_far.turns if estimates else frozenset(),
-            )
+            self._go_on_with(planned_again(self.decisions.plan, self.ties.known(), self._gone))
         except InputRefused as error:
-            if not estimates:
-                self._live.fail(error.fault)
-            return
-        if estimates and (not set(plan.dropped) <= {*gone, *so_far.dropped} or plan.takes != so_far.takes):
-            return
+            self._live.fail(error.fault)
+
+    def plan_with(self, estimates: Iterable[Estimate]) -> None:
+        """Go on with other estimates, if that costs nothing."""
+        self._tell()
+        plan = reestimated(self.decisions.plan, self.ties.known(), self._gone, estimates)
+        if plan is not None and not self._needs_replan:
+            self._go_on_with(plan)
+
+    @property
+    def _gone(self) -> tuple[str, ...]:
+        return (*self._dropped, *self.ties.gone)
+
+    def _go_on_with(self, plan: Plan) -> None:
+        gone = self._gone
         self.decisions.replan(plan)
         self.ties.renew()
-        self._look_again()
+        self._shared.rehearse(plan)
         # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.
         for id in tuple(self._dropped):
             self._shared.live_blocks.lose(self.plan.block.id, id)
@@ -402,16 +380,6 @@ class BlockPerformance:
                 if self._runs[problem.behavior].pending is not None:
                     self.body.abort(problem.behavior)
                 self.lose(problem.behavior, Fault(reason=problem.message), problem.kind)
-
-    def _look_again(self, but: object = None) -> None:
-        """Have all blocks rehearse again what is to come: the plan of this one is new."""
-        for each in self._shared.others():
-            if each is not but:
-                each.rehearsing.look_again()
-
-    def known(self) -> Known:
-        """Other live blocks, as known now."""
-        return self.ties.known()
 
     # -- parts of the body -------------------------------------------------------------------------------------------
 

@@ -75,7 +75,7 @@ def meanwhile(
 
 
 def times_ahead(performed: Performed, now: Seconds) -> dict[str, tuple[PlannedTime, ...]]:
-    """When behaviors began or begin, wait, hurry and dawdle, in seconds from now, in the order in which they begin.
+    """Seconds from now at which behaviors began or begin, wait, hurry and dawdle, in the order in which they begin.
 
     Of those that move the body and have not ended.
     """

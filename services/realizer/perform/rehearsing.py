@@ -6,7 +6,7 @@ was made with are no longer true. Nothing waits for the answer.
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Collection, Iterable
 from functools import partial
 from typing import Protocol
 
@@ -34,14 +34,21 @@ Ask = Callable[[Block, EstimateBehaviors], Awaitable[tuple[Estimate, ...]]]
 class Rehearsed(Performed, Protocol):
     """A block that is being performed."""
 
-    def known(self) -> Known:
-        """Other live blocks, as known now."""
+    @property
+    def ties(self) -> "KnowsOthers": ...
 
     def take_in(self, news: Callable[[], object]) -> None:
         """Take in news and do what follows from it, unless the block is ending."""
 
     def plan_with(self, estimates: Iterable[Estimate]) -> None:
         """Plan what is left with other estimates, unless that costs a behavior."""
+
+
+class KnowsOthers(Protocol):
+    """The ties of a block."""
+
+    def known(self) -> Known:
+        """Other live blocks, as known now."""
 
 
 class Rehearsing:
@@ -56,9 +63,12 @@ class Rehearsing:
         self._now = now
         self._ask = ask
         self._changed = asyncio.Event()
+        self._parts: set[str] = set()
+        """Parts that move in another way than when the body was asked last."""
 
-    def look_again(self) -> None:
-        """Ask the body soon, and once, about all that has changed by then."""
+    def look_again(self, parts: Collection[str]) -> None:
+        """Ask the body soon, and once, about all that has changed by then. parts: that move otherwise than before."""
+        self._parts.update(parts)
         self._changed.set()
 
     async def run(self) -> None:
@@ -112,11 +122,11 @@ class Rehearsing:
             for id, each in times_ahead(self._owner, now).items()
             if id not in facts.begun or (facts.next_number(id) and not paces.get(id) and not facts.is_held(id))
         }
-        if not times:
+        parts, changed = parts_moved(plan, times), self._parts
+        self._parts = set()
+        if not times or not (parts & changed or "torso" in parts | changed):
             return EstimateBehaviors(items=())
-        poses = poses_before(plan, self._owner.known())
+        poses = poses_before(plan, self._owner.ties.known())
         asked = question_about_rest(self._owner, poses, times)
-        moving = meanwhile(
-            self._others(), parts_moved(plan, times), now, lambda each, id: each is not self._owner or id not in times
-        )
+        moving = meanwhile(self._others(), parts, now, lambda each, id: each is not self._owner or id not in times)
         return replace(asked, others=moving)

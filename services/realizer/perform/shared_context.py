@@ -12,8 +12,10 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
+from engage_hri.services.realizer.perform.questions import parts_moved
 from engage_hri.services.realizer.perform.rehearsing import Ask, Rehearsing
 from engage_hri.services.realizer.perform.ties import Tied
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.requests.ends import Requester
 
 
@@ -71,3 +73,10 @@ class SharedContext(Struct, frozen=True):
     live_blocks: LiveBlocks
     over: Callable[[str, str], None]
     ask: Ask
+
+    def rehearse(self, plan: Plan, but: object = None) -> None:
+        """Let blocks rehearse what is to come, since a plan is new. but: a performance that need not."""
+        parts = parts_moved(plan, plan.chains)
+        for each in self.others():
+            if each is not but:
+                each.rehearsing.look_again(parts)

@@ -1,0 +1,33 @@
+"""End of all that a block still performs: the body is told to stop, and is given time to do so."""
+
+import asyncio
+from collections.abc import Mapping
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
+from engage_hri.services.realizer.perform.control_link import ControlLink
+from engage_hri.services.realizer.perform.live import Ending
+
+
+async def all_ended(
+    runs: Mapping[str, BehaviorRun],
+    tasks: Mapping[str, asyncio.Task[None]],
+    body: ControlLink,
+    ending: Ending,
+    within: Seconds,
+) -> None:
+    """Abort what still runs, and return when all that the body does has ended, or `within` is over."""
+    moving = dict[asyncio.Task[None], str]()
+    for id, run in runs.items():
+        if run.pending is None or tasks[id].done():
+            continue
+        if run.is_by_body:
+            moving[tasks[id]] = id
+            if ending.status != "done" and not run.pending.outcome.done():
+                body.abort(id)
+        elif ending.status != "done":
+            body.cancel(id, f"block {ending.status}")
+    if moving:
+        _, stuck = await asyncio.wait(moving, timeout=within)
+        for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
+            body.cancel(moving[task], "its block has ended")

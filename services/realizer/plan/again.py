@@ -1,0 +1,37 @@
+"""Another plan of a block that is being performed: something was dropped, others came, motions take longer."""
+
+from collections.abc import Collection, Iterable
+
+from engage_hri.schemas.behaviors import Hand
+from engage_hri.schemas.body import Estimate
+from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.phases import ARMS
+from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.relations import BlockRefused
+
+
+def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
+    """A plan of a block as if the behaviors that are gone had never been written. Raises BlockRefused."""
+    return plan_block(
+        so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=_chosen(so_far, known)
+    )
+
+
+def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: Iterable[Estimate]) -> Plan | None:
+    """The plan with other estimates; None if these would cost a behavior, or change who takes what from whom.
+
+    A motion that takes another time is no reason for that: blocks that plan with each other would never agree.
+    """
+    try:
+        plan = plan_block(
+            so_far.block, estimates, dropped=gone, known=known, barred=_chosen(so_far, known), turns=so_far.turns
+        )
+    except BlockRefused:
+        return None
+    return plan if {*plan.dropped} <= {*gone, *so_far.dropped} and plan.takes == so_far.takes else None
+
+
+def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:
+    """Hands that are not to be chosen: blocks that came later were planned around the arms that this one uses."""
+    return {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
