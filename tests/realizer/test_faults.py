@@ -10,8 +10,8 @@ from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import performance as executor
+from engage_hri.services.realizer.plan.again import planned_again
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together
@@ -51,10 +51,10 @@ async def test_what_is_lost_in_one_go_is_planned_around_once(monkeypatch: pytest
     plans: list[Plan] = []
 
     def counted(*arguments: Any, **more: Any) -> Plan:
-        plans.append(plan_block(*arguments, **more))
+        plans.append(planned_again(*arguments, **more))
         return plans[-1]
 
-    monkeypatch.setattr(executor, "plan_block", counted)
+    monkeypatch.setattr(executor, "planned_again", counted)
     async with stage(FakeBody({shift.id: Script(refuse=True) for shift in shifts})) as seen:
         at_once = together(*(f"{shift.id}:start" for shift in shifts))
         outcome = await seen.perform(block((SPEECH, *shifts), at_once))

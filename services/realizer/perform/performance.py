@@ -54,8 +54,7 @@ class BlockPerformance:
     ) -> None:
         """held, is_held: see `HeldBlock`."""
         self._live, self.id = live, live.id
-        self.plan = plan
-        self._shared = shared
+        self.plan, self._shared = plan, shared
         self.bus = shared.bus
         self._config = shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
