@@ -7,6 +7,7 @@ import asyncio
 import logging
 import os
 import signal
+import sys
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 
 import pytest
@@ -24,6 +25,10 @@ settings.load_profile("same")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's background, and all children would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Set in many containers. Each worker, and each of some hundred processes of the tests, would compile everything anew.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+    sys.dont_write_bytecode = False
 
 LONGEST_TEST = 24 * 3600.0
 """Virtual seconds; then a test waits for something that never comes."""

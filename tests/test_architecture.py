@@ -8,6 +8,7 @@ import ast
 import re
 import subprocess
 from collections.abc import Iterator
+from functools import lru_cache
 from math import inf
 from pathlib import Path, PurePosixPath
 
@@ -133,13 +134,13 @@ def _in_code(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]
         for name in _called(tree) & THREAD_CALLS:
             yield f"calls {name}: this code starts no threads"
     if place.parts[0] != "tests" and str(place) not in ("schemas/keys.py", VISITOR):
-        for node in ast.walk(tree):
+        for node in _nodes(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and "engage/v1" in node.value:
                 yield f"line {node.lineno} spells a key expression: schemas/keys.py has them all"
 
 
 def _docstrings(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+    for node in _nodes(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             first, *_ = (ast.get_docstring(node) or "-").splitlines()
             if NO_SUBJECTS.match(first) or first.rstrip().endswith("?"):
@@ -213,7 +214,7 @@ def _in_tests(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
     for line in _sleeps(tree, "time.sleep"):
         yield f"line {line} sleeps on the wall clock: wait for something"
     whole_file = any("real_time" in ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign))
-    for function in ast.walk(tree):
+    for function in _nodes(tree):
         if isinstance(function, ast.AsyncFunctionDef | ast.FunctionDef):
             real = whole_file or any("real_time" in ast.unparse(mark) for mark in function.decorator_list)
             for line in _sleeps(function, "asyncio.sleep") if real else ():
@@ -222,7 +223,7 @@ def _in_tests(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
 
 def _sleeps(tree: ast.AST, name: str) -> Iterator[int]:
     """Lines of calls that really wait; `sleep(0)` only lets others run."""
-    for node in ast.walk(tree):
+    for node in _nodes(tree):
         called = isinstance(node, ast.Call) and ast.unparse(node.func) == name
         if called and ast.unparse(node.args[0]) not in ("0", "0.0"):
             yield node.lineno
@@ -237,7 +238,7 @@ def _imports(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
 
 
 def _imported(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+    for node in _nodes(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -247,13 +248,16 @@ def _imported(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
+@lru_cache(maxsize=1)
+def _nodes(tree: ast.AST) -> list[ast.AST]:
+    """All nodes of a file, or of a part of one; most rules ask for those of a whole file, one after the other."""
+    return list(ast.walk(tree))
+
+
 def _called(tree: ast.Module) -> set[str]:
-    functions = (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
-    return {
-        function.attr if isinstance(function, ast.Attribute) else function.id
-        for function in functions
-        if isinstance(function, ast.Attribute | ast.Name)
-    }
+    functions = (node.func for node in _nodes(tree) if isinstance(node, ast.Call))
+    named = (each for each in functions if isinstance(each, ast.Attribute | ast.Name))
+    return {each.attr if isinstance(each, ast.Attribute) else each.id for each in named}
 
 
 def tracked() -> list[str]:

@@ -35,10 +35,12 @@ class _View(Struct):
 
     def median(self, now: Seconds) -> Entity:
         """The piece at the median of where it was seen in the window, coordinate by coordinate, weighted by time."""
-        times = [max(at, now - WINDOW) for at, _ in self.samples]
-        held = [end - at for at, end in zip(times, [*times[1:], now], strict=True)]
         pieces = [piece for _, piece in self.samples]
         last = pieces[-1]
+        if all(piece.position == last.position and piece.yaw == last.yaw for piece in pieces):
+            return last
+        times = [max(at, now - WINDOW) for at, _ in self.samples]
+        held = [end - at for at, end in zip(times, [*times[1:], now], strict=True)]
 
         def of(value: Callable[[Entity], float]) -> float:
             return _median(list(zip(map(value, pieces), held, strict=True)))

@@ -60,18 +60,19 @@ async def recorded(body: Body, joints: Iterable[str] = ()) -> AsyncIterator[Reco
 def violations(recording: Recording, limits: Iterable[JointLimit]) -> list[str]:
     """Every joint that leaves its range, its speed or its acceleration."""
     found = []
+    all_angles, all_speeds, all_accelerations = recording.angles, recording.speeds, recording.accelerations
     for limit in limits:
         if limit.joint not in recording.joints:
             continue
         column = recording.joints.index(limit.joint)
-        angles = recording.angles[:, column]
+        angles = all_angles[:, column]
         if angles.min() < limit.low - 1e-6 or angles.max() > limit.high + 1e-6:
             reached = f"{angles.min():.3f}..{angles.max():.3f}"
             found.append(f"{limit.joint} at {reached}, its range is {limit.low:.3f}..{limit.high:.3f}")
-        speed = np.abs(recording.speeds[:, column]).max()
+        speed = np.abs(all_speeds[:, column]).max()
         if speed > limit.speed * (1 + 1e-6):
             found.append(f"{limit.joint} moves at {speed:.2f} rad/s, the limit is {limit.speed:.2f}")
-        acceleration = np.abs(recording.accelerations[:, column]).max()
+        acceleration = np.abs(all_accelerations[:, column]).max()
         if acceleration > limit.acceleration * (1 + 1e-6):
             found.append(f"{limit.joint} accelerates at {acceleration:.1f}, the limit is {limit.acceleration:.1f}")
     return found

@@ -32,66 +32,74 @@ poses = st.lists(st.builds(of.PartPose, lexeme=words, part=words), min_size=2, m
 
 
 @st.composite
-def behaviors(draw: st.DrawFn, id: str, reference: st.SearchStrategy[str], *, in_fragment: bool) -> of.Behavior:
-    kinds = [
-        st.builds(of.Gaze, id=st.just(id), target=words, influence=words, offset_angle=numbers),
-        st.builds(of.GazeShift, id=st.just(id), target=words, offset_direction=words),
-        st.builds(of.Pointing, id=st.just(id), target=words, mode=hands),
-        st.builds(of.Gesture, id=st.just(id), lexeme=words, mode=hands),
-        st.builds(of.Head, id=st.just(id), lexeme=words, repetition=st.integers(1, 9), amount=amounts),
-        st.builds(of.HeadDirectionShift, id=st.just(id), target=words),
-        st.builds(of.Face, id=st.just(id), amount=amounts, overshoot=numbers, expressions=expressions),
-        st.builds(of.FaceLexeme, id=st.just(id), lexeme=words, amount=amounts),
-        st.builds(of.FaceFacs, id=st.just(id), au=st.integers(1, 60), side=sides, amount=amounts),
-        st.builds(of.FaceShift, id=st.just(id), lexeme=words, au=st.integers(0, 60), side=sides),
-        st.builds(of.FaceShift, id=st.just(id), amount=amounts, expressions=expressions.filter(bool)),
-        st.builds(of.Posture, id=st.just(id), stance=words, lexeme=words, part=words),
-        st.builds(of.PostureShift, id=st.just(id), stance=words),
-        st.builds(of.Posture, id=st.just(id), stance=words, poses=poses),
-        st.builds(of.Pose, id=st.just(id), lexeme=words, part=words),
-        st.builds(of.Locomotion, id=st.just(id), target=words, manner=words),
-        st.builds(of.Wait, id=st.just(id), duration=st.none() | st.floats(0, 1e6)),
-        st.builds(of.Emit, id=st.just(id), event=words),
-        speeches(id),
-        st.builds(
-            of.Event, id=st.just(id), kind=st.sampled_from(get_args(of.EventKind)), responder=words,
-            objects=st.lists(words, max_size=2).map(tuple), cause=st.sampled_from(get_args(of.Cause)),
-            optional=st.booleans(), accept=actions, limit=st.none() | st.floats(0.1, 1e3),
-            anchors=st.lists(reference, max_size=2).map(tuple), turn=words,
-        ),
-        st.builds(of.TurnSignal, id=st.just(id), turn=words, signal=st.sampled_from(["ended", "aborted"])),
-    ]  # fmt: skip
-    if in_fragment:
-        option = st.builds(
-            of.SpeechOption,
-            text=words,
-            cost=st.floats(0, 1e3),
-            distractors=st.lists(words, max_size=2).map(tuple),
-            deictic=st.booleans(),
-        )
-        options = st.none() | st.lists(option, min_size=1, max_size=3).map(tuple)
-        reliability = st.floats(0, 1, exclude_min=True, exclude_max=True)
-        kinds.append(
-            st.builds(of.Reference, id=st.just(id), target=words, minimum_reliability=reliability, options=options)
-        )
-    return draw(st.one_of(kinds))
-
-
-@st.composite
-def speeches(draw: st.DrawFn, id: str) -> of.Speech:
+def speeches(draw: st.DrawFn) -> of.Speech:
     text = draw(words)
     names = draw(st.lists(ids.filter(lambda id: id not in ("start", "end")), unique=True, max_size=3))
     positions = sorted(draw(st.integers(0, len(text))) for _ in names)
     marks = tuple(of.Mark(name, position) for name, position in zip(names, positions, strict=True))
     markup = draw(st.just("") | words | st.just('<prosody rate="slow">a</prosody>'))
-    return of.Speech(id=id, text=text, marks=marks, markup=markup)
+    return of.Speech(id="", text=text, marks=marks, markup=markup)
+
+
+KINDS = [
+    st.builds(of.Gaze, id=st.just(""), target=words, influence=words, offset_angle=numbers),
+    st.builds(of.GazeShift, id=st.just(""), target=words, offset_direction=words),
+    st.builds(of.Pointing, id=st.just(""), target=words, mode=hands),
+    st.builds(of.Gesture, id=st.just(""), lexeme=words, mode=hands),
+    st.builds(of.Head, id=st.just(""), lexeme=words, repetition=st.integers(1, 9), amount=amounts),
+    st.builds(of.HeadDirectionShift, id=st.just(""), target=words),
+    st.builds(of.Face, id=st.just(""), amount=amounts, overshoot=numbers, expressions=expressions),
+    st.builds(of.FaceLexeme, id=st.just(""), lexeme=words, amount=amounts),
+    st.builds(of.FaceFacs, id=st.just(""), au=st.integers(1, 60), side=sides, amount=amounts),
+    st.builds(of.FaceShift, id=st.just(""), lexeme=words, au=st.integers(0, 60), side=sides),
+    st.builds(of.FaceShift, id=st.just(""), amount=amounts, expressions=expressions.filter(bool)),
+    st.builds(of.Posture, id=st.just(""), stance=words, lexeme=words, part=words),
+    st.builds(of.PostureShift, id=st.just(""), stance=words),
+    st.builds(of.Posture, id=st.just(""), stance=words, poses=poses),
+    st.builds(of.Pose, id=st.just(""), lexeme=words, part=words),
+    st.builds(of.Locomotion, id=st.just(""), target=words, manner=words),
+    st.builds(of.Wait, id=st.just(""), duration=st.none() | st.floats(0, 1e6)),
+    st.builds(of.Emit, id=st.just(""), event=words),
+    speeches(),
+    st.builds(
+        of.Event, id=st.just(""), kind=st.sampled_from(get_args(of.EventKind)), responder=words,
+        objects=st.lists(words, max_size=2).map(tuple), cause=st.sampled_from(get_args(of.Cause)),
+        optional=st.booleans(), accept=actions, limit=st.none() | st.floats(0.1, 1e3), turn=words,
+    ),
+    st.builds(of.TurnSignal, id=st.just(""), turn=words, signal=st.sampled_from(["ended", "aborted"])),
+]  # fmt: skip
+"""Behaviors without ids, and events without anchors. Made once: that takes longer than to draw one."""
+option = st.builds(
+    of.SpeechOption,
+    text=words,
+    cost=st.floats(0, 1e3),
+    distractors=st.lists(words, max_size=2).map(tuple),
+    deictic=st.booleans(),
+)
+references = st.builds(
+    of.Reference,
+    id=st.just(""),
+    target=words,
+    minimum_reliability=st.floats(0, 1, exclude_min=True, exclude_max=True),
+    options=st.none() | st.lists(option, min_size=1, max_size=3).map(tuple),
+)
+in_blocks = st.one_of(KINDS)
+in_fragments = st.one_of(*KINDS, references)
+
+
+@st.composite
+def behaviors(draw: st.DrawFn, id: str, reference: st.SearchStrategy[str], *, in_fragment: bool) -> of.Behavior:
+    made = replace(draw(in_fragments if in_fragment else in_blocks), id=id)
+    return replace(made, anchors=tuple(draw(st.lists(reference, max_size=2)))) if isinstance(made, of.Event) else made
+
+
+times = st.builds(SyncRef, block=st.just("") | ids, offset=offsets)
 
 
 @st.composite
 def _inputs(draw: st.DrawFn, *, in_fragment: bool) -> tuple[tuple[of.Behavior, ...], tuple[of.Constraint, ...]]:
     names = draw(st.lists(ids, unique=True, max_size=4))
     points = st.sampled_from(("start", "end") if in_fragment else SYNC_POINTS)
-    times = st.builds(SyncRef, block=st.just("") | ids, offset=offsets)
     if names:
         named = st.builds(SyncRef, behavior=st.sampled_from(names), sync=points, offset=offsets)
         references = (times | named).map(str)

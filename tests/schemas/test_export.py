@@ -22,7 +22,8 @@ from engage_hri.services.hostile.typed import RandomMessages, Words, distorted
 from tests.schemas.strategies import blocks, fragments
 
 SCHEMA: dict[str, Any] = json.loads((EXPORTED / BUNDLE).read_bytes())
-REGISTRY: Registry[Any] = Registry().with_resource(ID, Resource.from_contents(SCHEMA))
+REGISTRY: Registry[Any] = Registry().with_resource(ID, Resource.from_contents(SCHEMA)).crawl()
+"""Crawled once: what has not been is crawled anew at each look-up of a name."""
 MESSAGES = [kind.__name__ for kind in get_args(Message)]
 quick = settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 

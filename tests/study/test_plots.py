@@ -4,7 +4,6 @@ import struct
 
 import pytest
 
-from engage_hri.services.study.plots import draw
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from tests.study.sessions import kind, session
 
@@ -38,6 +37,8 @@ def events(count: int, delay: float | None) -> list[EventRecord]:
     ],
 )  # fmt: skip
 def test_all_plots_are_drawn(records: list[SessionRecord], seen: list[EventRecord]):
+    from engage_hri.services.study.plots import draw  # here: no other worker needs matplotlib
+
     drawn = draw(records, seen)
 
     assert set(drawn) == NAMES

@@ -10,7 +10,7 @@ from contextlib import aclosing
 from math import inf, radians
 
 from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -64,6 +64,8 @@ class SimulatedBody(Body):
         self._torso = Torso(self._loop, zones, repertoire, displaced)
         self._voice = Voice(is_mute=bool(self._deviations.mute))
         self._occasions = 0
+        self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
+        """The last pose, as a message, and the rays of eyes and arms in it: often nothing has moved since."""
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -120,9 +122,12 @@ class SimulatedBody(Body):
     def state(self) -> BodyState:
         now = self._loop.time()
         pose = tracks.pose_at(self._torso.tracks, now)
+        if self._shown is None or self._shown[0] != pose:
+            arms = kinematics.arm(pose, "left"), kinematics.arm(pose, "right")
+            self._shown = (pose, kinematics.pose_message(pose), kinematics.gaze(pose), *arms)
+        _, message, gaze, left_arm, right_arm = self._shown
         return BodyState(
-            pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=kinematics.arm(pose, "left"),
-            right_arm=kinematics.arm(pose, "right"),
+            pose=message, gaze=gaze, left_arm=left_arm, right_arm=right_arm,
             moving=self._voice.is_busy or any(track.is_moving(now) for track in self._torso.tracks.values()),
             looking_at=self._torso.attention.fixated(now), speaking=self._voice.saying,
         )  # fmt: skip

@@ -111,27 +111,28 @@ def joints_of(part: str) -> tuple[str, ...]:
 
 
 def pose_message(pose: Pose) -> BodyPose:
-    return BodyPose(joints=tuple(JointAngle(name, angle) for name, angle in pose.items()))
+    return BodyPose(joints=tuple([JointAngle(name, angle) for name, angle in pose.items()]))
 
 
 def gaze(pose: Pose) -> Ray:
     """Gaze as a ray: from between the eyes along their axis."""
     yaw, pitch, roll = pose["neck_yaw"], pose["neck_pitch"], pose["neck_roll"]
-    ahead = (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
-    left = (-sin(yaw), cos(yaw), 0.0)
-    up = (-sin(pitch) * cos(yaw), -sin(pitch) * sin(yaw), cos(pitch))
+    trunk, cos_yaw, sin_yaw, cos_pitch, sin_pitch = _trunk(pose), cos(yaw), sin(yaw), cos(pitch), sin(pitch)
+    ahead = (cos_pitch * cos_yaw, cos_pitch * sin_yaw, sin_pitch)
+    left = (-sin_yaw, cos_yaw, 0.0)
+    up = (-sin_pitch * cos_yaw, -sin_pitch * sin_yaw, cos_pitch)
     up = _add(_scale(up, cos(roll)), _scale(left, sin(roll)))
     eyes = _add(NECK, _add(_scale(ahead, EYES_AHEAD), _scale(up, EYES_ABOVE)))
-    return Ray(origin=_to_world(eyes, pose), axis=_turned(ahead, pose))
+    return Ray(origin=_to_world(eyes, trunk), axis=_turned(ahead, trunk))
 
 
 def arm(pose: Pose, side: Side) -> Ray:
     """Forearm as a ray: from the elbow, tip at the hand."""
-    yaw, pitch = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"]
+    yaw, pitch, trunk = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"], _trunk(pose)
     elbow = _add(SHOULDER[side], _scale(_arm_direction(yaw, pitch), UPPER_ARM))
     axis = _arm_direction(yaw, pitch + pose[f"{side}_elbow"])
     hand = _add(elbow, _scale(axis, FOREARM))
-    return Ray(origin=_to_world(elbow, pose), axis=_turned(axis, pose), tip=_to_world(hand, pose))
+    return Ray(origin=_to_world(elbow, trunk), axis=_turned(axis, trunk), tip=_to_world(hand, trunk))
 
 
 def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, float]:
@@ -235,18 +236,25 @@ def _edge_crossing(forearm: Ray) -> Vector:
 
 def _arm_direction(yaw: Radians, angle: Radians) -> Vector:
     """Unit vector at `angle` from straight down, forward in the vertical plane at `yaw`."""
-    return (sin(angle) * cos(yaw), sin(angle) * sin(yaw), -cos(angle))
+    ahead = sin(angle)
+    return (ahead * cos(yaw), ahead * sin(yaw), -cos(angle))
 
 
-def _turned(vector: Vector, pose: Pose) -> Vector:
+def _trunk(pose: Pose) -> tuple[float, float, float, float]:
+    """Cosine and sine of the torso's lean and of its turn: the same for all that it carries."""
+    lean, turn = pose["torso_lean"], pose["torso_turn"]
+    return (cos(lean), sin(lean), cos(turn), sin(turn))
+
+
+def _turned(vector: Vector, trunk: tuple[float, float, float, float]) -> Vector:
     """Torso frame to world, direction only: lean about y, then turn about z."""
-    (x, y, z), lean, turn = vector, pose["torso_lean"], pose["torso_turn"]
-    x, z = x * cos(lean) + z * sin(lean), z * cos(lean) - x * sin(lean)
-    return (x * cos(turn) - y * sin(turn), x * sin(turn) + y * cos(turn), z)
+    (x, y, z), (cos_lean, sin_lean, cos_turn, sin_turn) = vector, trunk
+    x, z = x * cos_lean + z * sin_lean, z * cos_lean - x * sin_lean
+    return (x * cos_turn - y * sin_turn, x * sin_turn + y * cos_turn, z)
 
 
-def _to_world(point: Vector, pose: Pose) -> Vector:
-    return _add(HIP, _turned(_subtract(point, HIP), pose))
+def _to_world(point: Vector, trunk: tuple[float, float, float, float]) -> Vector:
+    return _add(HIP, _turned(_subtract(point, HIP), trunk))
 
 
 def _to_torso(point: Vector, pose: Pose) -> Vector:

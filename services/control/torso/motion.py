@@ -127,7 +127,10 @@ class Motion:
         return piece.t + 2 * (s - piece.s) / (piece.rate + root) if s > piece.s else piece.t
 
     def _piece(self, t: Seconds) -> _Piece:
-        return next((piece for piece in reversed(self._pieces) if piece.t <= t), self._pieces[0])
+        for piece in reversed(self._pieces):
+            if piece.t <= t:
+                return piece
+        return self._pieces[0]
 
     def _replan(self, now: Seconds, s: Seconds, rate: float) -> None:
         self._stop = max(s, min(self.limit, self.path.length))

@@ -75,9 +75,12 @@ class Track:
         self.joints = tuple(limit.joint for limit in LIMITS[part])
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
         self._column = 0
+        self._last: JointMotion | None = None
+        """Whose angles are known as numbers: of a motion that is over, it is the same all the time."""
+        self._angles: tuple[float, ...] = ()
 
     def play(self, motion: Motion, column: int = 0, aim: Aim | None = None) -> None:
-        self.motion, self._column, self.aim = motion, column, aim
+        self.motion, self._column, self.aim, self._last = motion, column, aim, None
 
     def at(self, t: Seconds) -> JointMotion:
         state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
@@ -101,10 +104,13 @@ class Track:
         return not self.trunk.is_moving(t) and aim.is_laid_for(self.trunk.angles(t))
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
-        columns = self.motion.at(t).q[self._column : self._column + len(self.joints)]
+        state = self.motion.at(t)
+        columns = slice(self._column, self._column + len(self.joints))
         if self.aim is not None and not self.is_still(t, self.aim):
-            columns = self.aim.within(columns + self.aim.offset(self.trunk.angles(t)))
-        return tuple(columns.tolist())
+            return tuple(self.aim.within(state.q[columns] + self.aim.offset(self.trunk.angles(t))).tolist())
+        if state is not self._last:
+            self._last, self._angles = state, tuple(state.q[columns].tolist())
+        return self._angles
 
     def is_moving(self, t: Seconds) -> bool:
         return t < self.motion.end
@@ -177,8 +183,8 @@ def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:
     """The angle of every joint, nod included."""
     pose: dict[str, float] = {}
     for part, track in tracks.items():
-        for joint, angle in zip(track.joints, track.angles(t), strict=True):
-            pose[joint] = pose.get(joint, 0.0) + angle if part == "nod" else angle
+        angles = zip(track.joints, track.angles(t), strict=True)
+        pose.update(angles if part != "nod" else [(joint, pose.get(joint, 0.0) + angle) for joint, angle in angles])
     return pose
 
 
