@@ -161,13 +161,15 @@ def _shown(term: Term, case: Case) -> str:
 def surprises(case: Case, block: str) -> list[tuple[float, str]]:
     """How far each point was off the last prediction told before it, with its name; the farthest first.
 
-    What comes as another block comes nobody can foresee: that may have changed it.
+    What comes as another block comes, or has its turn, nobody can foresee: it is planned then, and may change it.
     """
     predictions = case.record.predictions(block)
     if not predictions:
         return []
     found = []
     comings = [deed.at for deed in case.story.deeds if deed.kind == "perform" and deed.block != block]
+    turns = [each for each, other in case.blocks.items() if each != block and other.composition != "MERGE"]
+    comings += [began for each in turns if (began := case.record.began(each)) is not None]
     for each in case.record.points(block):
         at = each.at.seconds
         if any(-EXACT < at - coming < EXACT for coming in comings):

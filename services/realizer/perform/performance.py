@@ -115,10 +115,9 @@ class BlockPerformance:
                     self._take_out(self._live.taken_out)
                     self.take_in()
                     self._shared.rehearse(self.plan, but=self)
-                    rehearsing = tasks.create_task(self.rehearsing.run(), name=f"{block}: rehearsing")
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
                     await self._end_behaviors(ending)
-                for task in (rehearsing, *self._tasks.values()):
+                for task in self._tasks.values():
                     task.cancel()
         finally:
             self._close()
@@ -217,6 +216,7 @@ class BlockPerformance:
     def _close(self) -> None:
         self._timer.set(None)
         self._soon.stop()
+        self.rehearsing.stop()
         self._net.close()
         self._afterwards.stop()
         self._tell()

@@ -16,12 +16,14 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate, EstimateBehaviors
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Containing
 from engage_hri.services.realizer.perform.knowledge import Performed
 from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about_rest, times_ahead
 from engage_hri.services.realizer.plan.agreement import STRAIGHT, between, difference
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE, poses_before
+from engage_hri.services.realizer.points import frozen
 
 MOST = 6
 """Most questions in a row, each because of the answer to the one before."""
@@ -36,6 +38,9 @@ class Rehearsed(Performed, Protocol):
 
     @property
     def ties(self) -> "KnowsOthers": ...
+
+    def containing(self) -> Containing:
+        """Contain exceptions in the body of `with`: they end this block, and no other."""
 
     def take_in(self, news: Callable[[], object]) -> None:
         """Take in news and do what follows from it, unless the block is ending."""
@@ -52,7 +57,9 @@ class KnowsOthers(Protocol):
 
 
 class Rehearsing:
-    """The questions about one block."""
+    """The questions about one block. Most blocks need none, so there is no task before there is news."""
+
+    __slots__ = ("_ask", "_now", "_others", "_owner", "_parts", "_task")
 
     def __init__(
         self, owner: Rehearsed, others: Callable[[], Iterable[Performed]], now: Callable[[], Seconds], ask: Ask
@@ -62,26 +69,33 @@ class Rehearsing:
         self._others = others
         self._now = now
         self._ask = ask
-        self._changed = asyncio.Event()
-        self._parts: set[str] = set()
+        self._parts: frozenset[str] = frozen()
         """Parts that move in another way than when the body was asked last."""
+        self._task: asyncio.Task[None] | None = None
 
     def look_again(self, parts: Collection[str]) -> None:
         """Ask the body soon, and once, about all that has changed by then. parts: that move otherwise than before."""
-        self._parts.update(parts)
-        self._changed.set()
+        self._parts = self._parts.union(parts)
+        if self._task is None:
+            self._task = asyncio.get_running_loop().create_task(self._run(), name="rehearsal")
 
-    async def run(self) -> None:
-        """Ask whenever something has changed, until cancelled."""
-        while True:
-            await self._changed.wait()
-            for number in range(MOST):
-                self._changed.clear()
-                await self._look(1.0 if number < STRAIGHT else 0.5)
-                if not self._changed.is_set():
-                    break
-            else:
-                await asyncio.sleep(PAUSE)
+    def stop(self) -> None:
+        """Ask no more."""
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _run(self) -> None:
+        """Ask until nothing has changed since."""
+        try:
+            with self._owner.containing():
+                while not self._owner.is_ending and self._parts:
+                    for number in range(MOST):
+                        if self._parts:
+                            await self._look(1.0 if number < STRAIGHT else 0.5)
+                    if self._parts:
+                        await asyncio.sleep(PAUSE)
+        finally:
+            self._task = None
 
     async def _look(self, weight: float) -> None:
         """Ask, and plan with the answer if it says something else. weight: of the answer."""
@@ -123,7 +137,7 @@ class Rehearsing:
             if id not in facts.begun or (facts.next_number(id) and not paces.get(id) and not facts.is_held(id))
         }
         parts, changed = parts_moved(plan, times), self._parts
-        self._parts = set()
+        self._parts = frozen()
         if not times or not (parts & changed or "torso" in parts | changed):
             return EstimateBehaviors(items=())
         poses = poses_before(plan, self._owner.ties.known())
