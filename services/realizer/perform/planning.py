@@ -16,7 +16,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, may_share, parts_of
 from engage_hri.services.realizer.perform.live import Live
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about
+from engage_hri.services.realizer.perform.questions import is_crowd, meanwhile, parts_moved, question_about
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
@@ -121,8 +121,10 @@ class Planning:
         """The question to the body about a plan, beside what it does for the other blocks."""
         times = planned_times(plan, known)
         question = question_about(plan.block, poses_before(plan, known), times)
-        moving = meanwhile(self._performing(), parts_moved(plan, times), self._bus.now()) if known.holders else ()
-        return replace(question, others=moving)
+        performed = list(self._performing()) if known.holders else []
+        if is_crowd(performed):
+            return question
+        return replace(question, others=meanwhile(performed, parts_moved(plan, times), self._bus.now()))
 
     async def _earlier(self, live: Live, named: Iterable[Point]) -> None:
         """Wait until those of the earlier blocks are planned that this one is to be planned with in mind."""

@@ -12,6 +12,15 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import behavior_times
 from engage_hri.services.realizer.points import performer
 
+CROWD = 48
+"""Behaviors of all live blocks from which on the body is asked about each block by itself: each question is about all
+of them, and each new plan calls for one of each block."""
+
+
+def is_crowd(performed: Iterable[Performed]) -> bool:
+    """True if these performances have so many behaviors that they are not rehearsed beside each other."""
+    return sum(len(each.decisions.plan.chains) for each in performed) > CROWD
+
 
 def question_about(
     block: Block, before: Mapping[str, BodyPose] = {}, times: Mapping[str, tuple[PlannedTime, ...]] = {}

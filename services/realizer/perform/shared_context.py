@@ -12,7 +12,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.perform.questions import parts_moved
+from engage_hri.services.realizer.perform.questions import is_crowd, parts_moved
 from engage_hri.services.realizer.perform.rehearsing import Ask, Rehearsing
 from engage_hri.services.realizer.perform.ties import Tied
 from engage_hri.services.realizer.plan.plan import Plan
@@ -76,7 +76,8 @@ class SharedContext(Struct, frozen=True):
 
     def rehearse(self, plan: Plan, but: object = None) -> None:
         """Let blocks rehearse what is to come, since a plan is new. but: a performance that need not."""
+        performed = list(self.others())
         parts = parts_moved(plan, plan.chains)
-        for each in self.others():
+        for each in () if is_crowd(performed) else performed:
             if each is not but:
                 each.rehearsing.look_again(parts)
