@@ -19,8 +19,9 @@ from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generation.head_stories")
 
-settings.register_profile("same", derandomize=True, database=None)
-settings.register_profile("search", parent=settings.get_profile("default"))
+# No deadline: how long an example takes on a busy machine says nothing.
+settings.register_profile("same", derandomize=True, database=None, deadline=None)
+settings.register_profile("search", parent=settings.get_profile("default"), deadline=None)
 settings.load_profile("same")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's background, and all children would inherit it

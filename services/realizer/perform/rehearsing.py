@@ -28,7 +28,9 @@ from engage_hri.services.realizer.points import frozen
 MOST = 6
 """Most questions in a row, each because of the answer to the one before."""
 PAUSE: Seconds = 0.1
-"""Seconds from the end of such a row to the next one at least: blocks may never agree with each other."""
+LONGEST_PAUSE: Seconds = 3.2
+"""Seconds from the end of such a row to the next one, twice as many each time: blocks may never agree with each other,
+and a body may say something else each time."""
 Ask = Callable[[Block, EstimateBehaviors], Awaitable[tuple[Estimate, ...]]]
 """A question to the body about behaviors of a block. Raises EngageError."""
 
@@ -88,12 +90,14 @@ class Rehearsing:
         """Ask until nothing has changed since."""
         try:
             with self._owner.containing():
+                pause = PAUSE
                 while not self._owner.is_ending and self._parts:
                     for number in range(MOST):
                         if self._parts:
                             await self._look(1.0 if number < STRAIGHT else 0.5)
                     if self._parts:
-                        await asyncio.sleep(PAUSE)
+                        await asyncio.sleep(pause)
+                        pause = min(2 * pause, LONGEST_PAUSE)
         finally:
             self._task = None
 
