@@ -29,8 +29,8 @@ MOST = 6
 """Most questions in a row, each because of the answer to the one before."""
 PAUSE: Seconds = 0.1
 LONGEST_PAUSE: Seconds = 3.2
-"""Seconds from the end of such a row to the next one, twice as many each time: blocks may never agree with each other,
-and a body may say something else each time."""
+"""Seconds from the end of such a row to the next one, twice as many each time: blocks may never agree with each
+other, and a body may say something else each time."""
 Ask = Callable[[Block, EstimateBehaviors], Awaitable[tuple[Estimate, ...]]]
 """A question to the body about behaviors of a block. Raises EngageError."""
 
