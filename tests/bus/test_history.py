@@ -17,9 +17,11 @@ from engage_hri.schemas.recognition import OpenEvents
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh import readers
 from engage_hri.services.bus.zenoh import session as zenoh_session
-from engage_hri.services.bus.zenoh.history import BATCH
+from engage_hri.services.bus.zenoh.history import BATCH, History, finish
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.order import PULSE_FOR
 from engage_hri.services.runtime.service import Ready, running
 from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, messages, numbers, state
 from tests.commanding import command
@@ -313,5 +315,28 @@ async def test_who_may_not_publish_on_a_key_hands_out_nothing_for_it(monkeypatch
 
     assert numbers(await messages(inbox, 2)) == [2, 4]
     assert await inbox.next(near.join("timer").now() + 1.5) is None  # after the next pulse, too
+    await far.close()
+    await near.close()
+
+
+async def test_a_process_that_never_answers_at_first_is_asked_until_it_does(monkeypatch: pytest.MonkeyPatch):
+    """Nothing is lost meanwhile, though what was sent is no longer recent, and no count tells of it any more."""
+    loop, answers, asked = asyncio.get_running_loop(), History._asked, 0
+
+    def slow(history: History, kind: keys.KeyClass, query: zenoh.Query) -> None:
+        nonlocal asked
+        asked += 1
+        answers(history, kind, query) if loop.time() > published + PULSE_FOR + 0.3 else finish(query)
+
+    monkeypatch.setattr(History, "_asked", slow)
+    monkeypatch.setattr(readers, "UNANSWERED", 0.5)
+    robot, end = f"visited-{os.getpid()}", free_endpoint()
+    near, far = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
+    await acquainted(near, far)
+    far.join("there").publish(keys.FEEDBACK, state(1))
+    published = loop.time()
+
+    assert [one.id for one in await messages(near.join("here").subscribe(keys.FEEDBACK))] == ["1"]
+    assert asked > readers.TRIES
     await far.close()
     await near.close()

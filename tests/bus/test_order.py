@@ -20,7 +20,8 @@ def write(sent: SentLog, key: str, now: float = 0.0) -> Written:
 
 def answer(sent: SentLog, follower: Follower, now: Seconds = 0.0) -> Past:
     """The answer of a process to a follower of its."""
-    missing, oldest = follower.missing(), now - keys.HISTORY_MAX_AGE
+    missing = follower.missing(now)
+    oldest = now - keys.HISTORY_MAX_AGE - missing.age
     return sent.past(lambda key: any(keys.matches(pattern, key) for pattern in follower.patterns), missing, oldest)
 
 
@@ -33,7 +34,7 @@ class Wire:
 
     def __init__(self) -> None:
         self.sent = SentLog("run")
-        self.follower = Follower(HEARD)
+        self.follower = Follower(HEARD, 0.0)
         self.delivered: list[Written] = []
         self.expected: list[Written] = []
 
@@ -103,7 +104,7 @@ class Deceived(Wire):
 
     def __init__(self) -> None:
         super().__init__()
-        self.follower = Follower((*HEARD, keys.WORLD))
+        self.follower = Follower((*HEARD, keys.WORLD), 0.0)
         self.answer: Past | None = None
         self.lies: list[Written] = []
 
@@ -208,14 +209,23 @@ def test_the_first_question_gets_two_seconds_of_events_and_the_last_state():
     write(sent, keys.FEEDBACK, now=1.0)
     write(sent, keys.BLOCK, now=2.0)
 
-    past = answer(sent, Follower([keys.FEEDBACK, keys.WORLD]), 3.0)
+    past = answer(sent, Follower([keys.FEEDBACK, keys.WORLD], 3.0), 3.0)
 
     assert numbers(list(past.written)) == [3, 4]
     assert past.counts == {keys.WORLD: 2, keys.FEEDBACK: 2}
 
 
+def test_what_is_recent_is_so_when_one_begins_to_follow_however_late_the_answer_comes():
+    """A machine that stands still for seconds between question and answer takes nothing away."""
+    sent, follower = SentLog("run"), Follower([keys.FEEDBACK], 10.0)
+    for at in (7.9, 8.1, 10.0, 10.5):
+        write(sent, keys.FEEDBACK, now=at)
+
+    assert numbers([one for one, _ in follower.catch_up(answer(sent, follower, 14.0))]) == [2, 3, 4]
+
+
 def test_after_a_cut_everything_kept_is_handed_out_however_old():
-    sent, follower = SentLog("run"), Follower([keys.FEEDBACK, keys.BLOCK])
+    sent, follower = SentLog("run"), Follower([keys.FEEDBACK, keys.BLOCK], 0.0)
     follower.catch_up(answer(sent, follower, 0.0))
     cut = [write(sent, key, now=0.0) for key in (keys.FEEDBACK, keys.BLOCK, keys.FEEDBACK)]
 
@@ -226,7 +236,7 @@ def test_after_a_cut_everything_kept_is_handed_out_however_old():
 
 
 def test_what_is_no_longer_kept_counts_as_lost():
-    sent, follower = SentLog("run", kept=2), Follower([keys.FEEDBACK])
+    sent, follower = SentLog("run", kept=2), Follower([keys.FEEDBACK], 0.0)
     follower.catch_up(answer(sent, follower, 0.0))
     for _ in range(5):
         write(sent, keys.FEEDBACK)
@@ -238,7 +248,7 @@ def test_what_is_no_longer_kept_counts_as_lost():
 
 
 def test_a_state_that_was_overwritten_is_not_missed():
-    sent, follower = SentLog("run"), Follower([keys.WORLD])
+    sent, follower = SentLog("run"), Follower([keys.WORLD], 0.0)
     follower.catch_up(answer(sent, follower, 0.0))
     write(sent, keys.WORLD)
     second = write(sent, keys.WORLD)
@@ -249,7 +259,7 @@ def test_a_state_that_was_overwritten_is_not_missed():
 
 
 def test_a_process_that_does_not_answer_holds_nothing_up():
-    sent, follower = SentLog("run"), Follower([keys.FEEDBACK])
+    sent, follower = SentLog("run"), Follower([keys.FEEDBACK], 0.0)
     for _ in range(5):
         write(sent, keys.FEEDBACK)
     held = [write(sent, keys.FEEDBACK), write(sent, keys.FEEDBACK)]

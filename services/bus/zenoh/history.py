@@ -136,6 +136,7 @@ class History:
                 form, age = form_asked(query, ""), _age(query.parameters)
             else:
                 missing = _missings.decode(query.payload.to_bytes())
+                age += missing.age
         except (EngageError, *BAD) as error:
             refuse(query, error.fault if isinstance(error, EngageError) else Fault(reason=str(error)), "json")
             finish(query)

@@ -58,10 +58,14 @@ Counts = dict[str, int]
 
 
 class Missing(Struct, frozen=True):
-    """A follower's question for the past. seen: its last count, by key. is_new: it has never caught up."""
+    """A follower's question for the past. seen: its last count, by key. is_new: it has never caught up.
+
+    age: time since it began to follow. A new one gets what is recent as of then: a late answer loses nothing.
+    """
 
     seen: Counts = {}
     is_new: bool = True
+    age: Seconds = 0.0
 
 
 class Past(Struct, frozen=True):
@@ -130,11 +134,12 @@ class Follower:
 
     behind: the past is needed; until `catch_up` nothing is delivered. gaps: how often a message was missed.
     lost: messages that were gone for good. forged: claims that the process' answers have disproved. asking, again:
-    kept for `Readers`: the question is on its way, and is to be asked once more after it.
+    kept for `Readers`: the question is on its way, and is to be asked once more after it. since: when it began.
     """
 
-    def __init__(self, patterns: Iterable[str]) -> None:
+    def __init__(self, patterns: Iterable[str], since: Seconds) -> None:
         self.patterns = tuple(patterns)
+        self.since = since
         self.behind = True
         self.asking = False
         self.again = False
@@ -181,10 +186,10 @@ class Follower:
         self.gaps += not self.behind
         self.behind = True
 
-    def missing(self) -> Missing:
+    def missing(self, now: Seconds) -> Missing:
         """Make the question. Its answer decides on all that is held now."""
         self._held_before = len(self._held)
-        return Missing(dict(self._seen), self._is_new)
+        return Missing(dict(self._seen), self._is_new, now - self.since)
 
     def catch_up(self, past: Past | None) -> list[tuple[Written, bool]]:
         """Take the past (None: there was no answer). Returns the messages to deliver, and whether each is history.

@@ -13,6 +13,7 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Subscription
 from engage_hri.services.bus.payloads import read_payload, unreadable
@@ -27,7 +28,9 @@ _flushes = msgspec.msgpack.Decoder(tuple[str, Counts])
 Trusts = Callable[[str, str, str], bool]
 """Check of a message: the run of its process, its key, and the participant that it names."""
 TRIES = 3
-"""Number of times that a process that is there, but does not answer, is asked for its past."""
+"""Number of times that a process that is there, but does not answer, is asked before what it sends is let through."""
+UNANSWERED: Seconds = 3.0
+"""Time after which such a process is asked again, as long as it is there: nobody else tells what was missed."""
 RUNS_KEPT = 256
 """Number of processes, there or gone, that a subscription remembers: one that is back gets on where it was."""
 
@@ -44,13 +47,13 @@ class _Reader:
         self.kept = tuple(dict.fromkeys(each for pattern in subscription.patterns for each in keys.kept(pattern)))
         self.followers: dict[str, Follower] = {}
 
-    def follower(self, run: str, there: Collection[str]) -> Follower:
+    def follower(self, run: str, there: Collection[str], now: Seconds) -> Follower:
         """The follower of a process, also of one that is new. there: processes that are not forgotten for it."""
         follower = self.followers.get(run)
         if follower is None:
             if len(self.followers) >= RUNS_KEPT and (gone := next((k for k in self.followers if k not in there), "")):
                 del self.followers[gone]
-            follower = self.followers[run] = Follower(self.subscription.patterns)
+            follower = self.followers[run] = Follower(self.subscription.patterns, now)
         return follower
 
 
@@ -91,6 +94,7 @@ class Readers:
         return sum(one.gaps for one in followers), sum(one.lost for one in followers)
 
     def close(self) -> None:
+        self._readers.clear()
         for declared in self._declared:
             declared.undeclare()
 
@@ -119,7 +123,7 @@ class Readers:
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-        self._ask(reader, {run: reader.follower(run, self._peers.processes) for run in self._peers.processes})
+        self._ask(reader, {run: self._follower(reader, run) for run in self._peers.processes})
 
     def detach(self, subscription: Subscription) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
@@ -129,6 +133,9 @@ class Readers:
             if carrier is not None and not readers:
                 del self._carriers[pattern]
                 carrier.undeclare()
+
+    def _follower(self, reader: _Reader, run: str) -> Follower:
+        return reader.follower(run, self._peers.processes, self._loop.time())
 
     def _sample_came(self, pattern: str, sample: zenoh.Sample) -> None:
         if sample.kind != zenoh.SampleKind.PUT:
@@ -149,7 +156,7 @@ class Readers:
             if not envelope.number:
                 self._deliver(reader, written, run, past=False)
                 continue
-            follower = reader.follower(run, self._peers.processes)
+            follower = self._follower(reader, run)
             for one in follower.take(written):
                 self._deliver(reader, one, run, past=False)
             self._catch_up(reader, run, follower)
@@ -222,7 +229,7 @@ class Readers:
         """Ask processes for what is missing: one, or all when a reader comes. waiting: followers, by run."""
         missing = Missing()
         for follower in waiting.values():
-            follower.asking, missing = True, follower.missing()
+            follower.asking, missing = True, follower.missing(self._loop.time())
 
         def told(run: str, past: Past | None) -> None:
             if (follower := waiting.pop(run, None)) is not None:
@@ -256,10 +263,17 @@ class Readers:
             follower.again, follower.behind = False, True
         self._catch_up(reader, run, follower)
         self._answer_flushes()
+        if past is None and reader.kept:
+            self._loop.call_later(UNANSWERED, self._ask_again, reader, run, follower)
+
+    def _ask_again(self, reader: _Reader, run: str, follower: Follower) -> None:
+        if reader in self._readers and run in self._peers.processes and not follower.asking:
+            follower.behind = True
+            self._catch_up(reader, run, follower)
 
     def process_came(self, run: str) -> None:
         for reader in self._readers:
-            follower = reader.follower(run, self._peers.processes)
+            follower = self._follower(reader, run)
             # The process may be back after a cut in which messages were lost, or the answer to a question.
             follower.again = follower.asking
             follower.behind = True
@@ -277,7 +291,7 @@ class Readers:
 
     def _compare(self, run: str, pulse: Counts) -> None:
         for reader in self._readers:
-            follower = reader.follower(run, self._peers.processes)
+            follower = self._follower(reader, run)
             follower.pulse(pulse)
             self._catch_up(reader, run, follower)
 
