@@ -265,8 +265,11 @@ def _begin(
             course = choreography.plan(behavior, torso.situation(torso.world))
             torso.set_base(behavior, course, MovementAuthority(behavior, START))
             torso.follow()
-        # Nothing moves: it ends whenever it is asked to.
-        return replace(estimate, phases=tuple([replace(each, longest=None) for each in estimate.phases]))
+        # Nothing moves: it ends at once, or whenever it is asked to.
+        return replace(
+            estimate,
+            phases=tuple([replace(each, natural=0.0, shortest=0.0, longest=None) for each in estimate.phases]),
+        )
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
         _place(torso, item.pose, [part for part in course.parts if part not in moved])

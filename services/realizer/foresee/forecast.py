@@ -45,6 +45,8 @@ class Forecast(LongestPaths):
         """Seconds by which arcs are longer than planned; see `prolong`."""
         self._given_way: set[int] = set()
         self._broken: set[int] = set()
+        self._unkept: set[int] = set()
+        """Bounds that the plan does not keep: they are broken before others are."""
         for rank, transition in enumerate(order(net) or range(size)):
             self._rank[transition] = rank
         for place in net.places:
@@ -62,10 +64,13 @@ class Forecast(LongestPaths):
             for bound in net.bounds
             if bound.kind == "phase"
         }
+        unkept = {(plan.at.get(each.late), plan.at.get(each.early)) for each in plan.broken}
         for bound in net.bounds:
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
-            self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
+            arc = self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
+            if (bound.source, bound.target) in unkept:
+                self._unkept.add(arc)
         self._elsewhere: dict[int, int] = {}
         """For each instant with points of other blocks, the arc that keeps it no earlier than those blocks expect."""
         self._awaited: dict[int, list[str]] = {}
@@ -332,7 +337,9 @@ class Forecast(LongestPaths):
                 self._set_seconds(each, self._arcs[each].seconds - share * room[each])
         if not enough:
             bounds = [each for each in numbers if self._arcs[each].is_bound]
-            self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))
+            first = [each for each in bounds if each in self._unkept]
+            first += [each for each in bounds if self._arcs[each].behavior]
+            self._break([*first, bounds[-1]][0])
 
     def _break(self, number: int) -> None:
         self._broken.add(number)

@@ -22,7 +22,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import slack
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer
 
-SURPRISE: Seconds = 0.1
+SURPRISE: Seconds = 0.008
 """Difference from the expected time, in seconds, from which predictions are computed again."""
 NOTICEABLE: Seconds = 0.02
 """Seconds; planned instants that differ by less are not worth a message."""
@@ -284,11 +284,12 @@ class Foresight(Observer):
         forecast, plan, facts = self.forecast, self.plan, self._facts
         if forecast is None or behavior not in plan.chains:
             return ()
+        # A shift beneath a look takes no time, and ends whenever it is asked to: no bound says so.
+        is_moving = plan.chains[behavior].type not in SHIFTS
         is_minded = behavior in self._minded or behavior in self.may_be_slower
-        if not is_minded and not forecast.is_hurried(behavior):
+        if is_moving and not is_minded and not forecast.is_hurried(behavior):
             return ()  # No bound makes it hurry, for itself or for who comes after it, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
-        is_moving = plan.chains[behavior].type not in SHIFTS  # a shift beneath a look takes no time
         number = facts.next_number(behavior)
         at = facts.reached[points[number - 1]] if number else now
         is_paced = is_hurried = forecast.is_hurried(behavior)

@@ -28,7 +28,7 @@ from engage_hri.services.realizer.plan.waiting import waited_for
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
-NOTICEABLE: Seconds = 0.1
+NOTICEABLE: Seconds = 0.008
 """Seconds that people notice between what they see and hear; a prediction that moves by less is not told again."""
 PLANNED: Seconds = 0.002
 """The same for the predictions of another plan: they are no mere consequence of what was measured."""
