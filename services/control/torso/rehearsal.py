@@ -77,7 +77,7 @@ class _Part:
     def next_due(self) -> Seconds | None:
         """Instant at which a paced behavior passes its next point: then it is given the next one."""
         run = self.run
-        if not self._forced or run.is_over or run.holding or not run.pending:
+        if not (self._forced or run.authority.pace) or run.is_over or run.holding or not run.pending:
             return None
         return run.due(run.pending[0])
 
@@ -181,12 +181,12 @@ def rehearsed(
         {each.sync: round(began + each.at, ROUNDING) for each in item.times} for item in items
     ]
     passing = [{each.sync for each in item.times if each.through} for item in items]
-    events = [(at[START], BEGIN, number, "") for number, at in enumerate(times) if not items[number].reached]
+    events: list[tuple[Seconds, int, int, str]] = []
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
     told: dict[int, Estimate] = {}
     for number, item in enumerate(items):
-        if item.reached and (run := _under_way(torso, item)) is not None:
+        if (run := _under_way(torso, item)) is not None:
             part = parts[number] = _go_on(torso, run, times[number], passing[number])
             moved.update(run.course.parts)
             events += [(until, RELEASE, number, sync) for sync, until in part.waits.items()]
@@ -194,6 +194,8 @@ def rehearsed(
             told[number] = Estimate(
                 behavior=item.behavior.id, feasible=True
             )  # It moves nothing: a shift beneath a look.
+        else:
+            events.append((times[number][START], BEGIN, number, ""))
     for number, part in parts.items():
         if number < count:
             part.foresee(torso, clock.at)
@@ -231,7 +233,9 @@ def rehearsed(
 
 
 def _under_way(torso: Torso, item: EstimateItem) -> Run | None:
-    """The run of a behavior that is under way."""
+    """The run of a behavior that is under way: who asks may know of it, or say that it was to begin by now."""
+    if not item.reached and any(each.sync == START and each.at > EARLY for each in item.times):
+        return None
     return next((run for run in torso.runs.values() if run.behavior == item.behavior and not run.is_over), None)
 
 

@@ -27,7 +27,7 @@ class Forecast(LongestPaths):
     def __init__(
         self, plan: Plan, began: Seconds, factor: Callable[[str], float], foreseen: Mapping[Point, Seconds]
     ) -> None:
-        net = plan.net
+        net, planned = plan.net, plan.schedule
         size = len(net.transitions)
         super().__init__(size, began)
         self._there: list[Seconds] = [began] * size
@@ -46,7 +46,9 @@ class Forecast(LongestPaths):
         self._given_way: set[int] = set()
         self._broken: set[int] = set()
         self._unkept: set[int] = set()
-        """Bounds that the plan does not keep: they are broken before others are."""
+        """Bounds that the plan does not keep."""
+        self._bent: set[int] = set()
+        """Phases that the plan makes shorter, and the bounds of those that it makes longer, than is natural."""
         for rank, transition in enumerate(order(net) or range(size)):
             self._rank[transition] = rank
         for place in net.places:
@@ -58,6 +60,8 @@ class Forecast(LongestPaths):
                     key = (place.after, place.source)
                     self._after[key] = (*self._after.get(key, ()), arc)
                 if behavior:
+                    if planned[place.target] - planned[place.source] < place.lag - EPSILON:
+                        self._bent.add(arc)
                     self._phase_to[behavior, place.target] = self._phase_from[behavior, place.source] = arc
         self._longest = {
             (bound.behavior, bound.source): inf if bound.stretch is None else bound.stretch - bound.lag
@@ -71,6 +75,8 @@ class Forecast(LongestPaths):
             arc = self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
             if (bound.source, bound.target) in unkept:
                 self._unkept.add(arc)
+            if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag:
+                self._bent.add(arc)
         self._elsewhere: dict[int, int] = {}
         """For each instant with points of other blocks, the arc that keeps it no earlier than those blocks expect."""
         self._awaited: dict[int, list[str]] = {}
@@ -318,17 +324,25 @@ class Forecast(LongestPaths):
     # -- making way ----------------------------------------------------------------------------------------------
 
     def _make_way(self, numbers: Sequence[int], excess: Seconds) -> None:
-        """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, break a bound."""
+        """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, break a bound.
+
+        As the plan does: what it does not keep is not hurried for, and what it makes slower or faster gives way first.
+        """
+        if (unkept := next((each for each in numbers if each in self._unkept), None)) is not None:
+            self._break(unkept)
+            return
         room = {each: self._arcs[each].seconds - self._arcs[each].least for each in numbers}
         elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
         boundless = [each for each in elastic if room[each] == inf]
         if boundless:
-            elastic = [min(boundless, key=lambda each: self._rank[self._arcs[each].target])]
+            elastic = [min(boundless, key=lambda each: (each not in self._bent, self._rank[self._arcs[each].target]))]
             room[elastic[0]] = excess
         enough = bool(elastic) and sum(room[each] for each in elastic) >= excess - EPSILON
         # What can be slower gives way before what has to hurry.
-        for is_bound in (True, False):
-            giving = [each for each in elastic if self._arcs[each].is_bound == is_bound]
+        for is_bound, is_bent in ((True, True), (True, False), (False, True), (False, False)):
+            giving = [
+                each for each in elastic if self._arcs[each].is_bound == is_bound and (each in self._bent) == is_bent
+            ]
             total = sum(room[each] for each in giving)
             share = min(1.0, excess / total) if total > 0.0 and excess > 0.0 else 0.0
             excess -= share * total
@@ -337,9 +351,7 @@ class Forecast(LongestPaths):
                 self._set_seconds(each, self._arcs[each].seconds - share * room[each])
         if not enough:
             bounds = [each for each in numbers if self._arcs[each].is_bound]
-            first = [each for each in bounds if each in self._unkept]
-            first += [each for each in bounds if self._arcs[each].behavior]
-            self._break([*first, bounds[-1]][0])
+            self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))
 
     def _break(self, number: int) -> None:
         self._broken.add(number)

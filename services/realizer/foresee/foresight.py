@@ -327,32 +327,35 @@ class Foresight(Observer):
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """Expected times of all points of the block that are still to come, in seconds from the block's start."""
-        forecast = self.from_scratch(now)
+        times = self._each(self.from_scratch(now), now)
         points = {point for chain in self.plan.chains.values() for point in chain.points}
         coming = points - self._facts.reached.keys()
-        self._expected |= {point: max(now, forecast.times[self.plan.at[point]]) for point in coming}
+        self._expected |= {point: max(now, times[point]) for point in coming}
         self.is_surprised = False
         return {point: self._expected[point] - self._facts.began for point in coming}
 
     def times(self, now: Seconds) -> dict[Point, Seconds]:
         """Time of each point of the plan and of the end of the block, measured or expected, by the loop's clock."""
-        forecast, reached = self.from_scratch(now), self._facts.reached
-        times = {point: reached.get(point, forecast.times[at]) for point, at in self.plan.at.items()}
-        return {**times, BLOCK_START: self._facts.began, BLOCK_END: forecast.times[len(self.plan.members) - 1]}
+        forecast, last = self.from_scratch(now), len(self.plan.members) - 1
+        return {**self._each(forecast, now), BLOCK_START: self._facts.began, BLOCK_END: forecast.times[last]}
 
     def outlook(self, now: Seconds) -> Outlook:
         """All that was measured, and that is expected from it."""
-        forecast, reached, at = self.from_scratch(now), self._facts.reached, self.plan.at
-        instants = {point: self._net.passed.get(here, forecast.times[here]) for point, here in at.items()}
-        arrivals = {point: reached.get(point, instants[point]) for point in at}
+        return Outlook({**self._each(self.from_scratch(now), now), ORIGIN: self._facts.began})
+
+    def _each(self, forecast: Forecast, now: Seconds) -> dict[Point, Seconds]:
+        """When each point is expected: with the others of its instant, unless its behavior cannot wait so long."""
+        at, facts, passed = self.plan.at, self._facts, self._net.passed
+        instants = {point: passed.get(here, forecast.times[here]) for point, here in at.items()}
+        arrivals = {point: facts.reached.get(point, instants[point]) for point in at}
         for chain in self.plan.chains.values():
             for before, point in pairwise(chain.points):
                 is_passive = self._net.part_of[point].kind == "passive"
-                if point not in reached and is_passive and at[before] != at[point]:
+                if point not in facts.reached and is_passive and at[before] != at[point]:
                     behavior, here, since = point.behavior, at[point], arrivals[before]
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
                     arrivals[point] = max(now, since + least, min(since + most, instants[point]))
-        return Outlook({**arrivals, ORIGIN: self._facts.began})
+        return arrivals
 
     def from_scratch(self, now: Seconds | None = None) -> Forecast:
         """A forecast of all instants; for those that the kept forecast has, it says the same.
