@@ -167,12 +167,14 @@ class _Followed:
 def _least(tie: Place | Bound, plan: Plan) -> Seconds:
     """The least seconds from the source to the target of a tie; minus infinity: any.
 
-    Who sets out late enough not to wait on its target waits before it sets out.
+    Who sets out late enough not to wait on its target waits before it sets out, unless it waits there by plan.
     """
     if isinstance(tie, Place):
         return tie.shortest
     if tie.stretch is not None:
         return tie.lag - tie.stretch
+    if plan.schedule[tie.source] + tie.lag > plan.schedule[tie.target] + EPSILON:
+        return -inf
     is_prompt = any(each.behavior == tie.behavior and each.kind == "prompt" for each in plan.members[tie.source])
     return tie.lag if is_prompt else -inf
 

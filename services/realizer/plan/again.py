@@ -19,7 +19,7 @@ def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
 
 
 def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: Iterable[Estimate]) -> Plan | None:
-    """The plan with other estimates; None if these would cost a behavior, or change who takes what from whom.
+    """The plan with other estimates; None if these would cost a behavior, or a part that somebody else has.
 
     A motion that takes another time is no reason for that: blocks that plan with each other would never agree.
     """
@@ -29,7 +29,7 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
         )
     except BlockRefused:
         return None
-    return plan if {*plan.dropped} <= {*gone, *so_far.dropped} and plan.takes == so_far.takes else None
+    return plan if {*plan.dropped} <= {*gone, *so_far.dropped} and plan.takes.items() <= so_far.takes.items() else None
 
 
 def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:

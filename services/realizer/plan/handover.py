@@ -112,6 +112,8 @@ def arrange(
     yield len(chains) // 4
     users = _users(chains, ranked)
     beneath = frozenset(_overlaid(chains, users, times))
+    for id in [id for id in cuts if chains[id].type in SHIFTS and id not in successors and id not in beneath]:
+        del cuts[id]  # The look that it lay beneath ends before it, by now.
     cuts.update(dict.fromkeys(beneath, 0))
     yield len(chains) // 4
     for id, takers in _takers(chains, ranked, users).items():

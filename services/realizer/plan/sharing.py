@@ -135,7 +135,8 @@ class _Sharing:
             elif id not in self.known.begun:
                 self._wait(id, self._release(id, holder, 1))
         elif is_overlaid(chain, holder.chain):
-            self.cuts[id] = 0  # A shift takes nothing from a gaze.
+            if start < self.times[holder.chain.points[-1]] - EPSILON:
+                self.cuts[id] = 0  # A shift takes nothing from a gaze.
         elif id not in self.known.begun:
             first = self._first_after(holder.chain, start)
             if first is not None and (point := self._needed(id, holder, first)) is not None:
