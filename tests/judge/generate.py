@@ -79,7 +79,7 @@ def _stream(chance: Random) -> tuple[Deed, ...]:
 
 
 def _sentences(chance: Random) -> tuple[Deed, ...]:
-    """A block of sentences that nobody times, with behaviors that depend on them, each with parts of its own."""
+    """A block of sentences that nobody times, with behaviors that depend on them; two of those may share a part."""
     speeches = [_speech(chance, f"s{number}") for number in range(chance.randint(2, 4))]
     elements = list(speeches)
     seven = reading.SEVEN_1_0
@@ -91,7 +91,14 @@ def _sentences(chance: Random) -> tuple[Deed, ...]:
         Element("faceLexeme", "f", ("start", "attackPeak", "relax", "end"), "attackPeak", {"lexeme": "SMILE"}),
     ]
     constraints = []
-    for one in chance.sample(dependents, chance.randint(0, 3)):
+    chosen = chance.sample(dependents, chance.randint(0, 3))
+    if chance.random() < 0.4:
+        twins = [
+            Element("head", id, seven, chance.choice(("stroke", "strokeEnd", "relax", "end")), {"lexeme": "NOD"})
+            for id in ("n", "n2")
+        ]
+        chosen = [*twins, *(each for each in chosen if each.id != "n")]
+    for one in chosen:
         to = chance.choice(speeches)
         ref = offset(chance, f"{to.id}:{chance.choice(to.points)}", (0.0, 0.0, 0.2, -0.2))
         if chance.random() < 0.25:

@@ -229,7 +229,8 @@ def predictions(case: Case) -> Iterator[Finding]:
 def spoken_order(case: Case) -> Iterator[Finding]:
     """Sentences come in the document's order, if that is possible, else in another; what can be served is not lost.
 
-    Asked of blocks whose behaviors use parts of their own, with the natural seconds that the body has named before.
+    Asked of blocks whose behaviors use parts of their own, but for words and nods, with the natural seconds that the
+    body has named before.
     """
     if not case.record.natural or not case.is_exact:
         return
@@ -251,7 +252,14 @@ def spoken_order(case: Case) -> Iterator[Finding]:
 
 
 def _is_possible(case: Case, block: Reading, order: tuple[str, ...]) -> bool:
-    """Whether the speeches can be said in this order, every phase taking its natural time: single points, relaxed."""
+    """Whether the speeches can be said in this order, every phase taking its natural time, with nods in any order."""
+    nods = [each.id for each in block.behaviors.values() if each.type == "head"]
+    return any(_is_possible_with(case, block, order, each) for each in permutations(nods))
+
+
+def _is_possible_with(case: Case, block: Reading, order: tuple[str, ...], nods: tuple[str, ...]) -> bool:
+    """The same for one order of the nods: each begins once the one before has made its stroke, and all that is asked
+    of it. Single points, relaxed."""
     zero = Place(block.id, "", "start")
     lags: list[tuple[Place, Place, float]] = []
     places: set[Place] = {zero}
@@ -268,6 +276,12 @@ def _is_possible(case: Case, block: Reading, order: tuple[str, ...]) -> bool:
         lags += [(zero, place, 0.0) for place in draft.values()]
     for earlier, later in pairwise(order):
         lags.append((Place(block.id, earlier, "end"), Place(block.id, later, "start"), 0.0))
+    asked = {_drafted(term.place, block) for relation in block.relations for term in relation.terms}
+    for earlier, later in pairwise(nods):
+        for point in [
+            each for each in places if each.behavior == earlier and (each in asked or each.sync == "stroke_end")
+        ]:
+            lags.append((point, Place(block.id, later, "start"), 0.0))
     for relation in block.relations:
         first = relation.terms[0]
         for term in relation.terms[1:]:

@@ -165,6 +165,7 @@ class Torso:
 
     def take_over(self, run: Run, path: Path) -> None:
         """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
+        run.began = self.clock.time()
         for joint in run.course.joints:
             self.misbelieved.pop(joint, None)
         for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):

@@ -32,6 +32,8 @@ ROUNDING = 6
 """Decimals of seconds that tell instants apart."""
 HURRIED: Seconds = 0.0005
 """Seconds by which a point comes too early for a behavior that does not hurry."""
+SAME: Seconds = 0.1
+"""Seconds by which a behavior may have begun at another time than who asks says."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
 
@@ -185,8 +187,9 @@ def rehearsed(
     parts: dict[int, _Part] = {}
     moved: set[str] = set()
     told: dict[int, Estimate] = {}
+    under_way = _under_way(torso, items, began)
     for number, item in enumerate(items):
-        if (run := _under_way(torso, item)) is not None:
+        if (run := under_way.get(number)) is not None:
             part = parts[number] = _go_on(torso, run, times[number], passing[number])
             moved.update(run.course.parts)
             events += [(until, RELEASE, number, sync) for sync, until in part.waits.items()]
@@ -232,11 +235,24 @@ def rehearsed(
     return tuple([told[number] for number in range(count)])
 
 
-def _under_way(torso: Torso, item: EstimateItem) -> Run | None:
-    """The run of a behavior that is under way: who asks may know of it, or say that it was to begin by now."""
-    if not item.reached and any(each.sync == START and each.at > EARLY for each in item.times):
-        return None
-    return next((run for run in torso.runs.values() if run.behavior == item.behavior and not run.is_over), None)
+def _under_way(torso: Torso, items: Sequence[EstimateItem], now: Seconds) -> dict[int, Run]:
+    """The runs of the behaviors that are under way, by number: who asks knows of it, or says they begin by now.
+
+    Two blocks may have the same behavior: of those the run is the one's that began when it did.
+    """
+    runs = {id(run): run for run in torso.runs.values() if not run.is_over}
+    starts = [next((now + each.at for each in item.times if each.sync == START), inf) for item in items]
+    pairs = sorted(
+        (abs(run.began - starts[number]), number, key)
+        for number, item in enumerate(items)
+        for key, run in runs.items()
+        if run.behavior == item.behavior and (item.reached or starts[number] <= now + EARLY)
+    )
+    found: dict[int, Run] = {}
+    for apart, number, key in pairs:
+        if number not in found and key in runs and apart < SAME:
+            found[number] = runs.pop(key)
+    return found
 
 
 def _go_on(torso: Torso, run: Run, times: Mapping[str, Seconds], passing: Container[str]) -> _Part:

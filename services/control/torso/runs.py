@@ -22,7 +22,8 @@ STALL, OVERHEAT = "(stall)", "(overheat)"
 class Run:
     """A behavior that is being performed: `course` under `authority`.
 
-    bell: rings when the authority changes. holding: it waits at a hold point, standing or still coming to a stop.
+    bell: rings when the authority changes. began: when it was given its parts.
+    holding: it waits at a hold point, standing or still coming to a stop.
     """
 
     def __init__(
@@ -37,6 +38,7 @@ class Run:
         self.course = course
         self.authority = authority
         self.bell = Bell()
+        self.began: Seconds = inf
         self.pending: list[CoursePoint] = list(course.points)
         self.holding = False
         self.is_beneath = False

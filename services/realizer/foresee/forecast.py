@@ -326,7 +326,7 @@ class Forecast(LongestPaths):
     def _make_way(self, numbers: Sequence[int], excess: Seconds) -> None:
         """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, break a bound.
 
-        As the plan does: what it does not keep is not hurried for, and what it makes slower or faster gives way first.
+        As the plan does: what it does not keep is not hurried for; what it makes slower or faster gives way first.
         """
         if (unkept := next((each for each in numbers if each in self._unkept), None)) is not None:
             self._break(unkept)
@@ -370,43 +370,3 @@ class Forecast(LongestPaths):
             if arc.is_on and arc.is_bound and not self._is_fact[arc.source]:
                 self._break(number)
         self._relax()
-
-
-def full_forecast(
-    plan: Plan,
-    began: Seconds,
-    factor: Callable[[str], float],
-    foreseen: Mapping[Point, Seconds],
-    reached: Mapping[Point, Seconds],
-    arrived: Mapping[Point, Seconds],
-    instants: Mapping[int, Seconds],
-    prolonged: Iterable[tuple[int, int, Seconds]] = (),
-) -> Forecast:
-    """Forecast of every instant, from scratch. instants: those that are over. prolonged: see `Forecast.prolong`."""
-    forecast = Forecast(plan, began, factor, foreseen)
-    for source, target, seconds in prolonged:
-        forecast.prolong(source, target, seconds)
-    for point, at in reached.items():
-        if point in plan.at:
-            forecast.passed(point.behavior, plan.at[point], at)
-    for point in arrived.keys() - reached.keys():
-        if point in plan.at:
-            forecast.come(point.behavior, plan.at[point], arrived[point])
-    for transition, at in instants.items():
-        forecast.fix(transition, at)
-    for transition in range(len(plan.members)):
-        forecast.require(transition)
-    forecast.update()
-    return forecast
-
-
-def is_predictive(plan: Plan) -> bool:
-    """True if a time is bounded from above, or a point that cannot or should not wait is tied to another."""
-    if any(bound.kind != "phase" for bound in plan.net.bounds):
-        return True
-    constrained = {place.target for place in plan.net.places if place.kind in ("order", "delay", "series")}
-    return any(
-        any(member.kind in ("passive", "prompt") for member in members)
-        and (len(members) > 1 or transition in constrained)
-        for transition, members in enumerate(plan.members)
-    )

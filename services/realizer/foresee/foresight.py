@@ -13,7 +13,8 @@ from typing import Any
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import SHORT, Experience
-from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
+from engage_hri.services.realizer.foresee.forecast import Forecast
+from engage_hri.services.realizer.foresee.from_scratch import full_forecast, is_predictive
 from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet

@@ -29,7 +29,9 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
         )
     except BlockRefused:
         return None
-    return plan if {*plan.dropped} <= {*gone, *so_far.dropped} and plan.takes.items() <= so_far.takes.items() else None
+    return (
+        plan if {*plan.dropped} <= {*gone, *so_far.dropped} and plan.takes.items() <= so_far.takes.items() else None
+    )
 
 
 def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:

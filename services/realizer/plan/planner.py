@@ -23,6 +23,7 @@ from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.part_order import PartOrder, turns_in
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
@@ -40,7 +41,7 @@ from engage_hri.services.realizer.plan.relations import (
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
-from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder
+from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder, may_speak_at_once
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
@@ -113,6 +114,7 @@ class _Planner:
         self.turns = self.given
         self.overlaps: set[Turn] = set()
         """Turns that there is no time to wait for."""
+        self.parts = PartOrder()
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
 
@@ -173,7 +175,7 @@ class _Planner:
         wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order that is new.
         """
         while True:
-            self.turns = self.given - self.overlaps
+            self.turns = (self.given | self.parts.turns) - self.overlaps
             said = self.relations
             present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
@@ -184,13 +186,16 @@ class _Planner:
             except Misordered:
                 continue
             except Losses as found:
+                waits = [loss.turn for loss in found.losses if loss.turn in self.turns]
+                if self.parts.change(waits, self.chains, self.known.begun):
+                    continue
                 times = yield from times_of(self.speeches, self.relations)
                 gone, losses, given_up = {*self.dropped}, list[Loss](), set[Point]()
                 for number, loss in enumerate(found.losses):
                     if not number % PORTION:
                         yield 8 * PORTION
                     turn = loss.turn
-                    if turn and turn in self.turns and self._may_speak_at_once(turn[1].behavior, present):
+                    if turn and turn in self.turns and may_speak_at_once(turn[1].behavior, self.chains, present):
                         self.overlaps.add(turn)
                     elif time := times.give_up(loss.points, loss.among, gone):
                         given_up.add(time[0])
@@ -206,6 +211,7 @@ class _Planner:
                             self._lose(loss)
                     yield len(part)
                 self.order.begin_anew(self.chains)
+                self.parts.begin_anew()
 
     def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
         return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
@@ -353,7 +359,11 @@ class _Planner:
                 raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:
+            turns = self.turns | arrangement.waits
+            if self.parts.change(turns_in(impossible.circles, assembly, turns), self.chains, self.known.begun):
+                raise Misordered from None
             if self.order.refute(impossible.circles, assembly.net):
+                self.parts.begin_anew()
                 raise Misordered from None
             if taken := foresight.losses_to_others(
                 impossible, assembly, arrangement.turns, self.chains, self.known, self.spelling
@@ -372,19 +382,13 @@ class _Planner:
             elif waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
                 assembler.waive(waits)
             else:
-                handovers = {each for takers in arrangement.handovers.values() for each in takers}
-                present, turns = assembler.relations, self.turns | self.order.turns | handovers
+                present, turns = assembler.relations, turns | self.order.turns
                 raise (
                     yield from judge(
                         impossible, assembly, self.chains, present, classes, self.block.id, turns, self.spelling
                     )
                 ) from None
             return (yield from self._solved(assembler, arrangement, classes))
-
-    def _may_speak_at_once(self, id: str, present: Relations) -> bool:
-        """True for an utterance that no constraint mentions: the voice decides whether it has to wait."""
-        is_speech = id in self.chains and self.chains[id].type == "speech"
-        return is_speech and all(point.behavior != id for point in present.constrained)
 
     def _resolve(self, conflict: Conflict) -> None:
         """Settle a conflict: one of the two uses the other arm, or waits for its turn."""

@@ -4,12 +4,14 @@ Constraints come first. Where they leave no time for one speech after another, t
 only when no order serves all. So first it is made sure that the speeches are possible without any order.
 """
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Literal
 
 from engage_hri.services.realizer.net.petri_net import PetriNet
+from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle
+from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.points import Point
 
 WORK = 400
@@ -112,3 +114,9 @@ class SpeakingOrder:
             order.remove(later)
             order.insert(order.index(earlier), later)
         return tuple(order)
+
+
+def may_speak_at_once(id: str, chains: Mapping[str, Chain], present: Relations) -> bool:
+    """True for an utterance that no constraint mentions: the voice decides whether it has to wait."""
+    is_speech = id in chains and chains[id].type == "speech"
+    return is_speech and all(point.behavior != id for point in present.constrained)
