@@ -160,8 +160,11 @@ class Case(Struct):
         at = {Point(f"other:b{number}", "end"): number for number in self.foreign}
         at |= {Point(name, f"p{number}"): number for name, each in self.stations.items() for number in each}
         members = tuple(() for _ in self.net.transitions)
+        # What a plan makes slower or faster gives way first: whatever that is, what can be kept is kept.
+        chance = random.Random(len(self.net.places))
+        schedule = tuple([round(chance.uniform(0.0, 5.0), 2) for _ in self.net.transitions])
         return Plan(
-            block=Block(id="b", behaviors=()), behaviors=(), net=self.net, at=at, members=members, schedule=(),
+            block=Block(id="b", behaviors=()), behaviors=(), net=self.net, at=at, members=members, schedule=schedule,
             chains={}, estimates={}, natural=frozenset(), required=frozenset(), waited_for=frozenset(), kept={},
             entering=(), relations=Relations((), (), frozenset()),
         )  # fmt: skip

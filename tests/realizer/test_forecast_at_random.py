@@ -164,9 +164,10 @@ def test_what_was_told_last_of_a_net_of_one_phase() -> None:
     )
     bounds = (Bound("delay", 3, 0, -2.25), Bound("phase", 2, 1, -1.0, 3.0, "a"))
     one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(5)), places, bounds), {}, [])
+    plan = replace(one.plan, schedule=(0.0,) * 5)  # which hurries both phases
 
     def times(*facts: tuple[int, float], factor: float = 1.0) -> tuple[Mapping[int, float], Forecast]:
-        forecast = Forecast(one.plan, BEGAN, lambda id: factor, {})
+        forecast = Forecast(plan, BEGAN, lambda id: factor, {})
         for each in range(5):
             forecast.require(each)
         for each, at in facts:

@@ -25,6 +25,8 @@ from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member,
 
 SURPRISE: Seconds = 0.008
 """Difference from the expected time, in seconds, from which predictions are computed again."""
+OVERDUE: Seconds = 0.1
+"""Seconds after which it is looked whether a behavior is overdue, if only other blocks want to know."""
 NOTICEABLE: Seconds = 0.02
 """Seconds; planned instants that differ by less are not worth a message."""
 Pace = tuple[tuple[str, Seconds], ...]
@@ -241,7 +243,7 @@ class Foresight(Observer):
         """Next time to look for delays that only other blocks depend on; None: there is no need."""
         while self._arrivals and self._facts.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
             heapq.heappop(self._arrivals)  # The behavior has arrived there.
-        return self._arrivals[0][0] + SURPRISE if self.followed and self._arrivals else None
+        return self._arrivals[0][0] + OVERDUE if self.followed and self._arrivals else None
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
         """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.
@@ -345,7 +347,7 @@ class Foresight(Observer):
         return Outlook({**self._each(self.from_scratch(now), now), ORIGIN: self._facts.began})
 
     def _each(self, forecast: Forecast, now: Seconds) -> dict[Point, Seconds]:
-        """When each point is expected: with the others of its instant, unless its behavior cannot wait so long."""
+        """Expected time of each point: that of its instant, unless its behavior cannot wait so long."""
         at, facts, passed = self.plan.at, self._facts, self._net.passed
         instants = {point: passed.get(here, forecast.times[here]) for point, here in at.items()}
         arrivals = {point: facts.reached.get(point, instants[point]) for point in at}
@@ -355,6 +357,7 @@ class Foresight(Observer):
                 if point not in facts.reached and is_passive and at[before] != at[point]:
                     behavior, here, since = point.behavior, at[point], arrivals[before]
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
+                    most = inf if before in facts.reached and facts.held_between(since, now, behavior) else most
                     arrivals[point] = max(now, since + least, min(since + most, instants[point]))
         return arrivals
 

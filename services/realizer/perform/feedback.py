@@ -28,8 +28,8 @@ from engage_hri.services.realizer.plan.waiting import waited_for
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
-NOTICEABLE: Seconds = 0.008
-"""Seconds that people notice between what they see and hear; a prediction that moves by less is not told again."""
+MOVED: Seconds = 0.008
+"""Seconds; a prediction that moves by less, as something was measured, is not told again."""
 PLANNED: Seconds = 0.002
 """The same for the predictions of another plan: they are no mere consequence of what was measured."""
 
@@ -38,9 +38,9 @@ AGAIN: Seconds = 0.001
 
 
 def moved_noticeably(
-    old: Mapping[Point, Seconds], new: Mapping[Point, Seconds], noticeable: Seconds = NOTICEABLE
+    old: Mapping[Point, Seconds], new: Mapping[Point, Seconds], noticeable: Seconds = MOVED
 ) -> bool:
-    """True if a point of `new` is not in `old`, or has moved by more than people notice.
+    """True if a point of `new` is not in `old`, or has moved by more than `noticeable`.
 
     Points that `new` lacks have been, or were dropped: other feedback says so.
     """
@@ -102,7 +102,7 @@ class Reporter:
         """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
         ours = {point: times[point] for point in _points(plan) if point in times}
         self.not_before = self._bus.now() + AGAIN * len(ours)
-        if moved_noticeably(self._told, ours, NOTICEABLE if plan is self._plan else PLANNED):
+        if moved_noticeably(self._told, ours, MOVED if plan is self._plan else PLANNED):
             self._predict(plan, began, ours)
         self._plan = plan
 

@@ -113,7 +113,7 @@ def arrange(
     handovers: dict[str, tuple[Handover, ...]] = {}
     conflicts = []
     yield len(chains) // 4
-    ranked = entering(chains, relations.constrained, times, rounds, before.ranked, begun)
+    ranked = entering(chains, mentioned, times, rounds, before.ranked, begun)
     yield len(chains) // 4
     users = _users(chains, ranked)
     beneath = frozenset(_overlaid(chains, users, times))
@@ -198,18 +198,17 @@ def kept_points(
 
 def entering(
     chains: Mapping[str, Chain],
-    constrained: Collection[Point],
+    mentioned: Collection[str],
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
     ranked: Sequence[str] = (),
     begun: Container[str] = (),
 ) -> tuple[str, ...]:
     """Behaviors in the order in which they take parts. Of those that start together, those that have begun come first
-    and unmentioned ones last; of the others who has to set out first for what it is asked for.
+    and unmentioned ones last.
 
     ranked: the order so far.
     """
-    mentioned = {point.behavior for point in constrained}
     so_far = {id: number for number, id in enumerate(ranked)}
     rank = {
         id: (
@@ -218,22 +217,11 @@ def entering(
             so_far.get(id, 0),
             rounds[start],
             id not in mentioned,
-            _sets_out(chain, constrained, times) if id in mentioned else 0.0,
             number,
         )
         for number, (id, chain) in enumerate(chains.items())
     }
     return tuple(sorted(chains, key=rank.__getitem__))
-
-
-def _sets_out(chain: Chain, constrained: Container[Point], times: Mapping[Point, Seconds]) -> Seconds:
-    """Time at which a behavior has to start for the first of its points that something is said of."""
-    natural = 0.0
-    for number, point in enumerate(chain.points):
-        natural += chain.segments[number - 1].natural if number else 0.0
-        if point in constrained:
-            return round(times[point] - natural, 6)
-    return times[chain.points[0]]
 
 
 def last_kept(

@@ -112,8 +112,7 @@ class _Planner:
         self.given: frozenset[Turn] = frozenset()
         """Turns to begin with."""
         self.turns = self.given
-        self.overlaps: set[Turn] = set()
-        """Turns that there is no time to wait for."""
+        self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.parts = PartOrder()
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
