@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.behaviors import Head, Pointing, Speech
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.services.realizer.perform.feedback import NOTICEABLE, moved_noticeably
+from engage_hri.services.realizer.perform.feedback import MOVED, moved_noticeably
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together
@@ -15,8 +15,8 @@ A, B = Point("a", "start"), Point("b", "end")
 def test_a_prediction_moves_noticeably_if_any_point_does() -> None:
     old = {A: 1.0, B: 2.0}
 
-    assert not moved_noticeably(old, {A: 1.0 + NOTICEABLE / 2, B: 2.0})
-    assert moved_noticeably(old, {A: 1.0, B: 2.0 - 2 * NOTICEABLE})
+    assert not moved_noticeably(old, {A: 1.0 + MOVED / 2, B: 2.0})
+    assert moved_noticeably(old, {A: 1.0, B: 2.0 - 2 * MOVED})
     assert not moved_noticeably(old, {B: 2.0})
     assert moved_noticeably({A: 1.0}, {B: 2.0})
 

@@ -79,6 +79,14 @@ def test_a_phase_without_room_keeps_its_time() -> None:
     assert times(made) == [0.0, 1.0, 2.25]
 
 
+@pytest.mark.parametrize("excess", [1e-9, 5e-8, 2.3e-7, 9e-7])
+def test_two_times_that_miss_each_other_by_a_rounding_are_one(excess: float) -> None:
+    """Nothing has room: without somebody giving way it would be tried for ever."""
+    made = net(3, (phase(0, 1, 0.25, 0.25), phase(1, 2, 0.75 + excess, 0.75 + excess)), (clock(2, 1.0),))
+
+    assert times(made) == pytest.approx([0.0, 0.25, 1.0], abs=1e-6)
+
+
 def test_what_cannot_be_is_told_with_every_phase_as_short_and_as_long_as_can_be() -> None:
     made = net(2, (phase(0, 1, 2.0, 1.75), phase(0, 1, 1.0, 0.5, "b")), (slowest(0, 1, 1.0, 0.5),))
 

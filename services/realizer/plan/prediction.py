@@ -88,6 +88,8 @@ def predict(
                     lags[index[lag.reason]] = lag
                 if (rest := excess - sum(slower)) > 0.0:
                     faster = [seconds - each for seconds, each in zip(room, slower, strict=True)]
+                    if not any(faster):  # They miss each other by a rounding: nobody notices who gives way.
+                        faster = [1.0] * len(cycle)
                     for lag in _shortened(cycle, faster, rest):
                         lags[index[lag.reason]] = lag
             if hopeless:
