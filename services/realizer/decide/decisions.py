@@ -15,9 +15,11 @@ from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.grants import Grants
 from engage_hri.services.realizer.decide.held_up import HeldUp
 from engage_hri.services.realizer.decide.lateness import LatenessWatch
+from engage_hri.services.realizer.decide.stopped import stopped
 from engage_hri.services.realizer.foresee.foresight import Foresight, differ_noticeably
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
+from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken, promises_of
 from engage_hri.services.realizer.plan.steps import finished
@@ -66,7 +68,7 @@ class Decisions:
         self.foresight.look_ahead(plan, net)
         self.grants.adopt(plan, net)
         self.facts.adopt(net, {id: chain.points for id, chain in plan.chains.items()})
-        self.foresight.prolong()
+        self.foresight.recall_holds()
         net.observe(self._observers(plan, net, self.began))
         for behavior in self.facts.begun:
             if behavior not in plan.chains:
@@ -175,6 +177,12 @@ class Decisions:
             return []
         found = (self._unheld(each) for each in self.promises.come(point, at))
         return [each for each in found if each.seconds > 0.0]
+
+    def stops(self, now: Seconds) -> Stops:
+        """What holds have stopped of the block, for another plan of it."""
+        if not self.facts.has_held:
+            return NO_STOPS
+        return stopped(self.plan, self.facts, self.foresight.times(now), now)
 
     def _unheld(self, broken: Broken) -> Broken:
         """The same without the seconds for which holds account."""

@@ -60,7 +60,7 @@ class Forecast(LongestPaths):
                     key = (place.after, place.source)
                     self._after[key] = (*self._after.get(key, ()), arc)
                 if behavior:
-                    if planned[place.target] - planned[place.source] < place.lag - EPSILON:
+                    if planned[place.target] - planned[place.source] < place.lag + place.stopped - EPSILON:
                         self._bent.add(arc)
                     self._phase_to[behavior, place.target] = self._phase_from[behavior, place.source] = arc
         self._longest = {
@@ -75,7 +75,7 @@ class Forecast(LongestPaths):
             arc = self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
             if (bound.source, bound.target) in unkept:
                 self._unkept.add(arc)
-            if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag:
+            if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag + bound.stopped:
                 self._bent.add(arc)
         self._elsewhere: dict[int, int] = {}
         """For each instant with points of other blocks, the arc that keeps it no earlier than those blocks expect."""

@@ -124,6 +124,21 @@ class Foresight(Observer):
         if (forecast := self.forecast) is not None and self._facts.next_number(behavior):
             self._news.append((forecast.overdue, *self._after_hold(behavior, now)))
 
+    def recall_holds(self) -> None:
+        """Take in what was held before there was this plan, as it was taken in when that went on."""
+        if (forecast := self.forecast) is not None and (last := self._facts.last_hold) is not None:
+            self.prolong()
+            self.none_before(last)
+            self._news += [(forecast.overdue, *each) for each in self._stood(last)]
+
+    def _stood(self, now: Seconds) -> Iterable[tuple[int, Seconds]]:
+        """Next points of behaviors that were held on their way there, as of `_after_hold`."""
+        facts = self._facts
+        for behavior in facts.under_way:
+            points, number = self.plan.chains[behavior].points, facts.next_number(behavior)
+            if number and facts.held_between(facts.reached[points[number - 1]], now, behavior):
+                yield self._after_hold(behavior, now)
+
     def _after_hold(self, behavior: str, now: Seconds) -> tuple[int, Seconds]:
         """The instant of the next point of a behavior under way, and when it comes there if it was held since.
 
@@ -370,12 +385,8 @@ class Foresight(Observer):
         known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
         forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged)
         if now is not None:
-            for behavior in facts.under_way:
-                points, number = self.plan.chains[behavior].points, facts.next_number(behavior)
-                if number and facts.held_between(facts.reached[points[number - 1]], now, behavior):
-                    forecast.overdue(*self._after_hold(behavior, now))
-            for transition in range(len(self.plan.members)):
-                forecast.overdue(transition, now)
+            for each in (*self._stood(now), *((here, now) for here in range(len(self.plan.members)))):
+                forecast.overdue(*each)
             forecast.update()
         return forecast
 

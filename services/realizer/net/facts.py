@@ -10,6 +10,7 @@ from math import isfinite
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.net.stops import Hold
 from engage_hri.services.realizer.points import Point, frozen
 
 
@@ -154,6 +155,11 @@ class Facts:
         """True if anything has been held since the block began."""
         return bool(self._holds)
 
+    @property
+    def last_hold(self) -> Seconds | None:
+        """Latest time at which others were held than before, or none any more; None: none ever was."""
+        return self._holds[-1][0] if self._holds else None
+
     def is_held(self, behavior: str) -> bool:
         """True if the behavior is to wait where it next can."""
         return self.held is None or behavior in self.held
@@ -176,6 +182,12 @@ class Facts:
         if not self._holds:  # asked at every point
             return 0.0
         return sum(_overlap(first, last, since, until) for first, last in self._holds_of(behavior, until))
+
+    def holds_so_far(self, now: Seconds) -> tuple[Hold, ...]:
+        """All times in which the same was held, up to now, in seconds from the block's start."""
+        ends = [*(at for at, _ in self._holds[1:]), now]
+        began, holds = self.began, zip(self._holds, ends, strict=False)
+        return tuple([Hold(at - began, end - began, held) for (at, held), end in holds if held is None or held])
 
     def _holds_of(self, behavior: str, until: Seconds) -> list[tuple[Seconds, Seconds]]:
         """Intervals in which the behavior (empty: any) was held; the last goes on to `until` if it is held still."""

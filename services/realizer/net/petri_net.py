@@ -44,7 +44,8 @@ class Place(Struct, frozen=True, gc=False):
     shortest: the least that the lag can be; only the phase of a behavior has less than `lag`.
     behavior: the one that has this phase, or that waits here since it cannot wait at a later point.
     lines: of the XML that asks for it. after: behavior of which the token comes, when it passes the source, as that
-    of a phase does; empty: of the transition, when all have passed.
+    of a phase does; empty: of the transition, when all have passed. stopped: seconds by which the plan was made with
+    a longer lag, since holds have stopped the token so far.
     """
 
     kind: PlaceKind
@@ -55,13 +56,14 @@ class Place(Struct, frozen=True, gc=False):
     behavior: str = ""
     lines: tuple[int, ...] = ()
     after: str = ""
+    stopped: Seconds = 0.0
 
 
 class Bound(Struct, frozen=True, gc=False):
     """Upper bound: `target` is no earlier than `source` + `lag`, so `source` is no later than `target` - `lag`.
 
     lag: negative, but for bounds on the start of the block. kind phase: a behavior cannot wait in this phase; it can
-    take `stretch` seconds more than natural (None: any).
+    take `stretch` seconds more than natural (None: any). stopped: see `Place`.
     """
 
     kind: PlaceKind
@@ -71,6 +73,7 @@ class Bound(Struct, frozen=True, gc=False):
     stretch: Seconds | None = 0.0
     behavior: str = ""
     lines: tuple[int, ...] = ()
+    stopped: Seconds = 0.0
 
 
 class PetriNet(Struct, frozen=True, dict=True):

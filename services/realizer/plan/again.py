@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Iterable
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.body import Estimate
 from engage_hri.services.realizer.plan.known import Known
@@ -9,13 +11,15 @@ from engage_hri.services.realizer.plan.phases import ARMS
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.plan.stops import as_run
 
 
 def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
     """A plan of a block as if the behaviors that are gone had never been written. Raises BlockRefused."""
-    return plan_block(
+    plan = plan_block(
         so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=_chosen(so_far, known)
     )
+    return replace(plan, net=as_run(plan.net))
 
 
 def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: Iterable[Estimate]) -> Plan | None:
@@ -29,9 +33,8 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
         )
     except BlockRefused:
         return None
-    return (
-        plan if {*plan.dropped} <= {*gone, *so_far.dropped} and plan.takes.items() <= so_far.takes.items() else None
-    )
+    costs = {*plan.dropped} - {*gone, *so_far.dropped} or plan.takes.items() - so_far.takes.items()
+    return None if costs else replace(plan, net=as_run(plan.net))
 
 
 def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:

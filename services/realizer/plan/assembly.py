@@ -18,6 +18,7 @@ from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
+from engage_hri.services.realizer.plan.stops import prolonged
 from engage_hri.services.realizer.points import (
     EPSILON,
     ORIGIN,
@@ -359,10 +360,9 @@ class Assembler:
         self.places.append(Place("order", 0, end))
         for id, chain in self.chains.items():
             start, last = self.at[chain.points[0]], self.at[chain.points[-1]]
-            if id in self.waited_for:
-                self.places.append(Place("order", last, end, behavior=id))
-            else:
-                self.places.append(Place("order", start, end, behavior=id))
+            is_awaited = id in self.waited_for
+            self.places.append(Place("order", last if is_awaited else start, end, behavior=id))
+            if not is_awaited:
                 self.places.append(Place("idle", last, start, behavior=id))
         fed = {place.target for place in self.places if place.kind != "idle"}
         left = {place.source for place in self.places}
@@ -373,9 +373,9 @@ class Assembler:
     def _in_firing_order(self) -> Steps[Assembly]:
         net, ranked, is_ordered = yield from numbered(self.transitions, self.places, self.bounds)
         number = {old: new for new, old in enumerate(ranked)}
-        members = [*self.members, ()]
         at = {point: number[each] for point, each in self.at.items()}
-        return Assembly(net, is_ordered, at, tuple([members[each] for each in ranked]))
+        members = tuple([self.members[each] if each < self.size else () for each in ranked])
+        return Assembly(prolonged(net, members, self.chains, self.arrangement.begun), is_ordered, at, members)
 
     def circles(self) -> Steps[list[list[Point]]]:
         """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""
