@@ -140,6 +140,7 @@ class _Realizer:
             if performance.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
                 performance.decisions.facts.say(word.behavior, self.bus.local(word.at))
+                performance.held.tell()  # A voice that is held may stand now.
 
     async def _perform(self, live: Live) -> None:
         """Perform a block; an exception that nothing else catches ends this block only, and takes its parts home."""

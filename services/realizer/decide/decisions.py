@@ -179,7 +179,7 @@ class Decisions:
         return [each for each in found if each.seconds > 0.0]
 
     def stops(self, now: Seconds) -> Stops:
-        """What holds have stopped of the block, for another plan of it."""
+        """Tell what holds have stopped of the block, for another plan of it."""
         if not self.facts.has_held:
             return NO_STOPS
         return stopped(self.plan, self.facts, self.foresight.times(now), now)

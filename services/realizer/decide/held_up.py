@@ -10,10 +10,8 @@ from collections.abc import Mapping
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.outlook import Outlook
+from engage_hri.services.realizer.net.facts import STANDING
 from engage_hri.services.realizer.points import Point
-
-STANDING: Seconds = 0.5
-"""Seconds in which a body comes to stand once it is held, and gets under way again."""
 
 
 class HeldUp:

@@ -52,6 +52,7 @@ class Stuck:
         self._standing = standing
         self._pauses = pauses
         self._tied = tied
+        self._silent = facts.silent
         self._running = self._later_than_moving(elsewhere - standing)
         """Instants that come nearer, since something that leads to them is on its way."""
         unfired = {each for each in range(len(plan.members)) if each not in net.instants}
@@ -101,8 +102,7 @@ class Stuck:
         moving |= {at[each] for each in self._plan.foreign if each in running and each not in facts.reached}
         for behavior in facts.under_way:
             chain, number = self._plan.chains[behavior], facts.next_number(behavior)
-            has_stopped = facts.is_held(behavior) and performer(chain.behavior) != "body"
-            if not has_stopped and not facts.holds(chain.points[number]):
+            if not self._has_stopped(behavior) and not facts.holds(chain.points[number]):
                 moving.add(at[chain.points[number]])
         fired = self._net.instants
         clocks = (each for each in self._plan.net.places if each.lag > 0.0 and each.kind != "phase")
@@ -139,9 +139,14 @@ class Stuck:
         is_next = number < len(chain.points) and at[chain.points[number]] in self.instants
         return is_next or self._waits_before(member.behavior, at[member.point])
 
+    def _has_stopped(self, behavior: str) -> bool:
+        """True if a behavior is held and comes no nearer to its next point: a clock, or a voice between words."""
+        is_clock = performer(self._plan.chains[behavior].behavior) != "body"
+        return behavior in self._silent or (is_clock and self._facts.is_held(behavior))
+
     def _sets_out(self, member: Member) -> Seconds:
-        """Planned time of the next point of a behavior that is stuck; of another block, that may be now."""
-        if (chain := self._plan.chains.get(member.behavior)) is None:
+        """Planned time of the next point of a behavior that is stuck; of another block, and if it stands, now."""
+        if (chain := self._plan.chains.get(member.behavior)) is None or self._has_stopped(member.behavior):
             return -inf
         return self._plan.predicted(chain.points[self._facts.next_number(member.behavior)])
 

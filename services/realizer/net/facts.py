@@ -6,12 +6,15 @@ changes nothing.
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.net.stops import Hold
 from engage_hri.services.realizer.points import Point, frozen
+
+STANDING: Seconds = 0.5
+"""Seconds in which a body comes to stand once it is held, and gets under way again."""
 
 
 class Facts:
@@ -38,7 +41,7 @@ class Facts:
         self._holds: list[tuple[Seconds, Collection[str] | None]] = []
         """The times at which other behaviors were held than before, and which."""
         self._words: dict[str, list[Seconds]] = {}
-        """When the voice has finished words of a behavior that was held then."""
+        """When the voice has finished words of each behavior."""
 
     def adopt(self, net: RunningNet, points: Mapping[str, tuple[Point, ...]]) -> None:
         """Let `net` run from its start to where these facts bring it. points: of each behavior, in order."""
@@ -166,16 +169,28 @@ class Facts:
 
     def say(self, behavior: str, at: Seconds) -> None:
         """Note that the voice has finished a word: the one in which it is held, perhaps. Then it stands."""
-        if self.is_held(behavior):
-            self._words.setdefault(behavior, []).append(at)
+        self._words.setdefault(behavior, []).append(at)
+
+    @property
+    def silent(self) -> frozenset[str]:
+        """Behaviors that are held, and whose voice has come to the end of a word since: they come no nearer."""
+        return frozen(
+            behavior
+            for behavior, words in self._words.items()
+            if self.is_held(behavior) and words[-1] >= self._holds_of(behavior, inf)[-1][0]
+        )
 
     def stood_between(self, since: Seconds, until: Seconds, behavior: str) -> Seconds:
-        """Seconds between these times in which the behavior was held and stood: from the end of its last word on."""
-        words = self._words.get(behavior, ())
-        return sum(
-            _overlap(max([first, *(word for word in words if first <= word <= last)]), last, since, until)
-            for first, last in self._holds_of(behavior, until)
-        )
+        """Seconds between these times in which the behavior was held and stood: from the end of its last word on.
+
+        A hold is over before a voice that tells of its words could stand, if it is short and no word has ended in it.
+        """
+        stood, told = 0.0, self._words.get(behavior, ())
+        for first, last in self._holds_of(behavior, until):
+            words = [word for word in told if first <= word <= last]
+            if words or not told or last - first > STANDING:
+                stood += _overlap(max([first, *words]), last, since, until)
+        return stood
 
     def held_between(self, since: Seconds, until: Seconds, behavior: str = "") -> Seconds:
         """Seconds between these times in which the behavior was held; empty: in which any was."""

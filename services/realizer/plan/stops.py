@@ -62,7 +62,7 @@ def _later(bound: Bound, by: Seconds) -> Bound:
 
 
 class _Stopped:
-    """What was stopped of a net."""
+    """Measure of what was stopped in one net."""
 
     def __init__(
         self, stops: Stops, net: PetriNet, members: Sequence[Sequence[Member]], chains: Mapping[str, Chain]
