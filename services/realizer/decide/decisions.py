@@ -182,7 +182,7 @@ class Decisions:
         """Tell what holds have stopped of the block, for another plan of it."""
         if not self.facts.has_held:
             return NO_STOPS
-        return stopped(self.plan, self.facts, self.foresight.times(now), now)
+        return stopped(self.plan, self.facts, self.held_up, self.foresight.times(now), now)
 
     def _unheld(self, broken: Broken) -> Broken:
         """The same without the seconds for which holds account."""

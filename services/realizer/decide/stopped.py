@@ -4,20 +4,26 @@ from collections.abc import Iterator, Mapping
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.decide.held_up import HeldUp
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.stops import Stops
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.points import ORIGIN, Point, performer
 
 
-def stopped(plan: Plan, facts: Facts, times: Mapping[Point, Seconds], now: Seconds) -> Stops:
-    """What holds have stopped. times: of all points, measured or expected, by the loop's clock."""
+def stopped(plan: Plan, facts: Facts, held_up: HeldUp, times: Mapping[Point, Seconds], now: Seconds) -> Stops:
+    """Tell what holds have stopped. times: of all points, measured or expected, by the loop's clock."""
     began = facts.began
+
+    def cost(late: Point, early: Point, allowed: Seconds, by: Seconds) -> Seconds:
+        return held_up.between(late, early, allowed, by, max(times.get(late, now), times.get(early, now)))
+
     return Stops(
         holds=facts.holds_so_far(now),
         phases={point: seconds for point, seconds in _stood(plan, facts, now) if seconds},
         reached={point: at - began for point, at in facts.reached.items()},
-        times={point: at - began for point, at in times.items()},
+        times={ORIGIN: 0.0} | {point: at - began for point, at in times.items()},
+        cost=cost,
     )
 
 

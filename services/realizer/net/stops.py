@@ -1,6 +1,6 @@
 """Stops: for how long holds have stopped the clocks and phases of a block, as far as another plan has to know."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec import Struct
 
@@ -21,16 +21,19 @@ class Hold(Struct, frozen=True):
 
 
 class Stops(Struct, frozen=True):
-    """What holds have stopped. All times are seconds from the start of the block.
+    """Measure of what holds have stopped. All times are seconds from the start of the block.
 
     holds: one after the other, up to now. phases: for a point, the seconds in which its behavior stood on its way
-    there. times: of points that are reached, and of others as they are expected now.
+    there. times: of points that are reached, and of others as they are expected now. cost: for a point and one
+    before it, the seconds for which holds account, of those by which it is later than allowed after that: the
+    allowed seconds, and those by which it is later.
     """
 
     holds: tuple[Hold, ...] = ()
     phases: Mapping[Point, Seconds] = {}
     reached: Mapping[Point, Seconds] = {}
     times: Mapping[Point, Seconds] = {}
+    cost: Callable[[Point, Point, Seconds, Seconds], Seconds] = lambda late, early, allowed, by: 0.0
 
     def of_clock(self, behaviors: Collection[str], since: Seconds, lag: Seconds) -> Seconds:
         """Seconds for which a clock stood that began to run at a time for so long, and leads to these behaviors.
@@ -47,11 +50,6 @@ class Stops(Struct, frozen=True):
         """Seconds between these times in which a behavior was held."""
         overlaps = (min(each.until, until) - max(each.since, since) for each in self.holds if each.names((behavior,)))
         return sum(each for each in overlaps if each > 0.0)
-
-    @property
-    def total(self) -> Seconds:
-        """Seconds in which anything was held."""
-        return sum(each.until - each.since for each in self.holds)
 
 
 NO_STOPS = Stops()

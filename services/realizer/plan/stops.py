@@ -14,7 +14,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.points import Member, Point
+from engage_hri.services.realizer.points import ORIGIN, Member, Point
 
 
 class Begun(frozenset[str]):
@@ -29,7 +29,7 @@ class Begun(frozenset[str]):
 
 
 def stops_of(begun: frozenset[str]) -> Stops:
-    """What holds have stopped of a block of which this has begun."""
+    """Stops that come with what has begun."""
     return begun.stops if isinstance(begun, Begun) else NO_STOPS
 
 
@@ -84,7 +84,7 @@ class _Stopped:
     def of_bound(self, bound: Bound) -> Seconds:
         """Seconds by which a point may come later: for which its clock, or its behavior, has stood.
 
-        Or by which it comes too late by now, up to all the time that anything was held.
+        Or by which it is expected too late for the holds, whatever it is that they have stopped.
         """
         early, late = bound.target, bound.source
         if bound.kind == "phase":
@@ -93,9 +93,11 @@ class _Stopped:
             return 0.0
         since = self._fired(early)
         clock = 0.0 if since is None else self._stops.of_clock(self._members[late], since, -bound.lag)
-        first, last = self._expected(early), self._expected(late)
-        missed = last - first + bound.lag if first is not None and last is not None else 0.0
-        return max(clock, min(missed, self._stops.total))
+        first, last, times = self._last(early), self._last(late), self._stops.times
+        if first is None or last is None:
+            return clock
+        missed = times[last] - times[first] + bound.lag
+        return max(clock, self._stops.cost(last, first, -bound.lag, missed) if missed > 0.0 else 0.0)
 
     def _of_phase(self, behavior: str, source: int, target: int) -> Seconds:
         """Seconds for which a behavior has stood on its way; if it begins with the block, also before that."""
@@ -112,12 +114,10 @@ class _Stopped:
         """Time at which all that is in a transition was reached; None: not all is."""
         if not transition:
             return 0.0
-        return self._last(transition, self._stops.reached)
+        points, reached = self._points[transition], self._stops.reached
+        return max(reached[each] for each in points) if points and all(each in reached for each in points) else None
 
-    def _expected(self, transition: int) -> Seconds | None:
-        """Time at which all that is in a transition was reached, or is expected; None: nobody knows."""
-        return self._last(transition, self._stops.times) if transition else 0.0
-
-    def _last(self, transition: int, times: Mapping[Point, Seconds]) -> Seconds | None:
-        points = self._points[transition]
-        return max(times[each] for each in points) if points and all(each in times for each in points) else None
+    def _last(self, transition: int) -> Point | None:
+        """The latest of the points of a transition, reached or expected; None: nobody knows."""
+        points, times = self._points[transition] if transition else (ORIGIN,), self._stops.times
+        return max(points, key=times.__getitem__) if points and all(each in times for each in points) else None
