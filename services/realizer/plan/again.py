@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Iterable
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.body import Estimate
 from engage_hri.services.realizer.plan.known import Known
@@ -14,7 +16,11 @@ from engage_hri.services.realizer.plan.relations import BlockRefused
 def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
     """A plan of a block as if the behaviors that are gone had never been written. Raises BlockRefused."""
     return plan_block(
-        so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=_chosen(so_far, known)
+        so_far.block,
+        so_far.estimates.values(),
+        dropped=gone,
+        known=_still_untied(so_far, known),
+        barred=_chosen(so_far, known),
     )
 
 
@@ -23,9 +29,15 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
 
     A motion that takes another time is no reason for that: blocks that plan with each other would never agree.
     """
+    known = _still_untied(so_far, known)
     try:
         plan = plan_block(
-            so_far.block, estimates, dropped=gone, known=known, barred=_chosen(so_far, known), turns=so_far.turns
+            so_far.block,
+            estimates,
+            dropped=gone,
+            known=_still_untied(so_far, known),
+            barred=_chosen(so_far, known),
+            turns=so_far.turns,
         )
     except BlockRefused:
         return None
@@ -37,3 +49,8 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
 def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:
     """Hands that are not to be chosen: blocks that came later were planned around the arms that this one uses."""
     return {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
+
+
+def _still_untied(so_far: Plan, known: Known) -> Known:
+    """What is known, with the ties that were given up: others were planned with that in mind."""
+    return replace(known, untied=known.untied | so_far.untied) if so_far.untied else known

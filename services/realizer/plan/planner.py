@@ -91,9 +91,8 @@ class _Planner:
     ) -> None:
         self.block = block
         self.known = known
-        self.doubted: set[Point] = set()  # points of others that are not planned for when they are expected
-        self.untied: set[Point] = set(known.untied)
-        """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
+        self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
+        self.untied: set[Point] = set(known.untied)  # see `Plan`
         self.early: frozenset[tuple[str, str]] = frozenset()  # see `Arrangement`
         self.waived: set[tuple[Point, Point]] = set()
         """Points of this block, each with one of another, that are waited for in a circle whatever is planned."""
@@ -311,6 +310,7 @@ class _Planner:
             },
             rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             relations=present,
+            untied=frozen(self.untied),
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,
