@@ -52,5 +52,5 @@ def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:
 
 
 def _still_untied(so_far: Plan, known: Known) -> Known:
-    """What is known, with the ties that were given up: others were planned with that in mind."""
+    """Knowledge with the ties that were given up: others were planned with that in mind."""
     return replace(known, untied=known.untied | so_far.untied) if so_far.untied else known
