@@ -288,10 +288,12 @@ class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=
     """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails.
 
     element: name of its element, with the prefix that it has there. namespace: empty, unless it is not BML's.
+    lacks: of an element that is known, the attribute without which there is nothing to perform.
     """
 
     element: str
     namespace: str = ""
+    lacks: str = ""
 
 
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -59,6 +59,14 @@ _ACTIONS = ("ROTATION", "ORIENTATION")
 """Values of a draft's `action` that say which other attribute says what to do."""
 _AXES = {"X": "NOD", "Y": "SHAKE", "Z": "TILT"}
 """The draft's other names of rotations."""
+_OPTIONAL: Mapping[tuple[str, type[of.Behavior]], tuple[str, ...]] = {
+    ("head", of.Head): ("lexeme", "rotation", "orientation"),
+    ("gesture", of.Gesture): ("lexeme", "type", "lexeme"),
+    ("gesture", of.Pointing): ("target", "target"),
+    ("face", of.FaceFacs): ("au", "au"),
+    ("locomotion", of.Locomotion): ("target", "target"),
+}
+"""By element and struct, a field that the struct needs, and the attributes of the draft that can give it."""
 PARTS: Mapping[str, Mapping[str, str]] = {
     "lexeme": {"lexeme": "lexeme", "amount": "amount"},
     "facs": {"au": "au", "side": "side", "amount": "amount"},
@@ -119,6 +127,18 @@ def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]
         if local == "face" and name in SHAPES:
             value = f"{SHAPES[name]}_{value}"
         yield field, _AXES.get(value, value) if name == "rotation" else value
+
+
+def lacking(plain: Mapping[str, str], local: str, raw: Mapping[str, Any], kind: type[of.Behavior]) -> str:
+    """Attributes of a draft of which a behavior needs one, and has none. Empty: it has, or its dialect demands one.
+
+    Every attribute of these elements may be left out in the draft of 2007, where others may say what to do.
+    """
+    field, *names = _OPTIONAL.get((local, kind), ("",))
+    if not field or raw.get(field):
+        return ""
+    action = plain.get("action", plain.get("type", "")).strip().lower()
+    return action if action in names else " or ".join(names)
 
 
 # -- elements ------------------------------------------------------------------------------------------------------
@@ -242,3 +262,8 @@ def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
         with suppress(ValueError):
             return float(value)
     return value
+
+
+def says_yes(value: object) -> bool:
+    """Tell whether an attribute means true, as XML spells that."""
+    return str(value).strip().lower() in ("true", "1")

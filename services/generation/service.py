@@ -107,8 +107,8 @@ class _Generation:
                 self._arbiter.feed(message, now)
             case SyncPointProgress():
                 self._runner.feed(message, now)
-            case Unreadable(id=id, fault=fault):
-                self._warn(id, "PARSING_FAILURE", fault.within(id))
+            case Unreadable(block=block, fault=fault):
+                self._warn(block, "PARSING_FAILURE", fault.within(block))
             case PeerGone(participant="control"):
                 self._runner.body_lost()
                 self._arbiter.body_lost()

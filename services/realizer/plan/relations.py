@@ -3,7 +3,7 @@
 Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 
 from msgspec import Struct
@@ -98,7 +98,8 @@ class Relations(Struct, frozen=True, dict=True):
     """Everything that a block says about its points.
 
     unusable: behaviors that cannot be performed as written. required: those without which the block fails. blocks:
-    other blocks that it refers to.
+    other blocks that it refers to. durations: of waits whose end is tied, too. The end is planned for as it is tied;
+    a duration that is not kept by that is told.
     """
 
     equals: tuple[Equal, ...]
@@ -107,6 +108,7 @@ class Relations(Struct, frozen=True, dict=True):
     problems: tuple[Problem, ...] = ()
     unusable: frozenset[str] = frozenset()
     blocks: frozenset[str] = frozenset()
+    durations: tuple[Equal, ...] = ()
 
     @cached_property
     def named(self) -> frozenset[Point]:
@@ -316,7 +318,14 @@ class _Reader:
             and behavior.duration is None
             and Point(behavior.id, "end") not in found.held
         )
-        return replace(found, problems=found.problems + endless)
+        return replace(found, problems=found.problems + endless, durations=tuple(self._durations(found)))
+
+    def _durations(self, found: Relations) -> Iterator[Equal]:
+        for id, behavior in self.behaviors.items():
+            if isinstance(behavior, Wait) and behavior.duration is not None and Point(id, "end") in found.held:
+                lasting = f"{id}:start+{behavior.duration:g}"
+                end = Term(Point(id, "end"), 0.0, f"{id}:end", behavior.line)
+                yield Equal((end, Term(Point(id, "start"), behavior.duration, lasting, behavior.line)), id)
 
 
 def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:
