@@ -321,14 +321,14 @@ async def test_who_may_not_publish_on_a_key_hands_out_nothing_for_it(monkeypatch
 
 async def test_a_process_that_never_answers_at_first_is_asked_until_it_does(monkeypatch: pytest.MonkeyPatch):
     """Nothing is lost meanwhile, though what was sent is no longer recent, and no count tells of it any more."""
-    loop, answers, asked = asyncio.get_running_loop(), History._asked, 0
+    loop, answers, asked = asyncio.get_running_loop(), History._missing_asked, 0
 
-    def slow(history: History, kind: keys.KeyClass, query: zenoh.Query) -> None:
+    def slow(history: History, query: zenoh.Query) -> None:
         nonlocal asked
         asked += 1
-        answers(history, kind, query) if loop.time() > published + PULSE_FOR + 0.3 else finish(query)
+        answers(history, query) if loop.time() > published + PULSE_FOR + 0.3 else finish(query)
 
-    monkeypatch.setattr(History, "_asked", slow)
+    monkeypatch.setattr(History, "_missing_asked", slow)
     monkeypatch.setattr(readers, "UNANSWERED", 0.5)
     robot, end = f"visited-{os.getpid()}", free_endpoint()
     near, far = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])

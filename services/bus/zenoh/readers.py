@@ -38,13 +38,13 @@ RUNS_KEPT = 256
 class _Reader:
     """A subscription of the participant `bus`, with its follower of each process, by run.
 
-    kept: expressions that ask for the past of its keys.
+    kept: those of its patterns that have a past.
     """
 
     def __init__(self, bus: Bus, subscription: Subscription) -> None:
         self.bus = bus
         self.subscription = subscription
-        self.kept = tuple(dict.fromkeys(each for pattern in subscription.patterns for each in keys.kept(pattern)))
+        self.kept = tuple(filter(keys.has_past, subscription.patterns))
         self.followers: dict[str, Follower] = {}
 
     def follower(self, run: str, there: Collection[str], now: Seconds) -> Follower:
@@ -123,7 +123,7 @@ class Readers:
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-        self._ask(reader, {run: self._follower(reader, run) for run in self._peers.processes})
+        self._ask(reader, {run: self._follower(reader, run) for run in self._peers.publishers})
 
     def detach(self, subscription: Subscription) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
@@ -251,7 +251,7 @@ class Readers:
 
     def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
         follower.asking, known = False, follower.forged
-        if past is not None:  # which may hold more: see `keys.kept`
+        if past is not None:
             past = past.of(reader.subscription.wants)
             trusted = tuple(one for one in past.written if self._is_trusted(one, run))
             past = msgspec.structs.replace(past, written=trusted)
@@ -271,7 +271,7 @@ class Readers:
             follower.behind = True
             self._catch_up(reader, run, follower)
 
-    def process_came(self, run: str) -> None:
+    def publisher_came(self, run: str) -> None:
         for reader in self._readers:
             follower = self._follower(reader, run)
             # The process may be back after a cut in which messages were lost, or the answer to a question.
