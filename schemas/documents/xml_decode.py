@@ -46,6 +46,7 @@ from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated, in_draft_spelling
+from engage_hri.schemas.suggestion import meant
 from engage_hri.schemas.syncref import SyncRef
 
 __all__ = ["decode_xml", "encode_xml"]
@@ -149,7 +150,8 @@ class _Document:
                 reason = f"attribute {name!r} of <{local}>, which {dialect} has, is performed by no body"
                 self._note(reason, element, behavior, "DEGRADED")
             else:
-                self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+                known = grammar.known_attributes(local, kind) - plain.keys()
+                self._note(f"<{local}> has no attribute {name!r}{meant(name, known)}", element, behavior)
         return timing
 
     def _note_foreign(self, element: etree._Element, parts: Iterable[str], behavior: str = "") -> None:

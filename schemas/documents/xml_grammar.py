@@ -111,11 +111,21 @@ def field_of(name: str) -> str:
 
 def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
     """Find the attributes of an element that no reader knows. kind: of the behavior, if it is one."""
-    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
-    read |= SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys()
+    read = _read(local, kind)
     for name in sorted(plain.keys() - read):
         if kind is None or field_of(name) not in attribute_fields(kind):
             yield name
+
+
+def known_attributes(local: str, kind: type[msgspec.Struct] | None) -> frozenset[str]:
+    """List the attributes of an element that a reader knows. kind: of the behavior, if it is one."""
+    return frozenset(_read(local, kind)) | (set(map(attribute, attribute_fields(kind))) if kind else set())
+
+
+def _read(local: str, kind: type[msgspec.Struct] | None) -> set[str]:
+    """Attributes that are read, besides those that become fields."""
+    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
+    return read | (SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys())
 
 
 def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]:

@@ -6,6 +6,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Variability
+from engage_hri.services.realizer.plan.planner import plan_block
 from tests.realizer.test_simulated_body import robot
 
 WORDS = '<speech id="s"><text>One two three four</text></speech>'
@@ -54,3 +55,11 @@ async def test_a_duration_that_is_given_up_is_told(content: str, told: list[str]
 )
 async def test_a_duration_that_is_kept_is_not_told(content: str) -> None:
     assert await _late(content) == []
+
+
+def test_a_wait_that_is_dropped_is_not_told_to_be_endless() -> None:
+    block = decode_xml(f'<bml id="b">{WORDS}<wait id="w" start="s:starrt"/></bml>')
+    assert isinstance(block, Block)
+
+    (problem,) = plan_block(block).problems
+    assert "did you mean 'start'?" in problem.message

@@ -316,6 +316,7 @@ class _Reader:
             for behavior in self.block.behaviors
             if isinstance(behavior, Wait)
             and behavior.duration is None
+            and behavior.id not in self.unusable
             and Point(behavior.id, "end") not in found.held
         )
         return replace(found, problems=found.problems + endless, durations=tuple(self._durations(found)))
