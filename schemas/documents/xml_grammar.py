@@ -26,7 +26,7 @@ from engage_hri.schemas.documents.xml_source import (
     prefixed_name,
     split,
 )
-from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 from engage_hri.schemas.vocabulary import SHAPES
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
@@ -277,3 +277,10 @@ def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
 def says_yes(value: object) -> bool:
     """Tell whether an attribute means true, as XML spells that."""
     return str(value).strip().lower() in ("true", "1")
+
+
+def is_reference(value: str) -> bool:
+    """Tell whether an attribute's value names a sync point of a behavior, and so is meant as timing."""
+    with suppress(ValueError):
+        return SyncRef.parse(value).behavior != ""
+    return False
