@@ -206,6 +206,18 @@ def expressed(behavior: Face | FaceLexeme | FaceFacs | FaceShift) -> tuple[Expre
     return behavior.expressions
 
 
+def is_empty(behavior: Behavior) -> bool:
+    """True for a posture or a shift of the face that names nothing to show. (A face that does may keep a time.)"""
+    match behavior:
+        case FaceShift():
+            return not any(each.lexeme or each.au for each in expressed(behavior))
+        case Posture() | PostureShift():
+            return not behavior.stance and not any(each.lexeme for each in posed(behavior))
+        case Pose(lexeme=lexeme):
+            return not lexeme
+    return False
+
+
 class Locomotion(Behavior, frozen=True, kw_only=True, tag="locomotion", omit_defaults=True):
     """Move to a target. manner: how, for example `walk`."""
 

@@ -38,6 +38,7 @@ SHELLS = {
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/shown.py",  # publishes what the body shows
+    "services/control/estimates.py",  # publishes mistakes of the body
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
@@ -71,8 +72,8 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > shown > actions unheard waiting > live > body > variability"
-    " > config",
+    "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
+    " > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",

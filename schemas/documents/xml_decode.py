@@ -13,7 +13,6 @@ is of another namespace is left out of either, and noted. Text behind a referenc
 
 import re
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from itertools import chain, count
 from typing import Any
 
@@ -46,7 +45,7 @@ from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated, in_draft_spelling
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.suggestion import meant
 
 __all__ = ["decode_xml", "encode_xml"]
 
@@ -141,15 +140,17 @@ class _Document:
     ) -> list[of.Timing]:
         """Note unknown attributes. kind: of a behavior, in which an attribute that names a sync point is timing."""
         plain, local = attributes(element), local_name(element)
-        timing = []
+        timing, ignored = list[of.Timing](), list[str]()
         for name in grammar.unknown_attributes(plain, local, kind):
-            if kind and _is_reference(plain[name]):
+            if kind and grammar.is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
-            elif dialect := vocabulary.definition(local, name):
-                reason = f"attribute {name!r} of <{local}>, which {dialect} has, is performed by no body"
-                self._note(reason, element, behavior, "DEGRADED")
+            elif vocabulary.definition(local, name):
+                ignored.append(name)
             else:
-                self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+                known = grammar.known_attributes(local, kind) - plain.keys()
+                self._note(f"<{local}> has no attribute {name!r}{meant(name, known)}", element, behavior)
+        if ignored:
+            self._note(vocabulary.ignored(local, ignored), element, behavior, "DEGRADED")
         return timing
 
     def _note_foreign(self, element: etree._Element, parts: Iterable[str], behavior: str = "") -> None:
@@ -389,10 +390,3 @@ class _Document:
 def _ties(element: etree._Element) -> list[of.Timing]:
     children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
     return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
-
-
-def _is_reference(value: str) -> bool:
-    """Tell whether an attribute's value names a sync point of a behavior, and so is meant as timing."""
-    with suppress(ValueError):
-        return SyncRef.parse(value).behavior != ""
-    return False

@@ -26,7 +26,7 @@ from engage_hri.schemas.documents.xml_source import (
     prefixed_name,
     split,
 )
-from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 from engage_hri.schemas.vocabulary import SHAPES
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
@@ -111,11 +111,21 @@ def field_of(name: str) -> str:
 
 def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
     """Find the attributes of an element that no reader knows. kind: of the behavior, if it is one."""
-    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
-    read |= SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys()
+    read = _read(local, kind)
     for name in sorted(plain.keys() - read):
         if kind is None or field_of(name) not in attribute_fields(kind):
             yield name
+
+
+def known_attributes(local: str, kind: type[msgspec.Struct] | None) -> frozenset[str]:
+    """List the attributes of an element that a reader knows. kind: of the behavior, if it is one."""
+    return frozenset(_read(local, kind)) | (set(map(attribute, attribute_fields(kind))) if kind else set())
+
+
+def _read(local: str, kind: type[msgspec.Struct] | None) -> set[str]:
+    """Attributes that are read, besides those that become fields."""
+    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
+    return read | (SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys())
 
 
 def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]:
@@ -267,3 +277,10 @@ def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
 def says_yes(value: object) -> bool:
     """Tell whether an attribute means true, as XML spells that."""
     return str(value).strip().lower() in ("true", "1")
+
+
+def is_reference(value: str) -> bool:
+    """Tell whether an attribute's value names a sync point of a behavior, and so is meant as timing."""
+    with suppress(ValueError):
+        return SyncRef.parse(value).behavior != ""
+    return False

@@ -1,56 +1,39 @@
-"""A wait with a duration and a tied end: the end comes as it is tied, and a duration that is not kept is told."""
+"""The length of a wait: exact, but where its end is tied to another time; then it is the least."""
 
 import pytest
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.feedback import WarningFeedback
-from engage_hri.services.control.config import Variability
-from tests.realizer.test_simulated_body import robot
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.points import Point
 
 WORDS = '<speech id="s"><text>One two three four</text></speech>'
 
 
-async def _late(content: str) -> list[str]:
-    block = decode_xml(f'<bml id="b">{content}</bml>')
+def _block(content: str) -> Block:
+    block = decode_xml(f'<bml id="b">{content}{WORDS}</bml>')
     assert isinstance(block, Block)
-    async with robot(Variability()) as seen:
-        await seen.perform(block)
-        return [each.message for each in seen.feedback if isinstance(each, WarningFeedback) and each.kind == "LATE"]
+    return block
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("wait", "lasts"),
     [
-        (
-            f'<wait id="w" duration="0.4" end="s:end"/>{WORDS}',
-            ["line 1: end came 0.83 s later than it should be: w:end = w:start+0.4"],
-        ),
-        (
-            f'<wait id="w" duration="0.4"/>{WORDS}'
-            '<constraint><synchronize><sync ref="w:end"/><sync ref="s:end"/></synchronize></constraint>',
-            ["line 1: end came 0.83 s later than it should be: w:end = w:start+0.4"],
-        ),
-        (
-            f'<wait id="w" duration="0.4"/>{WORDS}'
-            '<constraint><after ref="s:end"><sync ref="w:end"/></after></constraint>',
-            ["line 1: end came 0.83 s later than it should be: w:end = w:start+0.4"],
-        ),
+        ('<wait id="w" duration="0.4"/>', 0.4),
+        ('<wait id="w" duration="0.4" start="0.5"/>', 0.4),
+        ('<wait id="w" duration="0.4" end="2"/>', 2.0),
+        ('<wait id="w" duration="0.4" start="1" end="2"/>', 1.0),
     ],
 )
-async def test_a_duration_that_is_given_up_is_told(content: str, told: list[str]) -> None:
-    assert await _late(content) == told
+def test_a_duration_is_exact_unless_the_end_is_tied_as_well(wait: str, lasts: float) -> None:
+    plan = plan_block(_block(wait))
+
+    start, end = (plan.schedule[plan.at[Point("w", sync)]] for sync in ("start", "end"))
+    assert end - start == pytest.approx(lasts)
+    assert plan.problems == ()
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        '<wait id="w" duration="0.5" start="0.1" end="0.6"/>',
-        f'<wait id="w" start="s:end-0.4" duration="0.4" end="s:end"/>{WORDS}',
-        f'<wait id="w" end="s:end"/>{WORDS}',
-        f'<wait id="w" duration="0.4"/>{WORDS}',
-        f'<wait id="w" duration="2"/>{WORDS}<constraint><after ref="s:end"><sync ref="w:end"/></after></constraint>',
-    ],
-)
-async def test_a_duration_that_is_kept_is_not_told(content: str) -> None:
-    assert await _late(content) == []
+def test_a_wait_that_is_dropped_is_not_told_to_be_endless() -> None:
+    (problem,) = plan_block(_block('<wait id="w" start="s:starrt"/>')).problems
+
+    assert "did you mean 'start'?" in problem.message

@@ -89,3 +89,24 @@ def test_an_element_of_the_draft_with_any_one_attribute_refuses_no_block(element
         read = _block(f'<{element} id="x"{needed}{given}/>')
         assert len(read.behaviors) == 2, name
         assert isinstance(read.behaviors[1], Speech)
+
+
+@pytest.mark.parametrize(
+    "xml",
+    [
+        '<posture id="x"/>', '<posture id="x"><pose part="ARMS"/></posture>', '<postureShift id="x"/>',
+        '<pose id="x"/>', '<faceShift id="x"/>',
+    ],
+)  # fmt: skip
+def test_a_face_or_posture_that_names_nothing_is_warned_of(xml: str) -> None:
+    (problem,) = plan_block(_block(xml, BML_1_0)).problems
+
+    assert (problem.kind, problem.behavior) == ("PARSING_FAILURE", "x")
+    assert problem.message.endswith("has nothing in it that says what to show; it moves nothing")
+
+
+def test_what_no_body_performs_of_one_behavior_is_one_warning() -> None:
+    (note,) = _block('<gesture id="x" type="BEAT" power="1" amplitude="2" trajectory="ARC"/>').unread
+
+    assert note.kind == "DEGRADED"
+    assert "attributes 'amplitude', 'power' and 'trajectory' of <gesture>: the draft of 2007 has this" in note.message

@@ -100,7 +100,7 @@ class Promises:
 
     def read(self, relations: Relations) -> Steps[None]:
         """Take in what these relations say."""
-        for equals in portions((*relations.equals, *relations.durations)):
+        for equals in portions(relations.equals):
             for equal in equals:
                 self._take(_Same(equal), equal.terms)
             yield 2 * len(equals)

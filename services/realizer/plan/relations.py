@@ -3,7 +3,7 @@
 Constraints and inline timing mean the same thing and become the same relations; so do `before` and `after`.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 
 from msgspec import Struct
@@ -20,6 +20,7 @@ from engage_hri.schemas.behaviors import (
     Synchronize,
     Unknown,
     Wait,
+    is_empty,
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -72,6 +73,8 @@ class Order(Struct, frozen=True, gc=False):
     placed: str = ""
 
 
+EMPTY = "has nothing in it that says what to show; it moves nothing"
+"""What is told of a face or posture that names nothing."""
 DROPPED = "; the behavior is dropped"
 """End of the message of a problem that costs a behavior, but for an advice."""
 
@@ -98,8 +101,7 @@ class Relations(Struct, frozen=True, dict=True):
     """Everything that a block says about its points.
 
     unusable: behaviors that cannot be performed as written. required: those without which the block fails. blocks:
-    other blocks that it refers to. durations: of waits whose end is tied, too. The end is planned for as it is tied;
-    a duration that is not kept by that is told.
+    other blocks that it refers to.
     """
 
     equals: tuple[Equal, ...]
@@ -108,7 +110,6 @@ class Relations(Struct, frozen=True, dict=True):
     problems: tuple[Problem, ...] = ()
     unusable: frozenset[str] = frozenset()
     blocks: frozenset[str] = frozenset()
-    durations: tuple[Equal, ...] = ()
 
     @cached_property
     def named(self) -> frozenset[Point]:
@@ -316,16 +317,15 @@ class _Reader:
             for behavior in self.block.behaviors
             if isinstance(behavior, Wait)
             and behavior.duration is None
+            and behavior.id not in self.unusable
             and Point(behavior.id, "end") not in found.held
         )
-        return replace(found, problems=found.problems + endless, durations=tuple(self._durations(found)))
-
-    def _durations(self, found: Relations) -> Iterator[Equal]:
-        for id, behavior in self.behaviors.items():
-            if isinstance(behavior, Wait) and behavior.duration is not None and Point(id, "end") in found.held:
-                lasting = f"{id}:start+{behavior.duration:g}"
-                end = Term(Point(id, "end"), 0.0, f"{id}:end", behavior.line)
-                yield Equal((end, Term(Point(id, "start"), behavior.duration, lasting, behavior.line)), id)
+        empty = tuple(
+            Problem("PARSING_FAILURE", at_line(behavior.line, f"{type_name(behavior)} {EMPTY}"), behavior.id)
+            for behavior in self.block.behaviors
+            if is_empty(behavior) and behavior.id not in self.unusable
+        )
+        return replace(found, problems=found.problems + endless + empty)
 
 
 def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:

@@ -41,7 +41,6 @@ def remaining(
         tuple(equals),
         tuple([Order(timed(each.earlier), timed(each.later), each.placed) for each in orders]),
         frozen(id for id in relations.required if id not in dropped),
-        durations=tuple([each for each in relations.durations if each.behavior not in dropped]),
     )
     return present, classes
 
