@@ -304,11 +304,8 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         path = ROOT / name
         assert path.is_file(), f"{name} is gone: take it off the list"
         modules = set(_imports(PurePosixPath(name), ast.parse(path.read_text())))
-        needs = {
-            each
-            for each in modules
-            if each.split(".")[0] in IMPURE or each.split(".")[1:2] in ([m] for m in MACHINERY)
-        }
+        parts = [each.split(".") for each in modules]
+        needs = [each for each in parts if each[0] in IMPURE or each[1:2] in ([m] for m in MACHINERY)]
         assert needs, f"{name} is pure: take it off the list"
 
 
