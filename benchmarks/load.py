@@ -131,7 +131,7 @@ async def fragments(endpoint: str, number: int, period: Seconds) -> None:
                 if not each % 100:
                     await asyncio.sleep(0)
             try:
-                await asyncio.gather(*(each.outcome for each in asked), return_exceptions=True)
+                await asyncio.wait([each.outcome for each in asked])
                 await asyncio.get_running_loop().create_future()
             finally:
                 ends = Counter("live" if not each.outcome.done() else _end(each.outcome) for each in asked)

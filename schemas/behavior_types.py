@@ -54,6 +54,14 @@ class BehaviorType(Struct, frozen=True, kw_only=True):
         """Name of the XML element, and `type` of the JSON form: `gazeShift`."""
         return str(self.kind.__struct_config__.tag)
 
+    @property
+    def series(self) -> str:
+        """Name that is common to the types of one series: untimed behaviors of these come one after the other.
+
+        All elements for a face are one series, for in the drafts they are one element. A shift lies beneath.
+        """
+        return self.family if self.family and self.lasts else self.name
+
 
 _STROKE = BehaviorType(
     kind=of.Gesture,

@@ -206,6 +206,18 @@ def expressed(behavior: Face | FaceLexeme | FaceFacs | FaceShift) -> tuple[Expre
     return behavior.expressions
 
 
+def is_empty(behavior: Behavior) -> bool:
+    """True for a posture or a shift of the face that names nothing to show. (A face that does may keep a time.)"""
+    match behavior:
+        case FaceShift():
+            return not any(each.lexeme or each.au for each in expressed(behavior))
+        case Posture() | PostureShift():
+            return not behavior.stance and not any(each.lexeme for each in posed(behavior))
+        case Pose(lexeme=lexeme):
+            return not lexeme
+    return False
+
+
 class Locomotion(Behavior, frozen=True, kw_only=True, tag="locomotion", omit_defaults=True):
     """Move to a target. manner: how, for example `walk`."""
 
@@ -288,10 +300,12 @@ class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=
     """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails.
 
     element: name of its element, with the prefix that it has there. namespace: empty, unless it is not BML's.
+    lacks: of an element that is known, the attribute without which there is nothing to perform.
     """
 
     element: str
     namespace: str = ""
+    lacks: str = ""
 
 
 class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -205,8 +205,9 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Type of the warning when not feasible: NO_SUCH_TARGET, BEHAVIOR_TYPE_NOT_SUPPORTED, CANNOT_CREATE_BEHAVIOR
     ..."""
     degraded: str = ""
-    """What is performed in place of what was asked, in words, if the body has only something near it. The realizer
-    warns of it, and performs the behavior."""
+    """What is performed in place of what was asked, in words, if the body has only something near it: "this body has
+    no gesture 'EMBLEM'; it performs 'WAVE', the nearest"; for several things one after the other, with "; " between
+    them. The realizer warns of it, and performs the behavior. `engage play` reads from it what the body does."""
     parts: tuple[str, ...] = ()
     phases: tuple[Phase, ...] = ()
     """Phases from `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and

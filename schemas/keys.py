@@ -77,12 +77,10 @@ KEPT_CLASSES: tuple[KeyClass, ...] = ("state", "evt", "cmd")
 """Classes of which a late subscriber gets what was published before."""
 
 
-def kept(pattern: str) -> tuple[str, ...]:
-    """Expressions that ask for the past of a pattern: none if it has none, and more than it if its class is open."""
+def has_past(pattern: str) -> bool:
+    """Tell whether the pattern may include keys of a class in `KEPT_CLASSES`."""
     name = pattern.split("/")[2:3]
-    if name in (["*"], ["**"]):
-        return tuple(map(of_class, KEPT_CLASSES))
-    return (pattern,) if name and name[0] in KEPT_CLASSES else ()
+    return name in (["*"], ["**"]) or (bool(name) and name[0] in KEPT_CLASSES)
 
 
 SERVICES = ("generation", "realizer", "recognition", "control")
@@ -211,7 +209,7 @@ ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 def own(run: str, subject: str) -> str:
     """Key of the process with id `run`.
 
-    subject: `process`, `alive/<name>`, `at/<endpoint>`, `pulse`, `counts`, `clock` or `flush`.
+    subject: `process/<clock>`, `log`, `alive/<name>`, `at/<endpoint>`, `pulse`, `past`, `counts`, `clock` or `flush`.
     """
     return f"{PREFIX}/@bus/{run}/{subject}"
 

@@ -127,10 +127,11 @@ class Refused(Answer, frozen=True, kw_only=True, tag="refused", omit_defaults=Tr
 class Unreadable(Struct, frozen=True, kw_only=True, tag="unreadable", omit_defaults=True):
     """local: bus -> server of the key: a payload that came as a command could not be read. Never travels.
 
-    id, life, kind: those of the request, as far as they could be read.
+    id, life, kind: those of the request, as far as they could be read. block: the id of the block or fragment in it.
     """
 
     fault: Fault
+    block: str = ""
     id: str = ""
     life: str = ""
     kind: str = ""

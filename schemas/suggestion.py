@@ -7,6 +7,12 @@ MOST = 12
 """Most names that are listed."""
 
 
+def meant(name: str, known: Iterable[str]) -> str:
+    """Write ` (did you mean 'start'?)`; empty if no name is like this one."""
+    near = get_close_matches(name, sorted(known), n=1, cutoff=0.75)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
 def suggestion(name: str, known: Iterable[str], none: str = "known: none") -> str:
     """Write `did you mean 'can'?`, or `known: can, cup` if no name is like this one.
 

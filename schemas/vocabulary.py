@@ -6,7 +6,7 @@ gesture; head, face and gaze), and what the reference implementation of the thes
 of FACS, to which both refer.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 
 from msgspec import Struct
@@ -138,6 +138,15 @@ def unperformed(element: str) -> str:
     """Reason why a behavior that no struct of ours has is dropped: nobody knows it, or no body performs it."""
     dialect = definition(element)
     return f"<{element}>, which {dialect} has, is performed by no body" if dialect else f"unknown element <{element}>"
+
+
+def ignored(element: str, attributes: Sequence[str]) -> str:
+    """Reason why attributes of an element, which a dialect defines, are left out."""
+    dialect = definition(element, attributes[0])
+    if len(attributes) == 1:
+        return f"attribute {attributes[0]!r} of <{element}>, which {dialect} has, is performed by no body"
+    names = f"{', '.join(map(repr, attributes[:-1]))} and {attributes[-1]!r}"
+    return f"attributes {names} of <{element}>: {dialect} has this, but no body performs it"
 
 
 def is_defined(table: str, lexeme: str) -> bool:

@@ -38,6 +38,7 @@ SHELLS = {
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/shown.py",  # publishes what the body shows
+    "services/control/estimates.py",  # publishes mistakes of the body
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
@@ -71,8 +72,8 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > shown > actions unheard waiting > live > body > variability"
-    " > config",
+    "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
+    " > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
@@ -303,11 +304,8 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         path = ROOT / name
         assert path.is_file(), f"{name} is gone: take it off the list"
         modules = set(_imports(PurePosixPath(name), ast.parse(path.read_text())))
-        needs = {
-            each
-            for each in modules
-            if each.split(".")[0] in IMPURE or each.split(".")[1:2] in ([m] for m in MACHINERY)
-        }
+        parts = [each.split(".") for each in modules]
+        needs = [each for each in parts if each[0] in IMPURE or each[1:2] in ([m] for m in MACHINERY)]
         assert needs, f"{name} is pure: take it off the list"
 
 

@@ -34,7 +34,7 @@ def core(block: Block) -> Block:
     remaining = (replace(each, operators=tuple(_remaining(each.operators, stays))) for each in block.constraints)
     constraints = tuple(each for each in remaining if each.operators)
     made = replace(block, behaviors=behaviors, constraints=constraints)
-    # A behavior without any constraint waits for the one before it of its type. One that had constraints, but only to
+    # A behavior without any constraint waits for the one before it of its series. One that had some, but only to
     # removed behaviors, must not: it is tied to the block's start.
     before, after = _mentioned(block), _mentioned(made)
     freed = [behavior.id for behavior in behaviors if behavior.id in before - after]

@@ -13,7 +13,6 @@ is of another namespace is left out of either, and noted. Text behind a referenc
 
 import re
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from itertools import chain, count
 from typing import Any
 
@@ -46,7 +45,7 @@ from engage_hri.schemas.documents.xml_speech import MARKS, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated, in_draft_spelling
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.suggestion import meant
 
 __all__ = ["decode_xml", "encode_xml"]
 
@@ -69,6 +68,7 @@ class _Document:
         self._source = source
         self._speaks_1_0 = False
         self._is_strict = False
+        self._is_draft = False
         self._behaviors: list[of.Behavior] = []
         self._constraints: list[of.Constraint] = []
         self._unread: list[Unread] = []
@@ -91,7 +91,8 @@ class _Document:
         self._note_attributes(root)
         self._note_foreign(root, foreign_attributes(root))
         raw = {"composition": plain.get("composition"), "character_id": plain.get("characterId")}
-        raw["dialect"] = "bml-1.0" if namespace == BML_1_0 else "draft"
+        self._is_draft = namespace != BML_1_0
+        raw["dialect"] = "draft" if self._is_draft else "bml-1.0"
         return disambiguated(self._converted(root, raw | self._content(root), Block))
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
@@ -139,15 +140,17 @@ class _Document:
     ) -> list[of.Timing]:
         """Note unknown attributes. kind: of a behavior, in which an attribute that names a sync point is timing."""
         plain, local = attributes(element), local_name(element)
-        timing = []
+        timing, ignored = list[of.Timing](), list[str]()
         for name in grammar.unknown_attributes(plain, local, kind):
-            if kind and _is_reference(plain[name]):
+            if kind and grammar.is_reference(plain[name]):
                 timing.append(of.Timing(name, plain[name]))
-            elif dialect := vocabulary.definition(local, name):
-                reason = f"attribute {name!r} of <{local}>, which {dialect} has, is performed by no body"
-                self._note(reason, element, behavior, "DEGRADED")
+            elif vocabulary.definition(local, name):
+                ignored.append(name)
             else:
-                self._note(f"<{local}> has no attribute {name!r}", element, behavior)
+                known = grammar.known_attributes(local, kind) - plain.keys()
+                self._note(f"<{local}> has no attribute {name!r}{meant(name, known)}", element, behavior)
+        if ignored:
+            self._note(vocabulary.ignored(local, ignored), element, behavior, "DEGRADED")
         return timing
 
     def _note_foreign(self, element: etree._Element, parts: Iterable[str], behavior: str = "") -> None:
@@ -205,16 +208,16 @@ class _Document:
         timing = (of.Timing("start", f"{reference}:end"),)
         return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
 
-    def _unknown(self, element: etree._Element, name: str, required: bool, namespace: str = "") -> of.Unknown:
+    def _unknown(self, element: etree._Element, name: str, required: bool, **said: str) -> of.Unknown:
         is_required = required or fields(attributes(element)).get("required")
-        raw = {"id": self._id(element), "element": name, "required": is_required, "namespace": namespace}
+        raw = {"id": self._id(element), "element": name, "required": is_required, **said}
         return self._converted(element, raw, of.Unknown)
 
     def _custom(self, element: etree._Element, namespace: str, required: bool) -> None:
         """Take in a behavior of another namespace. Without an id, and in a fragment, there is but a note of it."""
         name = prefixed_name(element)
         if not self._is_strict and element.get("id"):
-            self._behaviors.append(self._unknown(element, name, required, namespace))
+            self._behaviors.append(self._unknown(element, name, required, namespace=namespace))
             return
         reason = f"<{name}> is of namespace {namespace!r}, of which nothing is performed"
         kind: WarningKind = "CUSTOM_BEHAVIOR_NOT_SUPPORTED"
@@ -246,6 +249,8 @@ class _Document:
         if local == "reference":
             raw["options"] = self._options(element, raw)
         kind = grammar.kind_of(local, plain.get("type", "").upper(), raw)
+        if self._is_draft and (lacks := grammar.lacking(plain, local, raw, kind)):
+            return self._unknown(element, local, required, lacks=lacks)
         if row.is_standard:
             timing += self._note_attributes(element, raw["id"], kind)
         return self._converted(element, raw | {"timing": timing}, kind)
@@ -298,7 +303,7 @@ class _Document:
             if name != "stance":
                 found.append({field: value for field, value in parts.items() if value is not None})
             elif "stance" in raw:
-                reason, is_required = f"more than one <{name}> in a posture", _says_yes(raw.get("required"))
+                reason, is_required = f"more than one <{name}> in a posture", grammar.says_yes(raw.get("required"))
                 self._leave_out(reason, child, raw["id"], required=is_required, advice="one element for each")
             else:
                 raw["stance"] = parts["stance"] or ""
@@ -319,7 +324,7 @@ class _Document:
             self._converted(child, self._own_fields(child, of.SpeechOption), of.SpeechOption)
             for child in children_named(element, "speechOption")
         ]
-        if not _says_yes(raw.pop("propose", "")):
+        if not grammar.says_yes(raw.pop("propose", "")):
             return options
         if options:
             raise self._source.refusal("phrases are to be proposed, and offered", element, advice="leave out one")
@@ -328,7 +333,7 @@ class _Document:
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
         self._note_attributes(element)
         self._note_foreign(element, grammar.foreign_parts(element))
-        required = required or _says_yes(fields(attributes(element)).get("required"))
+        required = required or grammar.says_yes(fields(attributes(element)).get("required"))
         operators = []
         for child, _, local in bml_children(element):
             if local == "description":
@@ -375,25 +380,13 @@ class _Document:
             reason, _, path = str(error).partition(" - at `$")
             field = path.strip(".`")
             missing = re.fullmatch("Object missing required field `(.*)`", reason)
-            what = f"no {grammar.attribute(missing[1])}" if missing else f"{grammar.attribute(field)}: {reason}"
-            local = local_name(element)
-            name = f"<{local} id={raw['id']!r}>" if raw.get("id") else f"<{local}>"
-            raise self._source.refusal(
-                f"{name}: {what}", element, advice=allowed.advice(kind, f".{field}", raw)
-            ) from error
+            lacks = grammar.attribute(missing[1]) if missing else ""
+            what = f"no {lacks}" if missing else f"{grammar.attribute(field)}: {reason}"
+            name = f"<{local_name(element)}" + (f" id={raw['id']!r}>" if raw.get("id") else ">")
+            advice = f'add {lacks}="..."' if missing else allowed.advice(kind, f".{field}", raw)
+            raise self._source.refusal(f"{name}: {what}", element, advice=advice) from error
 
 
 def _ties(element: etree._Element) -> list[of.Timing]:
     children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
     return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
-
-
-def _is_reference(value: str) -> bool:
-    """Tell whether an attribute's value names a sync point of a behavior, and so is meant as timing."""
-    with suppress(ValueError):
-        return SyncRef.parse(value).behavior != ""
-    return False
-
-
-def _says_yes(value: object) -> bool:
-    return str(value).strip().lower() in ("true", "1")

@@ -26,7 +26,7 @@ from engage_hri.schemas.documents.xml_source import (
     prefixed_name,
     split,
 )
-from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 from engage_hri.schemas.vocabulary import SHAPES
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
@@ -59,6 +59,14 @@ _ACTIONS = ("ROTATION", "ORIENTATION")
 """Values of a draft's `action` that say which other attribute says what to do."""
 _AXES = {"X": "NOD", "Y": "SHAKE", "Z": "TILT"}
 """The draft's other names of rotations."""
+_OPTIONAL: Mapping[tuple[str, type[of.Behavior]], tuple[str, ...]] = {
+    ("head", of.Head): ("lexeme", "rotation", "orientation"),
+    ("gesture", of.Gesture): ("lexeme", "type", "lexeme"),
+    ("gesture", of.Pointing): ("target", "target"),
+    ("face", of.FaceFacs): ("au", "au"),
+    ("locomotion", of.Locomotion): ("target", "target"),
+}
+"""By element and struct, a field that the struct needs, and the attributes of the draft that can give it."""
 PARTS: Mapping[str, Mapping[str, str]] = {
     "lexeme": {"lexeme": "lexeme", "amount": "amount"},
     "facs": {"au": "au", "side": "side", "amount": "amount"},
@@ -103,11 +111,21 @@ def field_of(name: str) -> str:
 
 def unknown_attributes(plain: Mapping[str, str], local: str, kind: type[msgspec.Struct] | None) -> Iterator[str]:
     """Find the attributes of an element that no reader knows. kind: of the behavior, if it is one."""
-    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
-    read |= SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys()
+    read = _read(local, kind)
     for name in sorted(plain.keys() - read):
         if kind is None or field_of(name) not in attribute_fields(kind):
             yield name
+
+
+def known_attributes(local: str, kind: type[msgspec.Struct] | None) -> frozenset[str]:
+    """List the attributes of an element that a reader knows. kind: of the behavior, if it is one."""
+    return frozenset(_read(local, kind)) | (set(map(attribute, attribute_fields(kind))) if kind else set())
+
+
+def _read(local: str, kind: type[msgspec.Struct] | None) -> set[str]:
+    """Attributes that are read, besides those that become fields."""
+    read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
+    return read | (SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys())
 
 
 def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]:
@@ -119,6 +137,18 @@ def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]
         if local == "face" and name in SHAPES:
             value = f"{SHAPES[name]}_{value}"
         yield field, _AXES.get(value, value) if name == "rotation" else value
+
+
+def lacking(plain: Mapping[str, str], local: str, raw: Mapping[str, Any], kind: type[of.Behavior]) -> str:
+    """Attributes of a draft of which a behavior needs one, and has none. Empty: it has, or its dialect demands one.
+
+    Every attribute of these elements may be left out in the draft of 2007, where others may say what to do.
+    """
+    field, *names = _OPTIONAL.get((local, kind), ("",))
+    if not field or raw.get(field):
+        return ""
+    action = plain.get("action", plain.get("type", "")).strip().lower()
+    return action if action in names else " or ".join(names)
 
 
 # -- elements ------------------------------------------------------------------------------------------------------
@@ -242,3 +272,15 @@ def _value(kind: type[msgspec.Struct], field: str, value: Any) -> Any:
         with suppress(ValueError):
             return float(value)
     return value
+
+
+def says_yes(value: object) -> bool:
+    """Tell whether an attribute means true, as XML spells that."""
+    return str(value).strip().lower() in ("true", "1")
+
+
+def is_reference(value: str) -> bool:
+    """Tell whether an attribute's value names a sync point of a behavior, and so is meant as timing."""
+    with suppress(ValueError):
+        return SyncRef.parse(value).behavior != ""
+    return False

@@ -1,5 +1,7 @@
 """Payloads of other programs: the message in any encoding, and the notice of one that cannot be read."""
 
+from typing import TypeVar
+
 import msgspec
 from msgspec import Struct
 
@@ -34,6 +36,9 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
     return PerformFragment(id=thing.id, requester=requester, fragment=thing)
 
 
+_Part = TypeVar("_Part", bound=Struct)
+
+
 class _Head(Struct):
     """The fields of a request that its answer needs."""
 
@@ -42,14 +47,33 @@ class _Head(Struct):
     type: str = ""
 
 
+class _Named(Struct, frozen=True):
+    id: str = ""
+
+
+class _Content(Struct):
+    """The block or fragment of a request, as far as its id."""
+
+    block: _Named = _Named()
+    fragment: _Named = _Named()
+
+
 def unreadable(error: EngageError, key: str, payload: bytes = b"", encoding: str = "") -> Unreadable | None:
     """Notice of a bad payload for the server of `key`, which owes an answer; None on keys that have no server."""
     if keys.key_class(key) != "cmd":
         return None
+    head = _read(payload, encoding, _Head)
+    content = _read(payload, encoding, _Content)
+    known = getattr(error, "block", None)
+    block = known or content.block.id or content.fragment.id
+    return Unreadable(id=known or head.id, block=block, life=head.life, kind=head.type, fault=error.fault)
+
+
+def _read(payload: bytes, encoding: str, kind: type[_Part]) -> _Part:
+    """Read some fields of a payload; those of none that can be read."""
     codec = msgspec.json if encoding.startswith("application/json") else msgspec.msgpack
     try:
-        head = codec.decode(payload, type=_Head)
+        read: _Part = codec.decode(payload, type=kind)
+        return read
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        head = _Head()
-    id = getattr(error, "block", None) or head.id
-    return Unreadable(id=id, life=head.life, kind=head.type, fault=error.fault)
+        return kind()

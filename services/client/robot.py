@@ -21,12 +21,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner, Inhibit
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
-from engage_hri.schemas.blocks import (
-    Block,
-    BlockOutcome,
-    Composition,
-    PerformBlock,
-)
+from engage_hri.schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.feedback import Feedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
@@ -146,6 +141,7 @@ class Robot(Steering):
         constraints: Iterable[Constraint] = (),
         *,
         composition: Composition = "MERGE",
+        follows: Iterable[str] = (),
         timeout: Seconds | None = None,
     ) -> BlockOutcome:
         """Realize a BML block, past the policies: `realize(block)`, or `realize("greet", [Gaze(...), ...])`.
@@ -155,6 +151,7 @@ class Robot(Steering):
         behaviors: of the block to make; without any, `block` is no id.
         constraints: between the sync points of these behaviors.
         composition: beside what runs (`MERGE`), after it (`APPEND`), or in its place (`REPLACE`).
+        follows: ids of live blocks; when one of them fails or is ended, this block ends, too.
         timeout: seconds to wait for it to be accepted; None: for ever.
 
         Raises:
@@ -166,7 +163,7 @@ class Robot(Steering):
             made = Block(id=block, behaviors=parts, constraints=tuple(constraints), composition=composition)
         else:
             made = block_in(block, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
-        request = PerformBlock(id=self._request_id(made.id), block=made)
+        request = PerformBlock(id=self._request_id(made.id), block=made, follows=tuple(follows))
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
         return successful(outcome, made.id)

@@ -53,7 +53,9 @@ def main(options: Options) -> int:
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
-                print(f"! {problem.kind} {problem.behavior or plan.block.id}: {problem.message}", file=sys.stderr)
+                block = plan.block.id if len(source.things) > 1 or not problem.behavior else ""
+                place = ":".join(filter(None, (block, problem.behavior)))
+                print(f"! {problem.kind} {place}: {problem.message}", file=sys.stderr)
             if nothing_is_left(plan.block, planned.dropped):
                 reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
                 print(readable(Fault(reason=reason, where=plan.block.id), options.file), file=sys.stderr)

@@ -47,6 +47,10 @@ class Played:
             case BlockProgress(block=str() as block, progress="start"):
                 self._begun.add(block)
                 return
+            case WarningFeedback(kind="DEGRADED", block=str() as block, behavior=behavior):
+                if deed := self._deeds.get((block, behavior)):
+                    self._deeds[block, behavior] = deed.as_warned(message.message)
+                return
             case SyncPointProgress(block=block, behavior=behavior, sync="start"):
                 # A block may end before recognition has said that the event has started.
                 if (block, behavior) in self._announced:

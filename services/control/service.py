@@ -45,6 +45,7 @@ from engage_hri.services.control.body import (
     Spoke,
 )
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.live import LiveBehavior
 from engage_hri.services.control.shown import Shown
 from engage_hri.services.control.unheard import Unheard
@@ -104,6 +105,7 @@ class _Control:
         self._bus = bus
         self._config = config
         self._body = body
+        self._estimates = IncomingEstimates(bus)
         self._tasks = tasks
         self._actions = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
@@ -121,7 +123,7 @@ class _Control:
         refused = [_refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
         others = [item for item in question.others if _refused(item.behavior) is None]
-        estimates = iter(self._body.rehearse(known, self._world, others))
+        estimates = iter(self._estimates.take(known, self._body.rehearse(known, self._world, others)))
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def describe(self, question: Message) -> Message:

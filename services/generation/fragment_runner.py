@@ -23,6 +23,7 @@ from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
+from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, plan, targets
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -72,12 +73,15 @@ class FragmentRunner:
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
-    def admit(self, request: PerformFragment, world: World) -> None:
-        """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal, or one too many."""
-        if len(self._live) >= self._config.fragments:
-            reason = f"{len(self._live)} fragments are waiting or performed, which is the limit"
+    def check_room(self, waiting: int, id: str) -> None:
+        """Raise InputRefused if fragment `id` is one too many. waiting: those that wait to be admitted."""
+        if (number := len(self._live) + waiting) >= self._config.fragments:
+            reason = f"{number} fragments are waiting or performed, which is the limit"
             advice = "wait until one has ended; `generation.fragments` is the limit"
-            raise InputRefused(Fault(reason=reason, where=request.fragment.id, advice=advice))
+            raise InputRefused(Fault(reason=reason, where=id, advice=advice))
+
+    def admit(self, request: PerformFragment, world: World) -> None:
+        """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
         fragment = checked(request.fragment, world, self._bus.robot, self._config.utterance)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
@@ -171,8 +175,9 @@ class FragmentRunner:
             self._events.lose()
         while (aborted := self._turns.tick(now)) is not None:
             self._abort(aborted, now)
+        permits = self._leases.permits()
         for performance in list(self._live.values()):
-            self._enforce_inhibitions(performance)
+            self._enforce_inhibitions(performance, permits)
             if performance.refusal is not None:
                 del self._live[performance.request.id]
                 self._outcomes.refuse(performance.fragment.id, performance.turn)
@@ -187,9 +192,9 @@ class FragmentRunner:
         self._events.forget({*going, *self._outcomes.turns})
         return refused
 
-    def _enforce_inhibitions(self, performance: FragmentPerformance) -> None:
+    def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:
         block = performance.fragment.id
-        for behavior in performance.forbid(self._leases.permits()):
+        for behavior in performance.forbid(permits):
             how: Literal["freeze", "relax"] = "freeze" if self._leases.holds_head else "relax"
             id = f"{performance.block_id}/{behavior}:abort"
             self._requests.send(keys.BEHAVIOR, AbortBehavior(id=id, block=block, behavior=behavior, how=how))

@@ -107,8 +107,8 @@ class _Generation:
                 self._arbiter.feed(message, now)
             case SyncPointProgress():
                 self._runner.feed(message, now)
-            case Unreadable(id=id, fault=fault):
-                self._warn(id, "PARSING_FAILURE", fault.within(id))
+            case Unreadable(block=block, fault=fault):
+                self._warn(block, "PARSING_FAILURE", fault.within(block))
             case PeerGone(participant="control"):
                 self._runner.body_lost()
                 self._arbiter.body_lost()
@@ -133,11 +133,12 @@ class _Generation:
     def _admit(self, request: PerformFragment, now: Seconds, until: Seconds) -> None:
         """Hand a fragment to the runner, or keep it while the world lacks what it needs. until: when to give up."""
         world = self._world(now)
-        if world is None or (now < until and lacks_people(request.fragment, world)):
-            self._early[request.id] = (request, until)
-            return
         try:
-            self._runner.admit(request, world)
+            self._runner.check_room(len(self._early), request.fragment.id)
+            if world is None or (now < until and lacks_people(request.fragment, world)):
+                self._early[request.id] = (request, until)
+            else:
+                self._runner.admit(request, world)
         except EngageError as error:
             self._refuse(request.id, error.fault)
             id = request.fragment.id

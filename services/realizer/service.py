@@ -78,8 +78,8 @@ class _Realizer:
                 return
             case PeerAlive() | PeerGone() as change:
                 self.peers.feed(change)
-            case Unreadable(id=id, fault=fault):
-                self.bus.publish(keys.FEEDBACK, unread(id, fault))
+            case Unreadable(block=block, fault=fault):
+                self.bus.publish(keys.FEEDBACK, unread(block, fault))
         self.requests.feed(received)
         if (request := self.desk.take(received)) is not None:
             with self.desk.serving(request):

@@ -20,7 +20,7 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing
+from engage_hri.services.bus.zenoh.order import Envelope, Missing
 from tests.access.fortress import Fortress, Told
 from tests.bus.places import PATIENCE, free_endpoint
 
@@ -156,16 +156,16 @@ def play_history(robot: Fortress, role: str, holder: str, key: str, payload: byt
     """Show a process that has said this, and tell whoever asks."""
     run = f"{Holder(robot='robot', role=role, name=holder).mark}{'1' * 24}"
     session = robot.session(holder, id=run)
-    attachment = pack(Envelope(holder, "boot-00000000", time.monotonic(), 1, 1))
+    written = (key, encoding, payload, Envelope(holder, "boot-00000000", time.monotonic(), 1, 1))
 
     def tell(query: zenoh.Query) -> None:
-        query.reply(key, payload, encoding=encoding, attachment=attachment)
-        query.reply(keys.own(run, "counts"), pack(Counts({key: 1}, 1)))
+        query.reply(key, pack([written]))
+        query.reply(keys.own(run, "counts"), pack({key: 1}))
         query.drop()
 
-    expression = keys.of_class(keys.key_class(key))
-    session.declare_queryable(expression, zenoh.handlers.Callback(tell, indirect=False))
-    tokens = [session.liveliness().declare_token(keys.own(run, each)) for each in ("process", f"alive/{holder}")]
+    session.declare_queryable(keys.own(run, "past"), zenoh.handlers.Callback(tell, indirect=False))
+    shown = ("process/boot-0", "log", f"alive/{holder}")
+    tokens = [session.liveliness().declare_token(keys.own(run, each)) for each in shown]
     robot.router.expect(f"denied: robot/{role}/{holder} may not reply robot/{key}")
     for token in tokens:
         token.undeclare()
@@ -295,17 +295,14 @@ def test_a_viewer_who_overhears_commands(robot: Fortress) -> None:
 def test_a_viewer_who_overhears_commands_by_history(robot: Fortress) -> None:
     """A viewer asks a process for its past commands."""
     key = keys.of_class("cmd")
-    run = run_of(robot, keys.FEEDBACK)
-    replies = [
-        reply
-        for where in (f"{key}?run={run}", keys.own(run, "past"))
-        for reply in robot.session("viewer").get(
-            where, payload=pack(Missing()), accept_replies=zenoh.ReplyKeyExpr.ANY
-        )
-    ]
-    assert not [reply for reply in replies if reply.ok]
-    for asked in (key, keys.own(run, "past")):
-        robot.router.expect(f"denied: robot/observer/viewer may not query robot/{asked}")
+    run = run_of(robot, keys.request_state("generation"))
+    options = {"accept_replies": zenoh.ReplyKeyExpr.ANY, "consolidation": zenoh.ConsolidationMode.NONE}
+    viewer = robot.session("viewer")
+    assert not [reply for reply in viewer.get(f"{key}?run={run}", **options) if reply.ok]
+    robot.router.expect(f"denied: robot/observer/viewer may not query robot/{key}")
+    question = pack(((key,), Missing(is_new=False)))
+    replies = viewer.get(keys.own(run, "past"), payload=question, **options)
+    assert [str(reply.ok.key_expr) for reply in replies if reply.ok] == [keys.own(run, "counts")]
 
 
 def test_a_holder_who_plays_the_router(robot: Fortress) -> None:

@@ -102,6 +102,17 @@ async def acquainted(*hubs: ZenohHub) -> None:
             assert await hub.peers.change(deadline), f"{hub.run} never met all of {[other.run for other in hubs]}"
 
 
+async def matched(hub: ZenohHub, key: str) -> None:
+    """Wait until what the hub publishes on the key goes to somebody."""
+    loop, match = asyncio.get_running_loop(), asyncio.Event()
+    publisher: Any = hub.session.declare_publisher(key)
+    handler = zenoh.handlers.Callback(lambda status: loop.call_soon_threadsafe(match.set), indirect=False)
+    publisher.declare_matching_listener(handler)
+    if not publisher.matching_status.matching:
+        await asyncio.wait_for(match.wait(), PATIENCE)
+    publisher.undeclare()
+
+
 async def take(subscription: Subscription, count: int = 1) -> list[Received]:
     """The next `count` messages. Fails when they do not come."""
     taken = []

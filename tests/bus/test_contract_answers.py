@@ -9,8 +9,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import encode, encode_json, encoding_of
-from engage_hri.schemas.requests import Accepted, Cancel, KeepAlive, Kept
-from engage_hri.services.bus.interface import Bus
+from engage_hri.schemas.requests import Accepted, Cancel, KeepAlive, Kept, Request
+from engage_hri.services.bus.interface import Bus, Received, Subscription
 from engage_hri.services.requests.ends import RequestDesk
 from tests.bus.places import Place, echo, messages, numbers, state, take
 
@@ -132,12 +132,11 @@ async def test_a_request_is_cancelled_changed_and_renewed_only_by_who_has_asked(
     cancel = Cancel(id="b", requester="client", life=life)
     key, stop = (keys.command(each, "manager", "client") for each in (keys.BLOCK, keys.cancel("realizer")))
 
-    client.publish(key, block)
-    [asked] = await take(inbox)
-    while asked.past:  # The client did not know the server yet: it sends the request again, as clients do.
-        client.publish(key, block)
-        [asked] = await take(inbox)
+    asked = await known_to(inbox, client, key, block)
     assert desk.take(asked) == block
+    await known_to(
+        inbox, stranger, keys.command(keys.BLOCK, "manager", "stranger"), PerformBlock(id="s", block=Block(id="s"))
+    )
     stranger.publish(stop, cancel)
     stranger.publish(key, replace(block, block=Block(id="c")))
     stranger.publish(keys.command(keys.keep_alive("realizer"), "manager", "client"), kept(life, stranger))
@@ -150,6 +149,15 @@ async def test_a_request_is_cancelled_changed_and_renewed_only_by_who_has_asked(
     [withdrawn] = await take(inbox)
     assert desk.take(withdrawn) == cancel
     desk.close()
+
+
+async def known_to(inbox: Subscription, bus: Bus, key: str, request: Request) -> Received:
+    """Send a request until it is not from the past: who did not know the server yet sends again, as clients do."""
+    while True:
+        bus.publish(key, request)
+        [asked] = await take(inbox)
+        if not asked.past:
+            return asked
 
 
 def kept(life: str, bus: Bus) -> KeepAlive:

@@ -23,7 +23,7 @@ from engage_hri.services.bus.zenoh.history import BATCH, History, finish
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.order import PULSE_FOR
 from engage_hri.services.runtime.service import Ready, running
-from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, messages, numbers, state
+from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, matched, messages, numbers, state
 from tests.commanding import command
 
 pytestmark = pytest.mark.real_time
@@ -114,17 +114,6 @@ async def test_a_reply_is_what_was_published_down_to_attachment_and_timestamp(to
     assert str(kept.encoding) == str(live.encoding) == "application/msgpack;engage.Accepted/1"
     assert kept.attachment.to_bytes() == live.attachment.to_bytes()  # type: ignore[union-attr]
     assert kept.timestamp == live.timestamp
-
-
-async def matched(hub: ZenohHub, key: str) -> None:
-    """Wait until what the hub publishes on the key goes to somebody."""
-    loop, match = asyncio.get_running_loop(), asyncio.Event()
-    publisher: Any = hub.session.declare_publisher(key)
-    handler = zenoh.handlers.Callback(lambda status: loop.call_soon_threadsafe(match.set), indirect=False)
-    publisher.declare_matching_listener(handler)
-    if not publisher.matching_status.matching:
-        await asyncio.wait_for(match.wait(), PATIENCE)
-    publisher.undeclare()
 
 
 async def test_recent_events_and_commands_come_in_order_across_keys_unless_zenoh_is_let_merge_them(town: Town):
@@ -321,14 +310,14 @@ async def test_who_may_not_publish_on_a_key_hands_out_nothing_for_it(monkeypatch
 
 async def test_a_process_that_never_answers_at_first_is_asked_until_it_does(monkeypatch: pytest.MonkeyPatch):
     """Nothing is lost meanwhile, though what was sent is no longer recent, and no count tells of it any more."""
-    loop, answers, asked = asyncio.get_running_loop(), History._asked, 0
+    loop, answers, asked = asyncio.get_running_loop(), History._missing_asked, 0
 
-    def slow(history: History, kind: keys.KeyClass, query: zenoh.Query) -> None:
+    def slow(history: History, query: zenoh.Query) -> None:
         nonlocal asked
         asked += 1
-        answers(history, kind, query) if loop.time() > published + PULSE_FOR + 0.3 else finish(query)
+        answers(history, query) if loop.time() > published + PULSE_FOR + 0.3 else finish(query)
 
-    monkeypatch.setattr(History, "_asked", slow)
+    monkeypatch.setattr(History, "_missing_asked", slow)
     monkeypatch.setattr(readers, "UNANSWERED", 0.5)
     robot, end = f"visited-{os.getpid()}", free_endpoint()
     near, far = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])

@@ -2,16 +2,24 @@
 
 import asyncio
 import os
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
+from typing import Any
 
 import pytest
 import pytest_asyncio
+import zenoh
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import WATCHED
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.zenoh import hub
+from engage_hri.services.bus.zenoh.history import History
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.order import Missing, Past
+from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.readers import RUNS_KEPT, TRIES
-from tests.bus.places import acquainted, free_endpoint, messages, numbers, state
+from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time
 Told = Callable[[str, Past], None]
@@ -27,14 +35,21 @@ async def pair() -> AsyncIterator[tuple[ZenohHub, ZenohHub]]:
     there.join("there").publish(keys.WORLD, state(1))
     assert there._pulse is not None
     there._pulse.cancel()
+    await publishing(here, there)
     yield here, there
     await there.close()
     await here.close()
 
 
-def unanswered(hub: ZenohHub, times: int) -> list[str]:
+async def publishing(here: ZenohHub, *others: ZenohHub) -> None:
+    """Wait until it is known that these have published something."""
+    while here.peers.publishers != {other.run for other in others}:
+        assert await here.peers.change(asyncio.get_running_loop().time() + PATIENCE)
+
+
+def unanswered(asking: ZenohHub, times: int) -> list[str]:
     """Let the next questions of the hub for somebody's past die; the list tells how many were asked."""
-    ask, asked = hub._history.ask, []
+    ask, asked = asking._history.ask, []
 
     def ask_past(patterns: Sequence[str], run: str, missing: Missing, told: Told, ended: Ended) -> None:
         asked.append(run)
@@ -43,7 +58,7 @@ def unanswered(hub: ZenohHub, times: int) -> list[str]:
         else:
             ask(patterns, run, missing, told, ended)
 
-    hub._history.ask = ask_past  # type: ignore[method-assign]
+    asking._history.ask = ask_past  # type: ignore[method-assign]
     return asked
 
 
@@ -63,7 +78,7 @@ async def test_a_process_that_never_answers_holds_up_nobody_for_ever(pair: tuple
     assert numbers(await messages(inbox)) == [1]
     asked = unanswered(here, 1000)
 
-    here.readers.process_came(there.run)
+    here.readers.publisher_came(there.run)
     there.join("another").publish(keys.WORLD, state(2))
 
     assert numbers(await messages(inbox)) == [2]
@@ -85,8 +100,8 @@ async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair:
 
     assert numbers(await messages(inbox)) == [1]
     here._history.ask = ask_late  # type: ignore[method-assign]
-    here.readers.process_came(there.run)
-    here.readers.process_came(there.run)
+    here.readers.publisher_came(there.run)
+    here.readers.publisher_came(there.run)
     there.join("another").publish(keys.WORLD, state(2))
     told = await waiting.get()
 
@@ -97,12 +112,66 @@ async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair:
     assert len(asked) == 2
 
 
+def questions(monkeypatch: pytest.MonkeyPatch, kind: type, name: str, whose: Callable[[Any], str]) -> list[str]:
+    """Runs of the processes that this method of theirs was asked in; the list goes on."""
+    answer, asked = getattr(kind, name), []
+
+    def recorded(one: Any, query: zenoh.Query) -> None:
+        asked.append(whose(one))
+        answer(one, query)
+
+    monkeypatch.setattr(kind, name, recorded)
+    return asked
+
+
+async def test_a_question_is_one_for_all_patterns_and_goes_to_no_other_process(monkeypatch: pytest.MonkeyPatch):
+    asked = questions(monkeypatch, History, "_missing_asked", lambda history: history._sent.run)
+    robot, end = f"asked-{os.getpid()}", free_endpoint()
+    here, there, other, _ = hubs = [
+        await open_hub(robot, listen=[end]), *[await open_hub(robot, connect=[end]) for _ in range(3)]
+    ]  # fmt: skip
+    await acquainted(*hubs)
+    there.join("there").publish(keys.WORLD, state(1))
+    other.join("other").publish(keys.statistics("ann"), state(2))
+    await publishing(here, there, other)
+
+    inbox = here.join("here").subscribe(*WATCHED, keys.WORLD)
+    assert sorted(numbers(await messages(inbox, 2))) == [1, 2]
+    assert sorted(asked) == sorted([there.run, other.run]), "who has published nothing was asked"
+    asked.clear()
+    here.readers.publisher_came(there.run)
+    there._buses["there"].publish(keys.WORLD, state(3))
+
+    assert numbers(await messages(inbox)) == [3]
+    assert set(asked) == {there.run}
+    for each in reversed(hubs):
+        await each.close()
+
+
+async def test_processes_that_read_one_clock_do_not_ask_one_another_for_the_time(monkeypatch: pytest.MonkeyPatch):
+    asked = questions(monkeypatch, Peers, "_tell_time", lambda peers: peers._sent.run)
+    robot, end = f"asked-{os.getpid()}", free_endpoint()
+    here, there = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
+    await acquainted(here, there)
+    await here.peers.round_trip(there.run, PATIENCE)
+    assert asked == [there.run]
+
+    monkeypatch.setattr(hub, "own_clock", lambda *_: ("boot-elsewhere", lambda: 1000.0 + time.monotonic()))
+    far = await open_hub(robot, connect=[end])
+    await far.peers.round_trip(here.run, PATIENCE)  # which is asked after the first question for the time
+    await here.peers.round_trip(far.run, PATIENCE)
+
+    assert here.clocks.local(Stamp("boot-elsewhere", 1000.0)) == pytest.approx(0.0, abs=0.5)
+    for each in (far, there, here):
+        await each.close()
+
+
 async def test_processes_that_come_and_go_are_forgotten_but_none_that_is_there(pair: tuple[ZenohHub, ZenohHub]):
     here, there = pair
     inbox = here.join("here").subscribe(keys.WORLD)
     assert numbers(await messages(inbox)) == [1]
     for number in range(2 * RUNS_KEPT):
-        here.readers.process_came(f"run-{number}")
+        here.readers.publisher_came(f"run-{number}")
     [reader] = here.readers._readers
 
     assert len(reader.followers) == RUNS_KEPT

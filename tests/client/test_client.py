@@ -188,11 +188,15 @@ async def test_a_block_goes_past_the_policies_to_the_realizer(hub: MemoryHub, tm
             ready()
             async for received in inbox:
                 if isinstance(request := desk.take(received), PerformBlock):
+                    followed.append(request.follows)
                     desk.accept(request.id)
                     desk.end(BlockOutcome(id=request.id, block=request.block.id, status="done"))
 
+    followed: list[tuple[str, ...]] = []
     async with running(hub, {"realizer": realizer}), connect(hub=hub) as robot:
         outcome = await robot.realize(Block(id="wave"))
+        await robot.realize(Block(id="wave"), follows=["one", "two"])
+        assert followed == [(), ("one", "two")]
         again = await robot.realize("wave", HELLO.behaviors)  # type: ignore[arg-type]
         (tmp_path / "nod.xml").write_text(NOD)
         for source in (tmp_path / "nod.xml", NOD, NOD.encode()):

@@ -230,6 +230,17 @@ async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -
         assert now() == 6.0
 
 
+async def test_fragments_that_wait_for_the_world_count_among_those_that_may_wait(hub: MemoryHub) -> None:
+    async with stage(hub, GenerationConfig(fragments=2), world=None) as partners:
+        for id in "ab":
+            partners.send(says(id))
+        with pytest.raises(RequestRefused, match=r"2 fragments are waiting.*`generation.fragments` is the limit"):
+            await partners.send(says("c")).outcome
+        assert now() == 0.0
+        partners.see(TABLE)
+        await partners.fragment_block("a")
+
+
 async def test_a_reference_that_cannot_be_made_fails_its_fragment(hub: MemoryHub) -> None:
     async with stage(hub, GenerationConfig(condition="degraded-generation")) as partners:
         outcome = await partners.send(refers()).outcome

@@ -2,7 +2,19 @@
 
 import pytest
 
-from engage_hri.schemas.behaviors import After, Before, Constraint, Gesture, Hand, Head, Pointing, Synchronize, Timing
+from engage_hri.schemas.behaviors import (
+    After,
+    Before,
+    Constraint,
+    FaceFacs,
+    FaceLexeme,
+    Gesture,
+    Hand,
+    Head,
+    Pointing,
+    Synchronize,
+    Timing,
+)
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke
@@ -55,6 +67,13 @@ def test_a_nod_waits_for_the_nod_before_it_and_for_no_arm() -> None:
 
     assert lines(emission(middle(Head(id="m", lexeme="NOD")), before=before).block) == ["m:start after a:n:end"]
     assert lines(emission(middle(Gesture(id="g", lexeme="BEAT")), before=before).block) == []
+
+
+def test_of_faces_in_a_row_only_the_first_is_placed_whatever_their_types() -> None:
+    """The others follow it by themselves, as long as nothing names them."""
+    text = made(middle(FaceLexeme(id="f", lexeme="SMILE"), FaceFacs(id="g", au=2)))
+
+    assert text == ["f:start after a:s:end"]
 
 
 def test_only_the_next_reference_waits_for_the_glance_of_an_earlier_fragment() -> None:

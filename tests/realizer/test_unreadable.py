@@ -92,6 +92,22 @@ async def test_what_is_wrong_with_a_block_is_the_same_however_it_is_sent(
     assert (warning.block, warning.kind) == ("b", "PARSING_FAILURE")
 
 
+@pytest.mark.parametrize(("block", "told"), [({"id": "b"}, "b"), ({}, None), ({"id": 3}, None), ("b", None)])
+async def test_a_request_that_fits_no_schema_is_warned_of_by_its_block_or_by_none(
+    block: object, told: str | None
+) -> None:
+    """The id of the request is no id of a block."""
+    head = {"type": "head", "id": "h", "lexeme": "NOD", "amount": 5.0}
+    content = {**block, "behaviors": [head]} if isinstance(block, dict) else block
+    request = {"type": "perform_block", "id": "r-b-1", "requester": "me", "block": content}
+    said = await _said_of(msgspec.json.encode(request), "application/json;engage.PerformBlock/1")
+
+    (refused,) = [each for each in said if isinstance(each, Refused)]
+    (warning,) = [each for each in said if isinstance(each, WarningFeedback)]
+    assert refused.id == "r-b-1"
+    assert (warning.block, warning.kind) == (told, "PARSING_FAILURE")
+
+
 async def test_a_mark_that_looks_like_an_offset_is_known_as_such_however_it_is_sent() -> None:
     speech = {"type": "speech", "id": "s", "text": "one two", "marks": [{"id": "word-2", "position": 4}]}
     wait = {"type": "wait", "id": "w", "duration": 0, "timing": [{"sync": "start", "ref": "s:word-2"}]}

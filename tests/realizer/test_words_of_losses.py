@@ -5,7 +5,9 @@ import re
 import pytest
 
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.test_losses import planned
 
@@ -106,3 +108,19 @@ def test_contradicting_offsets_are_told_with_the_points_as_they_are_written() ->
         planned(block)
     assert "n:strokeEnd is already 1 s after s:end (" in str(refused.value)
     assert "stroke_end" not in str(refused.value)
+
+
+def test_of_two_speeches_that_overlap_it_is_told_who_has_the_voice_and_no_riddle() -> None:
+    speeches = '<speech id="a" start="1"><text>First sentence.</text></speech>'
+    speeches += '<speech id="b" start="1.2"><text>Second sentence.</text></speech>'
+    block = decode_xml(ONE_POINT_0.format(speeches))
+    assert isinstance(block, Block)
+
+    phase = Phase(since="start", to="end", shortest=0.9, natural=0.9)
+    estimates = [Estimate(behavior=id, feasible=True, parts=("voice",), phases=(phase,)) for id in ("a", "b")]
+    (problem,) = plan_block(block, estimates).problems
+    reason = "line 2: cannot be on time: b has the voice until b:end, and a cannot wait for that: "
+    assert problem.message.startswith(reason)
+    assert problem.message.endswith("; b:start = 1.2 is given up, so that the words are said")
+    assert "would come" not in problem.message
+    assert "not before" not in problem.message

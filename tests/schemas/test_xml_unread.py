@@ -21,6 +21,14 @@ from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
         ),
         ('Well, <gaze id="g" target="t"/> hello', Unread(message="text 'Well, hello' outside of speech")),
         ('<gaze id="g" target="t" speed="9"/>', Unread(message="<gaze> has no attribute 'speed'", behavior="g")),
+        (
+            '<head id="g" lexeme="NOD" starrt="1"/>',
+            Unread(message="<head> has no attribute 'starrt' (did you mean 'start'?)", behavior="g"),
+        ),
+        (
+            '<gaze id="g" target="t" ofsetAngle="9"/>',
+            Unread(message="<gaze> has no attribute 'ofsetAngle' (did you mean 'offsetAngle'?)", behavior="g"),
+        ),
         ('<speech id="s" text="?">Hi</speech>', Unread(message="<speech> has no attribute 'text'", behavior="s")),
         ('<constraint><during ref="1"/></constraint>', Unread(message="unknown element <during> in a constraint")),
         (

@@ -4,8 +4,9 @@ A `session.get` of all states (`keys.of_class`) brings them as they were publish
 timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`; `age=SECONDS`, how far back
 commands and events go; `run=RUN`, to ask only that process.
 
-Our own processes send a `Missing` with the question. They get what is missing of a key in one reply, and at the end
-one with the `Counts` of all these keys: so they know that all has come, and that there is nothing else.
+Our own processes ask `@bus/<run>/past`, of one process or of all (`*`), once for all their patterns. They get what is
+missing of a key in one reply, under that key, and at the end one with the `Counts` of all these keys: so they know
+that all has come, and that there is nothing else.
 """
 
 import asyncio
@@ -14,9 +15,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from math import isnan
+from typing import Any
 
 import msgspec
 import zenoh
+from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
@@ -35,23 +38,17 @@ BAD = (msgspec.DecodeError, UnicodeDecodeError)
 pack = msgspec.msgpack.encode
 envelopes = msgspec.msgpack.Decoder(Envelope)
 _parts = msgspec.msgpack.Decoder(list[Written])
-_missings = msgspec.msgpack.Decoder(Missing)
 _counts = msgspec.msgpack.Decoder(Counts)
 
 
-class _Answer:
-    """The answer of one process so far. parts: the counts of each pattern that it has answered for."""
+class _Question(Struct, frozen=True, array_like=True):
+    """Question of our own processes: what is missing on the keys of these patterns."""
 
-    def __init__(self) -> None:
-        self.written: list[Written] = []
-        self.parts: list[Counts] = []
+    patterns: tuple[str, ...]
+    missing: Missing
 
-    def past(self) -> Past:
-        counts: Counts = {}
-        for part in self.parts:
-            for key, nth in part.items():
-                counts[key] = max(nth, counts.get(key, 0))
-        return Past(counts, tuple(self.written))
+
+_questions = msgspec.msgpack.Decoder(_Question)
 
 
 class History:
@@ -63,15 +60,23 @@ class History:
         self._bridge = bridge
         self._sent = sent
         self._open = True
-        self._declared = tuple(
+        self._declared: tuple[Any, ...] = tuple(
             session.declare_queryable(keys.of_class(kind), bridge.on_loop(partial(self._asked, kind)))
             for kind in keys.KEPT_CLASSES
         )
 
+    def begin(self) -> None:
+        """Show that this process has a past from now on, and be asked for it: watchers never have one."""
+        past, log = (keys.own(self._sent.run, subject) for subject in ("past", "log"))
+        self._declared += (
+            self._session.declare_queryable(past, self._bridge.on_loop(self._missing_asked)),
+            self._session.liveliness().declare_token(log),
+        )
+
     def close(self) -> None:
         self._open = False
-        for declared in self._declared:
-            declared.undeclare()  # type: ignore[no-untyped-call]
+        for declared in reversed(self._declared):
+            declared.undeclare()
 
     # -- asking -------------------------------------------------------------------------------------------------
 
@@ -87,68 +92,45 @@ class History:
 
         Calls `told` with each process that has answered in full, and its answer; then `ended`. Both on the loop.
         """
-        answers: dict[str, _Answer] = {}
-        waiting = len(patterns)
+        answers: dict[str, list[Written]] = {}
 
         def replied(reply: zenoh.Reply) -> None:
             if reply.ok is None or reply.replier_id is None:
                 return
             # Zenoh says who answers: no process can answer for another.
             replier = str(reply.replier_id.zid)
-            answer = answers.setdefault(replier, _Answer())
             with suppress(*BAD):  # counts as no answer
-                if (key := str(reply.ok.key_expr)) != keys.own(replier, "counts"):
-                    answer.written += [one for one in _parts.decode(reply.ok.payload.to_bytes()) if one.key == key]
-                    return
-                answer.parts.append(_counts.decode(reply.ok.payload.to_bytes()))
-                if len(answer.parts) == len(patterns):
-                    told(replier, answer.past())
+                if (key := str(reply.ok.key_expr)) == keys.own(replier, "counts"):
+                    counts = _counts.decode(reply.ok.payload.to_bytes())
+                    told(replier, Past(counts, tuple(answers.pop(replier, ()))))
+                else:
+                    part = _parts.decode(reply.ok.payload.to_bytes())
+                    answers.setdefault(replier, []).extend(one for one in part if one.key == key)
 
-        def one_ended(_: object) -> None:
-            nonlocal waiting
-            waiting -= 1
-            if not waiting:
-                ended()
-
-        payload, only = pack(missing), f"?run={run}" if run else ""
-        for pattern in patterns:
-            self._session.get(
-                f"{pattern}{only}",
-                self._bridge.on_loop(replied, one_ended),
-                target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE,
-                accept_replies=zenoh.ReplyKeyExpr.ANY,
-                allowed_destination=zenoh.Locality.REMOTE,
-                payload=payload,
-                timeout=CATCH_UP,
-                **QOS,
-            )
+        self._session.get(
+            keys.own(run or "*", "past"),
+            self._bridge.on_loop(replied, lambda _: ended()),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            accept_replies=zenoh.ReplyKeyExpr.ANY,
+            allowed_destination=zenoh.Locality.REMOTE,
+            payload=pack(_Question(tuple(patterns), missing)),
+            timeout=CATCH_UP,
+            **QOS,
+        )
 
     # -- answering ----------------------------------------------------------------------------------------------
 
-    def _asked(self, kind: keys.KeyClass, query: zenoh.Query) -> None:
-        if query.parameters.get("run") not in (None, self._sent.run):
-            finish(query)
-            return
-        form, age, missing = "", keys.HISTORY_MAX_AGE, None
+    def _missing_asked(self, query: zenoh.Query) -> None:
         try:
-            if query.payload is None:
-                form, age = form_asked(query, ""), _age(query.parameters)
-            else:
-                missing = _missings.decode(query.payload.to_bytes())
-                age += missing.age
-        except (EngageError, *BAD) as error:
-            refuse(query, error.fault if isinstance(error, EngageError) else Fault(reason=str(error)), "json")
+            asked = _questions.decode(query.payload.to_bytes() if query.payload else b"")
+            expressions = [zenoh.KeyExpr(pattern) for pattern in asked.patterns]
+        except (zenoh.ZError, *BAD) as error:
+            refuse(query, Fault(reason=str(error)), "json")
             finish(query)
             return
-
-        def is_wanted(key: str) -> bool:
-            return keys.key_class(key) == kind and query.key_expr.intersects(zenoh.KeyExpr(key))
-
-        past = self._sent.past(is_wanted, missing or Missing(), self._loop.time() - age)
-        if missing is None:
-            self._answer(query, deque(past.written), form)
-            return
+        oldest = self._loop.time() - keys.HISTORY_MAX_AGE - asked.missing.age
+        past = self._sent.past(partial(_is_in, expressions), asked.missing, oldest)
         parts: dict[str, list[object]] = {}
         for one in past.written:
             parts.setdefault(one.key, []).append((one.key, one.encoding, one.payload, one.envelope))
@@ -156,6 +138,23 @@ class History:
             query.reply(key, pack(part))
         query.reply(keys.own(self._sent.run, "counts"), pack(past.counts))
         finish(query)
+
+    def _asked(self, kind: keys.KeyClass, query: zenoh.Query) -> None:
+        if query.parameters.get("run") not in (None, self._sent.run):
+            finish(query)
+            return
+        try:
+            form, age = form_asked(query, ""), _age(query.parameters)
+        except EngageError as error:
+            refuse(query, error.fault, "json")
+            finish(query)
+            return
+
+        def is_wanted(key: str) -> bool:
+            return keys.key_class(key) == kind and _is_in((query.key_expr,), key)
+
+        past = self._sent.past(is_wanted, Missing(), self._loop.time() - age)
+        self._answer(query, deque(past.written), form)
 
     def _answer(self, query: zenoh.Query, waiting: deque[Written], form: str) -> None:
         for _ in range(min(BATCH, len(waiting)) if self._open else 0):
@@ -169,6 +168,10 @@ class History:
             self._loop.call_soon(self._answer, query, waiting, form)
         else:
             finish(query)
+
+
+def _is_in(expressions: Sequence[zenoh.KeyExpr], key: str) -> bool:
+    return any(each.intersects(zenoh.KeyExpr(key)) for each in expressions)
 
 
 def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:

@@ -123,7 +123,7 @@ class ZenohHub(Hub):
         self._history = History(session, self.bridge, self._sent)
         trusts = rights.trusts if rights else None
         self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, trusts)
-        self.peers.stand(self.readers.process_came, self.readers.participant_changed)
+        self.peers.stand(self.readers.publisher_came, self.readers.participant_changed)
 
     @property
     def health(self) -> BusHealth:
@@ -201,6 +201,8 @@ class ZenohHub(Hub):
         payload, encoding = published(message)
         stamp = self.session.new_timestamp()
         if ordered:
+            if not self._sent.number:
+                self._history.begin()
             written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now, stamp)
             envelope = written.envelope
             if self._pulse is None:

@@ -28,8 +28,8 @@ _instants = msgspec.msgpack.Decoder(Stamp)
 class Peers:
     """Liveliness and the questions between processes.
 
-    processes: runs of the processes that are there. names: participants, each with the runs that have it. changes:
-    number of times that a peer has come or gone.
+    processes: runs of the processes that are there. publishers: of those that have a past to hand out. names:
+    participants, each with the runs that have it. changes: number of times that a peer has come or gone.
     """
 
     def __init__(
@@ -37,6 +37,7 @@ class Peers:
     ) -> None:
         """places: endpoints at which others may connect to this process."""
         self.processes: set[str] = set()
+        self.publishers: set[str] = set()
         self.names: dict[str, set[str]] = {}
         self.changes = 0
         self._places: dict[str, set[str]] = {sent.run: {_without_settings(place) for place in places}}
@@ -48,19 +49,20 @@ class Peers:
         self._sent = sent
         self._watchers: list[asyncio.Future[None]] = []
         self._clock_of: dict[str, str] = {}
-        """Clocks of the processes that have told theirs."""
+        """Clocks of the processes that are there."""
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         self._declared: tuple[Any, ...] = (
             session.declare_queryable(keys.own(sent.run, "clock"), bridge.on_loop(self._tell_time)),
         )
 
-    def stand(self, on_process: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
+    def stand(self, on_publisher: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
         """Watch for the others, and show the own process' token, now that it can answer.
 
-        on_process: called with the run of a process that has come, or come back. on_participant: called with name and
+        on_publisher: called with the run of a process that has published for the first time, or come back.
+        on_participant: called with name and
         run of a participant, and with True if it has come, False if it has gone.
         """
-        self._on_process = on_process
+        self._on_publisher = on_publisher
         self._on_participant = on_participant
         liveliness = self._session.liveliness()
         handler = self._bridge.on_loop(self._token_changed)
@@ -70,7 +72,7 @@ class Peers:
                 liveliness.declare_token(keys.own(self._sent.run, f"at/{place}"))
                 for place in sorted(self._places[self._sent.run])
             ),
-            liveliness.declare_token(keys.own(self._sent.run, "process")),
+            liveliness.declare_token(keys.own(self._sent.run, f"process/{self.clocks.own}")),
         )
 
     async def wait_for_discovery(self, deadline: Seconds) -> None:
@@ -95,14 +97,19 @@ class Peers:
         there = sample.kind == zenoh.SampleKind.PUT
         if run == self._sent.run:
             return
-        if subject == ["process"]:
+        if subject[:1] == ["process"] and len(subject) == 2:
             if there:
                 self.processes.add(run)
-                self.measure_clock(run)
-                self._on_process(run)
+                self._clock_of[run] = subject[1]
+                if subject[1] != self.clocks.own:
+                    self.measure_clock(run)
             else:
                 self.processes.discard(run)
                 self._clock_of.pop(run, None)
+        elif subject == ["log"]:
+            (self.publishers.add if there else self.publishers.discard)(run)
+            if there:
+                self._on_publisher(run)
         elif subject[:1] == ["at"]:
             places, place = self._places.setdefault(run, set()), "/".join(subject[1:])
             (places.add if there else places.discard)(place)
@@ -183,13 +190,12 @@ class Peers:
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         asked = {self.clocks.own}
         for run in sorted(self.processes):
-            clock = self._clock_of.get(run)
-            if clock is None or clock not in asked:
-                asked.add(clock or "")
+            if (clock := self._clock_of[run]) not in asked:
+                asked.add(clock)
                 self.measure_clock(run)
 
     def measure_clock(self, run: str, trips: int = CLOCK_TRIPS) -> None:
-        """Read the clock of a process in a few round trips; one is enough to learn that it is of this machine."""
+        """Read the clock of a process in a few round trips."""
         asked = self.clocks.now()
 
         def reply(got: zenoh.Reply) -> None:
@@ -198,9 +204,8 @@ class Peers:
                 return
             with suppress(*BAD):
                 told = _instants.decode(got.ok.payload.to_bytes())
-                self._clock_of[run] = told.clock
                 self.clocks.measured(told.clock, asked, told.seconds, answered)
-                if trips > 1 and told.clock != self.clocks.own:
+                if trips > 1:
                     self.measure_clock(run, trips - 1)
 
         self.ask(keys.own(run, "clock"), b"", reply, lambda _: None, CLOCK_TIMEOUT)

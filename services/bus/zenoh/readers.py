@@ -20,7 +20,7 @@ from engage_hri.services.bus.payloads import read_payload, unreadable
 from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
 from engage_hri.services.bus.zenoh.order import Counts, Envelope, Follower, Missing, Past, SentLog, Written
 from engage_hri.services.bus.zenoh.peers import Peers
-from engage_hri.services.bus.zenoh.session import LoopBridge
+from engage_hri.services.bus.zenoh.session import Arrived, LoopBridge
 
 _pulses = msgspec.msgpack.Decoder(Counts)
 _flushes = msgspec.msgpack.Decoder(tuple[str, Counts])
@@ -38,13 +38,13 @@ RUNS_KEPT = 256
 class _Reader:
     """A subscription of the participant `bus`, with its follower of each process, by run.
 
-    kept: expressions that ask for the past of its keys.
+    kept: those of its patterns that have a past.
     """
 
     def __init__(self, bus: Bus, subscription: Subscription) -> None:
         self.bus = bus
         self.subscription = subscription
-        self.kept = tuple(dict.fromkeys(each for pattern in subscription.patterns for each in keys.kept(pattern)))
+        self.kept = tuple(filter(keys.has_past, subscription.patterns))
         self.followers: dict[str, Follower] = {}
 
     def follower(self, run: str, there: Collection[str], now: Seconds) -> Follower:
@@ -123,7 +123,7 @@ class Readers:
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-        self._ask(reader, {run: self._follower(reader, run) for run in self._peers.processes})
+        self._ask(reader, {run: self._follower(reader, run) for run in self._peers.publishers})
 
     def detach(self, subscription: Subscription) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
@@ -137,15 +137,15 @@ class Readers:
     def _follower(self, reader: _Reader, run: str) -> Follower:
         return reader.follower(run, self._peers.processes, self._loop.time())
 
-    def _sample_came(self, pattern: str, sample: zenoh.Sample) -> None:
-        if sample.kind != zenoh.SampleKind.PUT:
+    def _sample_came(self, pattern: str, sample: Arrived) -> None:
+        if not sample.is_put:
             return
-        key, payload, encoding = str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding)
+        key = sample.key
         run, envelope = self._origin(sample)
         if run == self._sent.run:
             self.refused += 1  # from outside in this process' own name
             return
-        written = Written(key, encoding, payload, envelope)
+        written = Written(key, sample.encoding, sample.payload, envelope)
         if not self._is_trusted(written, run):
             return
         self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time())
@@ -171,31 +171,27 @@ class Readers:
         self.refused += 1
         return False
 
-    def _origin(self, sample: zenoh.Sample) -> tuple[str, Envelope]:
+    def _origin(self, sample: Arrived) -> tuple[str, Envelope]:
         """Run and envelope of a sample; an empty one where there is none, as programs in other languages send it.
 
         An envelope counts only together with Zenoh's word for who sent it, which every process of ours gives.
         """
-        if sample.attachment is not None and sample.source_info is not None:
+        if sample.attachment is not None and sample.sender:
             try:
-                envelope = envelopes.decode(sample.attachment.to_bytes())
-                return str(sample.source_info.source_id.zid), envelope
+                return sample.sender, envelopes.decode(sample.attachment)
             except BAD:
                 self.refused += 1
         return self._foreign_life(sample), Envelope("", "", 0.0)
 
-    def _foreign_life(self, sample: zenoh.Sample) -> str:
+    def _foreign_life(self, sample: Arrived) -> str:
         """Life of a program without an envelope, as far as Zenoh tells; else empty.
 
         A sample that the program has not stamped itself is stamped by the process that passes it on.
         """
-        if sample.source_info is not None:
-            return str(sample.source_info.source_id.zid)
-        if sample.timestamp is None:
-            return ""
-        stamped_by = str(sample.timestamp.get_id())
+        if sample.sender or not sample.stamped_by:
+            return sample.sender
         passed_on_by = {self._sent.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
-        return "" if stamped_by in passed_on_by else stamped_by
+        return "" if sample.stamped_by in passed_on_by else sample.stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
         # One sample often has several readers: it is decoded once.
@@ -251,7 +247,7 @@ class Readers:
 
     def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
         follower.asking, known = False, follower.forged
-        if past is not None:  # which may hold more: see `keys.kept`
+        if past is not None:
             past = past.of(reader.subscription.wants)
             trusted = tuple(one for one in past.written if self._is_trusted(one, run))
             past = msgspec.structs.replace(past, written=trusted)
@@ -271,7 +267,7 @@ class Readers:
             follower.behind = True
             self._catch_up(reader, run, follower)
 
-    def process_came(self, run: str) -> None:
+    def publisher_came(self, run: str) -> None:
         for reader in self._readers:
             follower = self._follower(reader, run)
             # The process may be back after a cut in which messages were lost, or the answer to a question.
@@ -279,10 +275,10 @@ class Readers:
             follower.behind = True
             self._catch_up(reader, run, follower)
 
-    def _pulse_heard(self, sample: zenoh.Sample) -> None:
-        run = keys.run_of(str(sample.key_expr))
+    def _pulse_heard(self, sample: Arrived) -> None:
+        run = keys.run_of(sample.key)
         try:
-            pulse = _pulses.decode(sample.payload.to_bytes())
+            pulse = _pulses.decode(sample.payload)
         except BAD:
             self.refused += 1
         else:

@@ -17,7 +17,8 @@ EVERY_KIND = (
 ANYTHING = ("**", f"*/{keys.ANY_TOKEN}")
 """Expressions for all keys: no wildcard includes the `@` of the bus' own."""
 _ANY_PAST = tuple(map(keys.of_class, keys.KEPT_CLASSES))
-"""What all processes answer about what they have published. Each reply is checked under its own key."""
+"""What all processes answer about what they have published. Each reply is checked under its own key, also one to a
+question on `@bus/<run>/past`."""
 
 
 def access_control(holders: Iterable[Holder]) -> dict[str, Any]:
@@ -56,12 +57,12 @@ def _grants(holder: Holder) -> Iterator[tuple[str, str, tuple[str, ...]]]:
         for does in ("publishes", "subscribes", "serves", "asks")
     )
     runs = f"{holder.mark}$*"
-    answered = tuple(keys.own(runs, subject) for subject in ("counts", "clock", "flush"))
+    answered = tuple(keys.own(runs, subject) for subject in ("past", "counts", "clock", "flush"))
     shown = (
-        keys.own(runs, "process"), keys.own(runs, "at/**"), keys.own(runs, "answers/**"),
+        keys.own(runs, "process/*"), keys.own(runs, "log"), keys.own(runs, "at/**"), keys.own(runs, "answers/**"),
         *_named((keys.own(runs, f"alive/{OWN}"),), holder.name),
     )  # fmt: skip
-    asked = tuple(keys.own("*", subject) for subject in ("clock", "flush"))
+    asked = tuple(keys.own("*", subject) for subject in ("past", "clock", "flush"))
     yield "ingress", "put", (*publishes, keys.own(runs, "pulse"))
     yield "ingress", "declare_subscriber", (*subscribes, keys.ANY_PULSE)
     yield "ingress", "declare_queryable", (*serves, *answered, *_ANY_PAST)

@@ -172,6 +172,34 @@ class Traffic(Struct):
     lag: Seconds = 0.0
 
 
+class Arrived(Struct, frozen=True):
+    """A sample, copied out of Zenoh's buffers: each that waits would keep all of the one that it came in.
+
+    sender: Zenoh id in its source info; empty: it has none. stamped_by: id in its timestamp; empty: it has none.
+    """
+
+    key: str
+    payload: bytes
+    encoding: str
+    attachment: bytes | None
+    sender: str
+    stamped_by: str
+    is_put: bool
+
+
+def copied(sample: zenoh.Sample) -> Arrived:
+    attachment, source, stamp = sample.attachment, sample.source_info, sample.timestamp
+    return Arrived(
+        str(sample.key_expr),
+        sample.payload.to_bytes(),
+        str(sample.encoding),
+        None if attachment is None else attachment.to_bytes(),
+        "" if source is None else str(source.source_id.zid),
+        "" if stamp is None else str(stamp.get_id()),
+        sample.kind == zenoh.SampleKind.PUT,
+    )
+
+
 class LoopBridge:
     """Queues from Zenoh's threads to the loop: one for all ordered keys; one for streams, the oldest dropped first.
 
@@ -199,17 +227,17 @@ class LoopBridge:
         # indirect=False: else Zenoh starts a Python thread for each of these.
         return zenoh.handlers.Callback(lambda item: self._let_in(enter, item), ended, indirect=False)
 
-    def samples(self, enter: Callable[[zenoh.Sample], None]) -> Any:
+    def samples(self, enter: Callable[[Arrived], None]) -> Any:
         """Make a handler for subscribers: as `on_loop`, but samples that may be dropped take the streams' queue."""
 
         def sort(sample: zenoh.Sample) -> None:
             if sample.congestion_control == zenoh.CongestionControl.DROP:
                 if len(self._streams) == STREAM_CROWD:
                     self.traffic.dropped += 1
-                self._streams.append((enter, sample))
+                self._streams.append((enter, copied(sample)))
                 self._wake()
             else:
-                self._let_in(enter, sample)
+                self._let_in(enter, copied(sample))
 
         return zenoh.handlers.Callback(sort, indirect=False)
 

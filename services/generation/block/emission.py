@@ -168,17 +168,17 @@ class Emission:
     def _follow_the_turn(self) -> None:
         """Let everything begin after the turn's words so far, and each stroke only when its limb is free.
 
-        A behavior that the input does not name is left out, unless it is the first of its type: the realizer has it
-        follow the one before it of its type, but only as long as nothing names it.
+        A behavior that the input does not name is left out, unless it is the first of its series: the realizer has it
+        follow the one before it of its series, but only as long as nothing names it.
         """
         operators: list[Operator] = []
         free: list[str] = []
-        types: set[str] = set()
+        begun: set[str] = set()
         for behavior in self.kept:
             if isinstance(behavior, Reference):
                 continue
-            is_first = type_name(behavior) not in types
-            types.add(type_name(behavior))
+            is_first = (series := TYPES[type_name(behavior)].series) not in begun
+            begun.add(series)
             if (made := stroke(behavior, self.permits.only_hand)) is not None:
                 self.strokes.append(made)
             if is_first or behavior.id in self.named_behaviors:

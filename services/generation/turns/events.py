@@ -115,7 +115,7 @@ class TurnOutcomes:
     def close_due(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
         """Close the turns that are over by now. going: turns that are open, or have a fragment without an outcome."""
         over = [turn for turn in self._records if turn not in going and now >= self._due_at(turn)]
-        self._given_up = {turn: self._due_at(turn) for turn in self._records if turn not in (*going, *over)}
+        self._given_up = {turn: self._due_at(turn) for turn in self._records.keys() - {*going, *over}}
         return tuple(closed for turn in over if (closed := self._close(turn)).fragments)
 
     def _due_at(self, turn: str) -> Seconds:

@@ -37,9 +37,7 @@ AGAIN: Seconds = 0.001
 """Seconds between predictions, for each point that the last one told: the cost grows with their number."""
 
 
-def moved_noticeably(
-    old: Mapping[Point, Seconds], new: Mapping[Point, Seconds], noticeable: Seconds = MOVED
-) -> bool:
+def moved_noticeably(old: Mapping[Point, Seconds], new: Mapping[Point, Seconds], noticeable: Seconds = MOVED) -> bool:
     """True if a point of `new` is not in `old`, or has moved by more than `noticeable`.
 
     Points that `new` lacks have been, or were dropped: other feedback says so.

@@ -50,9 +50,9 @@ class Tied(Performed, Protocol):
 class Ties:
     """Ties of one performance.
 
-    foreign: points of other blocks that are followed. foreign_ties: those that the block itself names. vanished:
-    behaviors of other blocks of which some point will never be reached. given: behaviors whose parts another block
-    takes by its plan, and the start of the one there.
+    foreign: points of other blocks that are followed, also where there is no time to wait for them. foreign_ties:
+    those that the block itself names. vanished: behaviors of other blocks of which some point will never be reached.
+    given: behaviors whose parts another block takes by its plan, and the start of the one there.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Ties:
         self._others = others
         self._live_blocks = live_blocks
         self._blocks = blocks
-        self.foreign = set(owner.plan.foreign)
+        self.foreign = {*owner.plan.foreign, *owner.plan.untied}
         self.foreign_ties = frozen(point for point in owner.plan.foreign if point in owner.plan.constrained)
         self.vanished: frozenset[str] = frozen()
         self.given: dict[str, Point] = {}
@@ -284,7 +284,7 @@ class Ties:
     def renew(self) -> None:
         """Follow the points of other blocks that a new plan names, and tell whose parts it takes."""
         decisions = self._owner.decisions
-        fresh = set(decisions.plan.foreign) - decisions.facts.reached.keys()
+        fresh = {*decisions.plan.foreign, *decisions.plan.untied} - decisions.facts.reached.keys()
         self.foreign |= fresh
         self._live_blocks.follow(self, fresh)
         self.take_over()

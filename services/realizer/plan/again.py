@@ -16,6 +16,7 @@ from engage_hri.services.realizer.plan.stops import as_run
 
 def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
     """A plan of a block as if the behaviors that are gone had never been written. Raises BlockRefused."""
+    known = _still_untied(so_far, known)
     plan = plan_block(
         so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=_chosen(so_far, known)
     )
@@ -27,6 +28,7 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
 
     A motion that takes another time is no reason for that: blocks that plan with each other would never agree.
     """
+    known = _still_untied(so_far, known)
     try:
         plan = plan_block(
             so_far.block, estimates, dropped=gone, known=known, barred=_chosen(so_far, known), turns=so_far.turns
@@ -40,3 +42,8 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
 def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:
     """Hands that are not to be chosen: blocks that came later were planned around the arms that this one uses."""
     return {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
+
+
+def _still_untied(so_far: Plan, known: Known) -> Known:
+    """Knowledge with the ties that were given up: others were planned with that in mind."""
+    return replace(known, untied=known.untied | so_far.untied) if so_far.untied else known

@@ -235,20 +235,20 @@ class Assembler:
             self.bounds.append(Bound("order", source, target, seconds, lines=lines))
 
     def _series(self) -> None:
-        """Put a behavior of which nobody says when it comes after the previous of its type (thesis 4.5.2).
+        """Put a behavior of which nobody says when it comes after the previous of its series (thesis 4.5.2).
 
         Nothing waits for it. Speeches share a voice: each follows those before it, whatever is said about them.
         """
         sharing = self._speak_in_turn()
         previous: dict[str, Chain] = {}
         for id, chain in self.chains.items():
-            before = previous.get(chain.type)
-            previous[chain.type] = chain
+            series = TYPES[chain.type].series
+            before = previous.get(series)
+            previous[series] = chain
             is_placed = id in self.relations.placed or id in sharing or id in self.arrangement.begun
             if before is None or is_placed or performer(chain.behavior) == "recognition":
                 continue
-            other = before.behavior.id
-            sync, seconds = "end", 0.0
+            other, sync, seconds = before.behavior.id, "end", 0.0
             if other in self.arrangement.natural:
                 # The previous one lasts until this one takes over, which is as soon as the previous is on target.
                 sync = "stroke"

@@ -211,8 +211,15 @@ def _explained(circle: Circle, case: _Case, lost: str, turn: Turn | None) -> tup
     told = lacks.told(spelling) if lacks else ""
     if turn is not None and turn[1].behavior in chains:
         has = _in_the_way(turn, lost, chains, None, spelling)
-        told = f"{has}, and {told}" if told else f"{has}: "
-        return f"cannot be on time: {told}{way}", _instead(turn, lost, chains, spelling), 0
+        if lacks is None or lacks.amount == "wrong order":
+            # The turn says the order already: what remains is why its behaviors come when they do.
+            others = tuple([each for each in circle if each[0].kind != "series" or turn[0] != each[0].behavior])
+            return (
+                f"cannot be on time: {has}: {way_round(net, others, spelling=spelling)}",
+                _instead(turn, lost, chains, spelling),
+                0,
+            )
+        return f"cannot be on time: {has}, and {told}{way}", _instead(turn, lost, chains, spelling), 0
     said = {line for point in (lacks.since, lacks.to) for line in lines.get(point, ())} if lacks else set()
     own = chains[lost].behavior.line
     line = 0 if own in said else min(said, default=0)

@@ -108,6 +108,22 @@ def losses_to_others(
     return [found[id] for id in chains if id in found]
 
 
+def ties_within_turns(
+    impossible: Impossible, assembly: Assembly, turns: Iterable[Turn], named: Container[Point]
+) -> set[Point]:
+    """Points of other blocks to which who waits for a part of them is tied, so that it would wait for itself.
+
+    Where a time of the block is fixed besides, the tie is not to blame.
+    """
+    ends = {(assembly.at[point], assembly.at[Point(id, "start")]): (id, point) for id, point in turns}
+    found = set[Point]()
+    for circle in impossible.circles:
+        here = {end for tie, _ in circle for end in (tie.source, tie.target)}
+        if (turn := _turn(circle, ends)) is not None and is_foreign(turn[1].behavior) and 0 not in here:
+            found.update(point for end in here for point in assembly.net.transitions[end].points if point in named)
+    return {point for point in found if is_foreign(point.behavior)}
+
+
 def _turn(circle: Circle, ends: Mapping[tuple[int, int], Turn]) -> Turn | None:
     series = ((tie.source, tie.target) for tie, _ in circle if tie.kind == "series")
     return next((ends[each] for each in series if each in ends), None)

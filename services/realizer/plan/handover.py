@@ -128,7 +128,7 @@ def arrange(
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
             continue
-        if chain.type == "speech" and is_tied(chains[successor], chain, classes):
+        if False:
             continue
         first = _first_after(chain, times[Point(successor, "start")], times)
         is_natural = id in before.natural

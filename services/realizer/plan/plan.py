@@ -34,6 +34,7 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     natural: behaviors that end when something takes their place, or with the block.
     waited_for: behaviors that the end of the block waits for. given_up: for each speech that lacks a time it should
     have, what the block said, with the warning.
+    untied: points of other blocks that are not waited for, though the block names them: there is no time for it.
     relations: what the block says of these behaviors. broken: what of that the plan cannot keep, since times are
     fixed, or another block has passed a point already.
     constrained: points that something waits for, or that are timed.
@@ -58,6 +59,7 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     rounds: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
     holders: Mapping[str, tuple[str, ...]] = {}
+    untied: frozenset[Point] = frozenset()
     broken: tuple[Broken, ...] = ()
     constrained: frozenset[Point] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}

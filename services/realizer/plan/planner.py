@@ -91,27 +91,21 @@ class _Planner:
     ) -> None:
         self.block = block
         self.known = known
-        self.doubted: set[Point] = set()
-        """Points of other blocks that are not planned for when they are expected: something else leaves no time."""
-        self.untied: set[Point] = set(known.untied)
-        """Points of other blocks to which nothing is tied any more: they are expected too late for fixed times."""
-        self.early: frozenset[tuple[str, str]] = frozenset()
-        """Lasting behaviors, and those that they do not last for; see `Arrangement`."""
+        self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
+        self.untied: set[Point] = set(known.untied)  # see `Plan`
+        self.early: frozenset[tuple[str, str]] = frozenset()  # see `Arrangement`
         self.waived: set[tuple[Point, Point]] = set()
         """Points of this block, each with one of another, that are waited for in a circle whatever is planned."""
         self.spelling = Spelling(block, known.blocks)
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
-        self.dropped = dict.fromkeys(dropped)
-        """Behaviors, in the order in which they were dropped; the values mean nothing."""
+        self.dropped = dict.fromkeys(dropped)  # in the order in which they were dropped; the values mean nothing
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
-        self.given_up: dict[str, dict[str, Problem]] = {}
-        """Speeches without some of their times: what the block said of these, and the warnings."""
-        self.given: frozenset[Turn] = frozenset()
-        """Turns to begin with."""
-        self.turns = self.given
+        self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
+        self.turns: frozenset[Turn] = frozen()
+        self.given = self.turns  # turns to begin with
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.parts = PartOrder()
         self.hands: dict[str, Hand] = {}
@@ -316,6 +310,7 @@ class _Planner:
             },
             rounds={id: rounds[chain.points[0]] for id, chain in self.chains.items()},
             relations=present,
+            untied=frozen(self.untied),
             constrained=present.constrained,
             successors=arrangement.successors,
             takes=arrangement.takes,
@@ -363,6 +358,11 @@ class _Planner:
                 raise Misordered from None
             if self.order.refute(impossible.circles, assembly.net):
                 self.parts.begin_anew()
+                raise Misordered from None
+            if tied := foresight.ties_within_turns(
+                impossible, assembly, arrangement.turns, self.relations.constrained
+            ).difference(self.untied):
+                self.untied |= tied
                 raise Misordered from None
             if taken := foresight.losses_to_others(
                 impossible, assembly, arrangement.turns, self.chains, self.known, self.spelling

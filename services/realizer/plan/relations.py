@@ -20,6 +20,7 @@ from engage_hri.schemas.behaviors import (
     Synchronize,
     Unknown,
     Wait,
+    is_empty,
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -72,6 +73,8 @@ class Order(Struct, frozen=True, gc=False):
     placed: str = ""
 
 
+EMPTY = "has nothing in it that says what to show; it moves nothing"
+"""What is told of a face or posture that names nothing."""
 DROPPED = "; the behavior is dropped"
 """End of the message of a problem that costs a behavior, but for an advice."""
 
@@ -263,7 +266,7 @@ class _Reader:
 
     def _relate(self, operator: Synchronize | Before | After, terms: dict[str, Term]) -> None:
         if isinstance(operator, Synchronize):
-            if terms:
+            if len(terms) > 1:  # one alone says nothing
                 self.equals.append(Equal(tuple(terms.values())))
             return
         ref = terms.get(operator.ref)
@@ -314,9 +317,15 @@ class _Reader:
             for behavior in self.block.behaviors
             if isinstance(behavior, Wait)
             and behavior.duration is None
+            and behavior.id not in self.unusable
             and Point(behavior.id, "end") not in found.held
         )
-        return replace(found, problems=found.problems + endless)
+        empty = tuple(
+            Problem("PARSING_FAILURE", at_line(behavior.line, f"{type_name(behavior)} {EMPTY}"), behavior.id)
+            for behavior in self.block.behaviors
+            if is_empty(behavior) and behavior.id not in self.unusable
+        )
+        return replace(found, problems=found.problems + endless + empty)
 
 
 def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:

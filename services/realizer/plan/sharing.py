@@ -209,7 +209,15 @@ class _Sharing:
         kept = holder.kept | self.named
         is_asked = id in self.mentioned
         last = last_kept(holder.chain, self.chains[id], first, kept, is_natural=holder.is_natural, is_asked=is_asked)
-        return None if last is None else holder.chain.points[last]
+        if last is None or self._lies_beneath(holder.chain.points[last], id):
+            return None
+        return holder.chain.points[last]
+
+    def _lies_beneath(self, point: Point, id: str) -> bool:
+        """True for the end of a shift that waits for the look which is to begin over it: then it lies beneath."""
+        chain = self.known.holders[point.behavior].chain
+        awaited = self.known.awaiting.get(point, {})
+        return is_overlaid(chain, self.chains[id]) and any(each.behavior == id for each in awaited)
 
     def _still_needed(self, id: str, holder: Holder, first: int | None) -> Point | None:
         """A point that comes before a behavior of this block by plan, but which may turn out slow.

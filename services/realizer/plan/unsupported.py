@@ -8,9 +8,14 @@ from engage_hri.schemas.vocabulary import unperformed
 
 
 def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
-    """Kind and reason of the warning about a behavior of a type that nobody here knows."""
+    """Kind and reason of the warning about a behavior that nobody here knows, or that does not say what to do."""
     if behavior.namespace:
         return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"<{behavior.element}> is of namespace {behavior.namespace!r}"
+    if behavior.lacks:
+        return (
+            "CANNOT_CREATE_BEHAVIOR",
+            f"<{behavior.element}> has no {behavior.lacks}, so there is nothing to perform",
+        )
     return "BEHAVIOR_TYPE_NOT_SUPPORTED", unperformed(behavior.element)
 
 
