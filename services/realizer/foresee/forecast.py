@@ -68,12 +68,12 @@ class Forecast(LongestPaths):
             for bound in net.bounds
             if bound.kind == "phase"
         }
-        unkept = {(plan.at.get(each.late), plan.at.get(each.early)) for each in plan.broken}
+        unkept = {(plan.at.get(each.late), plan.at.get(each.early)): each.seconds for each in plan.broken}
         for bound in net.bounds:
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
             arc = self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
-            if (bound.source, bound.target) in unkept:
+            if unkept.get((bound.source, bound.target), 0.0) > bound.stopped + EPSILON:
                 self._unkept.add(arc)
             if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag + bound.stopped:
                 self._bent.add(arc)
