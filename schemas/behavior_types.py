@@ -120,6 +120,8 @@ ROWS = (
 )  # fmt: skip
 """All types, in the order of the table in docs/control.md."""
 TYPES: Mapping[str, BehaviorType] = {row.name: row for row in ROWS}
+SERIES: Mapping[str, str] = {row.name: row.series for row in ROWS}
+"""Name of the series of each type: untimed behaviors of one come one after the other."""
 
 
 def types_with(**features: object) -> frozenset[str]:

@@ -8,7 +8,7 @@ from operator import or_
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import TYPES
+from engage_hri.schemas.behavior_types import SERIES, TYPES
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.plan.cycles import components
@@ -242,7 +242,7 @@ class Assembler:
         sharing = self._speak_in_turn()
         previous: dict[str, Chain] = {}
         for id, chain in self.chains.items():
-            series = TYPES[chain.type].series
+            series = SERIES[chain.type]
             before = previous.get(series)
             previous[series] = chain
             is_placed = id in self.relations.placed or id in sharing or id in self.arrangement.begun

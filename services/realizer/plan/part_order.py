@@ -30,17 +30,16 @@ class PartOrder:
 
         impossible: waits for which there is no time. begun: behaviors that have their parts already.
         """
-        for waiter, point in sorted(impossible):
+        found = [each for each in impossible if each[0] in chains and chains[each[0]].type != "speech"]
+        for waiter, point in sorted(found):
             pair = frozenset((waiter, point.behavior))
-            if pair in self._tried or not pair <= chains.keys() or any(id in begun for id in pair):
-                continue
-            if any(chains[id].type == "speech" for id in pair):
+            if pair in self._tried or point.behavior not in chains or any(id in begun for id in pair):
                 continue
             self._tried.add(pair)
             last = chains[waiter].points[least(chains[waiter])]
             self.turns |= {(point.behavior, last)}
             return True
-        if impossible and self.turns:
+        if found and self.turns:
             self.turns = frozenset()
             return True
         return False

@@ -266,7 +266,7 @@ class _Reader:
 
     def _relate(self, operator: Synchronize | Before | After, terms: dict[str, Term]) -> None:
         if isinstance(operator, Synchronize):
-            if len(terms) > 1:  # one alone says nothing
+            if terms:
                 self.equals.append(Equal(tuple(terms.values())))
             return
         ref = terms.get(operator.ref)
