@@ -93,6 +93,14 @@ def performer(behavior: Behavior) -> Performer:
     return TYPES[type_name(behavior)].performer
 
 
+def stands_soon(behavior: Behavior) -> bool:
+    """True if it stands soon once it is held: a voice between two words, a clock at once.
+
+    A movement goes on to where it can wait.
+    """
+    return isinstance(behavior, Speech) or performer(behavior) != "body"
+
+
 def family(type: str) -> str:
     """Name that is common to types that take each other's place: a later gaze takes over from an earlier one."""
     return TYPES[type].family or type

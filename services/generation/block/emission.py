@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.behavior_types import TYPES
+from engage_hri.schemas.behavior_types import SERIES, TYPES
 from engage_hri.schemas.behaviors import (
     Action,
     After,
@@ -177,7 +177,7 @@ class Emission:
         for behavior in self.kept:
             if isinstance(behavior, Reference):
                 continue
-            is_first = (series := TYPES[type_name(behavior)].series) not in begun
+            is_first = (series := SERIES[type_name(behavior)]) not in begun
             begun.add(series)
             if (made := stroke(behavior, self.permits.only_hand)) is not None:
                 self.strokes.append(made)

@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 
-from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.held_up import HeldUp
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.stops import Stops
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.points import ORIGIN, Point, performer
+from engage_hri.services.realizer.points import ORIGIN, Point, stands_soon
 
 
 def stopped(plan: Plan, facts: Facts, held_up: HeldUp, times: Mapping[Point, Seconds], now: Seconds) -> Stops:
@@ -35,7 +34,7 @@ def _stood(plan: Plan, facts: Facts, now: Seconds) -> Iterator[tuple[Point, Seco
     for behavior in facts.begun:
         if (chain := plan.chains.get(behavior)) is None:
             continue
-        stands = isinstance(chain.behavior, Speech) or performer(chain.behavior) != "body"
+        stands = stands_soon(chain.behavior)
         for before, point in zip(chain.points, chain.points[1 : facts.next_number(behavior) + 1], strict=False):
             until = facts.reached.get(point, now)
             if stands:

@@ -10,7 +10,6 @@ from itertools import pairwise
 from math import inf
 from typing import Any
 
-from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.experience import SHORT, Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast
@@ -21,7 +20,7 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import slack
-from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer, stands_soon
 
 SURPRISE: Seconds = 0.008
 """Difference from the expected time, in seconds, from which predictions are computed again."""
@@ -146,7 +145,7 @@ class Foresight(Observer):
         """
         number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
         before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
-        stands = isinstance(chain.behavior, Speech) or performer(chain.behavior) != "body"
+        stands = stands_soon(chain.behavior)
         stood = self._facts.stood_between(before, now, behavior) if stands else 0.0
         at = before + self._phase(behavior, number) + stood
         return self.plan.at[point], now if self._facts.holds(point) else max(now, at)

@@ -18,7 +18,6 @@ from engage_hri.services.realizer.plan.handover import is_overlaid
 from engage_hri.services.realizer.plan.known import Known, at_home, block_of, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
-from engage_hri.services.realizer.plan.stops import Begun
 from engage_hri.services.realizer.points import EPSILON, Point, frozen
 
 MOST_PLANS = 20
@@ -208,7 +207,8 @@ class Ties:
             holders={id: each for id, each in found.holders.items() if id not in self.vanished},
             given={id: point for id, point in self.given.items() if point not in decisions.facts.reached},
             kept=frozenset(self._live_blocks.named(plan.block.id)),
-            begun=Begun(begun, decisions.stops(now)),
+            begun=frozenset(begun),
+            stops=decisions.stops(now),
             untied=found.untied | self._missed,
             due={behavior for (behavior, _), at in self._met.items() if at >= now - EPSILON},
         )

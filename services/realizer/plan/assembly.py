@@ -375,7 +375,7 @@ class Assembler:
         number = {old: new for new, old in enumerate(ranked)}
         at = {point: number[each] for point, each in self.at.items()}
         members = tuple([self.members[each] if each < self.size else () for each in ranked])
-        return Assembly(prolonged(net, members, self.chains, self.arrangement.begun), is_ordered, at, members)
+        return Assembly(prolonged(net, members, self.chains, self.arrangement.stops), is_ordered, at, members)
 
     def circles(self) -> Steps[list[list[Point]]]:
         """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""

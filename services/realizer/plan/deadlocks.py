@@ -17,6 +17,7 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Impossible
 from engage_hri.services.realizer.plan.relations import BlockRefused, Order, Relations
 from engage_hri.services.realizer.plan.steps import Steps
+from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import (
     AS_IN_DRAFTS,
     Spelling,
@@ -138,7 +139,7 @@ def judge(
     yield len(relations.equals) // 2
     case = _Case(net, chains, lines_by_point(relations), spelling)
     rank = {id: number for number, id in enumerate(chains) if id not in relations.required}
-    ends = {(assembly.at[turn[1]], assembly.at[Point(turn[0], "start")]): turn for turn in sorted(turns)}
+    ends = by_ends(turns, assembly.at)
     found = []
     for circle in impossible.circles:
         found.append((_loss(circle, case, rank, ends), circle))
@@ -183,8 +184,7 @@ def _loss(circle: Circle, case: _Case, rank: Mapping[str, int], turns: Mapping[t
     """
     net, chains = case.net, case.chains
     ties = [tie for tie, _ in circle]
-    series = ((tie.source, tie.target) for tie in ties if tie.kind == "series")
-    turn = next((turns[ends] for ends in series if ends in turns), None)
+    turn = next(turns_in(turns, circle), None)
     slow = {tie.behavior for tie in ties if isinstance(tie, Place) and tie.kind == "phase"}
     quick = {tie.behavior for tie in ties if isinstance(tie, Bound) and tie.kind == "phase"}
     touched = _touched(circle, net)

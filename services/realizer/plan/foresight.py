@@ -11,8 +11,9 @@ from engage_hri.services.realizer.plan.deadlocks import Loss
 from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known, block_of, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Awaited, Circle, Foresight, Impossible
+from engage_hri.services.realizer.plan.prediction import Awaited, Foresight, Impossible
 from engage_hri.services.realizer.plan.sharing import Waits
+from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling, other_part, taken
 from engage_hri.services.realizer.points import EPSILON, Point
 
@@ -95,10 +96,10 @@ def losses_to_others(
 
     A speech gives up its times before it is lost: it may wait until the other has the voice no more.
     """
-    ends = {(assembly.at[point], assembly.at[Point(id, "start")]): (id, point) for id, point in turns}
+    ends = by_ends(turns, assembly.at)
     found = {}
     for circle in impossible.circles:
-        if (turn := _turn(circle, ends)) is not None and is_foreign(turn[1].behavior):
+        if (turn := next(turns_in(ends, circle), None)) is not None and is_foreign(turn[1].behavior):
             ends_of_ties = {end for tie, _ in circle for end in (tie.source, tie.target)}
             among = frozenset(point for end in ends_of_ties for point in assembly.net.transitions[end].points)
             chain = chains[turn[0]]
@@ -115,18 +116,17 @@ def ties_within_turns(
 
     Where a time of the block is fixed besides, the tie is not to blame.
     """
-    ends = {(assembly.at[point], assembly.at[Point(id, "start")]): (id, point) for id, point in turns}
+    ends = by_ends(turns, assembly.at)
     found = set[Point]()
     for circle in impossible.circles:
         here = {end for tie, _ in circle for end in (tie.source, tie.target)}
-        if (turn := _turn(circle, ends)) is not None and is_foreign(turn[1].behavior) and 0 not in here:
+        if (
+            (turn := next(turns_in(ends, circle), None)) is not None
+            and is_foreign(turn[1].behavior)
+            and 0 not in here
+        ):
             found.update(point for end in here for point in assembly.net.transitions[end].points if point in named)
     return {point for point in found if is_foreign(point.behavior)}
-
-
-def _turn(circle: Circle, ends: Mapping[tuple[int, int], Turn]) -> Turn | None:
-    series = ((tie.source, tie.target) for tie, _ in circle if tie.kind == "series")
-    return next((ends[each] for each in series if each in ends), None)
 
 
 def _taken(turn: Turn, chains: Mapping[str, Chain], known: Known, spelling: Spelling) -> tuple[str, str]:

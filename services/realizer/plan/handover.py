@@ -14,6 +14,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import ARMS, Chain
 from engage_hri.services.realizer.plan.relations import Relations
@@ -59,6 +60,7 @@ class Arrangement(Struct, frozen=True):
     takes: behaviors of other blocks, by `block:behavior`, of which one of this block takes a part over.
     ranked: behaviors in the order in which they take their parts. Of those that begin at one instant it is kept: by a
     handover the later waits for one more event, which is no reason to come first or last.
+    stops: what holds have stopped of those that have begun.
     """
 
     natural: frozenset[str] = frozenset()
@@ -72,6 +74,7 @@ class Arrangement(Struct, frozen=True):
     spoken: tuple[str, ...] = ()
     takes: Mapping[str, str] = {}
     ranked: tuple[str, ...] = ()
+    stops: Stops = NO_STOPS
 
     @property
     def waits(self) -> frozenset[Turn]:
@@ -92,7 +95,6 @@ class Conflict(NamedTuple):
 def arrange(
     chains: Mapping[str, Chain],
     relations: Relations,
-    classes: Classes,
     before: Arrangement,
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
@@ -127,8 +129,6 @@ def arrange(
         if before.successors.get(successor, ("",))[0] == id and id not in begun:
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
-            continue
-        if False:
             continue
         first = _first_after(chain, times[Point(successor, "start")], times)
         is_natural = id in before.natural
@@ -259,7 +259,7 @@ def leaving(chain: Chain) -> int:
 def is_tied(later: Chain, speech: Chain, classes: Classes) -> bool:
     """True if the block itself says that `later` begins while the speech is spoken, or after it, not before.
 
-    The voice decides about that.
+    Then nothing else puts it in turn; where the two would overlap, it gives up that tie.
     """
     root, begins = classes.find(later.points[0])
     first, spoken = classes.find(speech.points[0])

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Elsewhere
 from engage_hri.services.realizer.points import EPSILON, Point
@@ -39,7 +40,8 @@ class Known(Struct, frozen=True, kw_only=True):
     have their parts.
     given: behaviors of this block that hand their parts over to another block by plan, and the start of the one there
     that takes them. kept: points of this block that other blocks wait for. begun: behaviors of this block that have
-    begun; they wait for nobody any more. due: those that would begin now, but for a behavior of another block.
+    begun; they wait for nobody any more. stops: what holds have stopped of these.
+    due: those that would begin now, but for a behavior of another block.
     untied: points of others to which nothing is to be tied: these wait for this block by now.
     awaiting: points of others that come only after points of this block, each with those, and the seconds from there
     at least. The end of the block is `BLOCK_END`. lost: points of others that are named and never come.
@@ -51,6 +53,7 @@ class Known(Struct, frozen=True, kw_only=True):
     given: Mapping[str, Point] = {}
     kept: Set[Point] = frozenset()
     begun: frozenset[str] = frozenset()
+    stops: Stops = NO_STOPS
     due: Set[str] = frozenset()
     untied: Set[Point] = frozenset()
     awaiting: Mapping[Point, Mapping[Point, Seconds]] = {}

@@ -1,12 +1,9 @@
 """The order in which behaviors of a block have a part: of two that cannot be in one order, the other is tried."""
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
-from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.handover import Turn, least
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Circle
-from engage_hri.services.realizer.points import Point
 
 
 class PartOrder:
@@ -43,15 +40,3 @@ class PartOrder:
             self.turns = frozenset()
             return True
         return False
-
-
-def turns_in(circles: Iterable[Circle], assembly: Assembly, turns: Iterable[Turn]) -> list[Turn]:
-    """The turns that these circles of ties go through."""
-    at = assembly.at
-    ends = {
-        (at[point], at[start]): (waiter, point)
-        for waiter, point in turns
-        if point in at and (start := Point(waiter, "start")) in at
-    }
-    ties = [(tie.source, tie.target) for circle in circles for tie, _ in circle if tie.kind == "series"]
-    return [ends[each] for each in ties if each in ends]

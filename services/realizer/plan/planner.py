@@ -23,7 +23,7 @@ from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
-from engage_hri.services.realizer.plan.part_order import PartOrder, turns_in
+from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
@@ -43,6 +43,7 @@ from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder, may_speak_at_once
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
+from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
@@ -94,8 +95,7 @@ class _Planner:
         self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
         self.untied: set[Point] = set(known.untied)  # see `Plan`
         self.early: frozenset[tuple[str, str]] = frozenset()  # see `Arrangement`
-        self.waived: set[tuple[Point, Point]] = set()
-        """Points of this block, each with one of another, that are waited for in a circle whatever is planned."""
+        self.waived: set[tuple[Point, Point]] = set()  # own and other, that wait for each other whatever is planned
         self.spelling = Spelling(block, known.blocks)
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
@@ -104,8 +104,7 @@ class _Planner:
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
-        self.turns: frozenset[Turn] = frozen()
-        self.given = self.turns  # turns to begin with
+        self.turns = self.given = frozenset[Turn]()  # `given`: turns to begin with
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.parts = PartOrder()
         self.hands: dict[str, Hand] = {}
@@ -251,7 +250,7 @@ class _Planner:
         natural = natural_ends(self.chains, present)
         waited_for = frozenset(self.chains) - unawaited_events(self.chains, present)
         self.turns = frozen(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
-        arranged_anew = partial(Arrangement, natural, self.known.begun, early=self.early)
+        arranged_anew = partial(Arrangement, natural, self.known.begun, early=self.early, stops=self.known.stops)
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
@@ -267,7 +266,7 @@ class _Planner:
             rounds = assembly.rounds(solution.times)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, classes, arrangement, everywhere, rounds, self.barred, given, self.known.begun
+                self.chains, present, arrangement, everywhere, rounds, self.barred, given, self.known.begun
             )
             undated = foresight.without_date(assembly, self.known) if given else ()
             waits = foresight.waits(assembly, self.known)
@@ -354,7 +353,8 @@ class _Planner:
             return assembler, assembly, solution
         except Impossible as impossible:
             turns = self.turns | arrangement.waits
-            if self.parts.change(turns_in(impossible.circles, assembly, turns), self.chains, self.known.begun):
+            waits = list(turns_in(by_ends(turns, assembly.at), *impossible.circles))
+            if self.parts.change(waits, self.chains, self.known.begun):
                 raise Misordered from None
             if self.order.refute(impossible.circles, assembly.net):
                 self.parts.begin_anew()
@@ -378,8 +378,8 @@ class _Planner:
                 if foreign := {point for point in late if is_foreign(point.behavior)}:
                     self.untied |= foreign
                     raise Misordered from None
-            elif waits := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
-                assembler.waive(waits)
+            elif idle := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
+                assembler.waive(idle)
             else:
                 present, turns = assembler.relations, turns | self.order.turns
                 raise (

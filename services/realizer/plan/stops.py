@@ -5,39 +5,23 @@ all that follows from it, is later by that much. A constraint that a hold has ma
 performance: it is late for the hold.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
-from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
+from engage_hri.services.realizer.net.stops import Stops
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.points import ORIGIN, Member, Point
 
 
-class Begun(frozenset[str]):
-    """Behaviors of a block that have begun, and for how long what was under way has been stopped."""
-
-    stops: Stops
-
-    def __new__(cls, behaviors: Iterable[str] = (), stops: Stops = NO_STOPS) -> "Begun":
-        made = super().__new__(cls, behaviors)
-        made.stops = stops
-        return made
-
-
-def stops_of(begun: frozenset[str]) -> Stops:
-    """Stops that come with what has begun."""
-    return begun.stops if isinstance(begun, Begun) else NO_STOPS
-
-
 def prolonged(
-    net: PetriNet, members: Sequence[Sequence[Member]], chains: Mapping[str, Chain], begun: frozenset[str]
+    net: PetriNet, members: Sequence[Sequence[Member]], chains: Mapping[str, Chain], stops: Stops
 ) -> PetriNet:
     """The net with all in it as long as it takes, since it has been stopped. members: of each transition."""
-    if not (stops := stops_of(begun)).holds:
+    if not stops.holds:
         return net
     made = _Stopped(stops, net, members, chains)
     places = tuple([_longer(each, made.of_place(each)) for each in net.places])
