@@ -26,20 +26,21 @@ def customs(case: Case) -> Iterator[Finding]:
     for id, block in case.blocks.items():
         if case.record.status(id) != "done":
             continue
-        left = _without_the_lost(case, block)
         done = {
             each.asked.id: each for each in case.done if each.block == id and (id, each.asked.id) not in case.lost
         }
         for each in done.values():
             if each.asked.type == "wait" and not _is_named(block, each.asked, "end"):
                 yield from _length(case, each)
-            if each.asked.type in LASTING and not _is_named(left, each.asked, *LEAVING):
-                yield from _lasts(case, left, each, done)
+            if each.asked.type in LASTING and (relaxed := each.time("relax")) is not None:
+                left = _without_the_lost(case, block, relaxed)
+                if not _is_named(left, each.asked, *LEAVING):
+                    yield from _lasts(case, left, each, relaxed, done)
         yield from _rows(block, done)
 
 
-def _without_the_lost(case: Case, block: Reading) -> Reading:
-    """The block without what was lost before it was there, as if that had never been written.
+def _without_the_lost(case: Case, block: Reading, by: float) -> Reading:
+    """The block without what was lost by then, before it was there, as if that had never been written.
 
     What was one instant with a point that is lost stays tied to what else was, by docs/realizer.md; but what a lost
     behavior says of itself is lost with it.
@@ -47,7 +48,7 @@ def _without_the_lost(case: Case, block: Reading) -> Reading:
     relations = []
     tied: dict[Place, list[Term]] = {}
     for each in block.relations:
-        gone = [term for term in each.terms if _is_gone(case, term)]
+        gone = [term for term in each.terms if _is_gone(case, term, by)]
         if any(term.place[:2] == (block.id, each.own) for term in gone):
             continue
         left = tuple(term for term in each.terms if term not in gone)
@@ -65,8 +66,11 @@ def _without_the_lost(case: Case, block: Reading) -> Reading:
     return replace(block, relations=tuple(relations))
 
 
-def _is_gone(case: Case, term: Term) -> bool:
-    return (term.place.block, term.place.behavior) in case.lost and term.place not in case.times
+def _is_gone(case: Case, term: Term, by: float) -> bool:
+    block, behavior = term.place[:2]
+    told = [each.at.seconds for each in case.record.warnings(block) if each.behavior == behavior and each.at]
+    is_lost = (block, behavior) in case.lost and term.place not in case.times
+    return is_lost and not (told and max(told) > by + EXACT)
 
 
 def _length(case: Case, done: Done) -> Iterator[Finding]:
@@ -81,10 +85,9 @@ def _length(case: Case, done: Done) -> Iterator[Finding]:
         yield Finding("wrong length", done.block, text, done.asked.id)
 
 
-def _lasts(case: Case, block: Reading, one: Done, done: dict[str, Done]) -> Iterator[Finding]:
+def _lasts(case: Case, block: Reading, one: Done, left: float, done: dict[str, Done]) -> Iterator[Finding]:
     """A look whose end is left open ends with all else in the block, or where the next of its kind starts."""
-    left, begun = one.time("relax"), one.time("start")
-    if left is None or begun is None:
+    if (begun := one.time("start")) is None:
         return
     family = next(family for family in FAMILIES if one.asked.type in family)
     takers = [

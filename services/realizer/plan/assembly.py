@@ -286,8 +286,8 @@ class Assembler:
             self._follow(Point(successor, "start"), point, behavior=id, kind=kind)
         others = [id for id in self.chains if id in self.waited_for and id not in self.arrangement.natural]
         for id in self.arrangement.lasting:
-            for other in [each for each in others if (id, each) not in self.arrangement.early]:
-                self._follow(self.chains[other].points[-1], Point(id, "relax"), behavior=id)
+            for last in filter(None, [self.arrangement.lasts_for(id, self.chains[other]) for other in others]):
+                self._follow(last, Point(id, "relax"), behavior=id)
 
     def _follow(
         self,

@@ -44,17 +44,19 @@ def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Poi
                 yield Awaited("order", source, target, lag, lag, pair=(own, foreign))
 
 
-def lasting_for_ever(impossible: Impossible, assembly: Assembly, lasting: Iterable[str]) -> set[tuple[str, str]]:
-    """Behaviors that last until another has ended that waits, through another block, until they have left."""
+def lasting_for_ever(impossible: Impossible, assembly: Assembly, lasting: Iterable[str]) -> set[tuple[str, Point]]:
+    """Behaviors that last for a point of another that waits, through another block, until they have left."""
     targets = {assembly.at[Point(id, "relax")]: id for id in lasting}
     found = set()
     for circle in impossible.circles:
         ties = [tie for tie, _ in circle]
         if any(isinstance(tie, Awaited) for tie in ties):
             found |= {
-                (id, tie.after)
+                (id, point)
                 for tie in ties
                 if isinstance(tie, Place) and tie.after and (id := targets.get(tie.target)) and tie.behavior == id
+                for point in assembly.net.transitions[tie.source].points
+                if point.behavior == tie.after
             }
     return found
 

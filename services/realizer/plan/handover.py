@@ -49,8 +49,8 @@ class Arrangement(Struct, frozen=True):
     """Order in which behaviors use parts of the body.
 
     natural: behaviors that end when something takes their place, or with the block; lasting: those with the block.
-    begun: behaviors that have begun, and come after nothing any more. early: lasting behaviors, each with one of the
-    block that it does not last for: that waits, through another block, until it has left.
+    begun: behaviors that have begun, and come after nothing any more. early: lasting behaviors, each with a point of
+    the block that it does not last for: that waits, through another block, until it has left.
     successors: for a behavior, the one that takes its part, and the first of its points that this brings about.
     handovers: for each behavior whose parts others take some time, the next on each part, and what it leaves to it.
     The first of these ends it; the others wait for it, too, or a slow one would lose its stroke to them.
@@ -66,7 +66,7 @@ class Arrangement(Struct, frozen=True):
     natural: frozenset[str] = frozenset()
     begun: frozenset[str] = frozenset()
     lasting: tuple[str, ...] = ()
-    early: frozenset[tuple[str, str]] = frozenset()
+    early: frozenset[tuple[str, Point]] = frozenset()
     successors: Mapping[str, tuple[str, Point]] = {}
     handovers: Mapping[str, tuple[Handover, ...]] = {}
     cuts: Mapping[str, int] = {}
@@ -75,6 +75,10 @@ class Arrangement(Struct, frozen=True):
     takes: Mapping[str, str] = {}
     ranked: tuple[str, ...] = ()
     stops: Stops = NO_STOPS
+
+    def lasts_for(self, id: str, other: Chain) -> Point | None:
+        """The last point of another behavior that a lasting one waits for before it leaves; None: for none."""
+        return next((point for point in reversed(other.points) if (id, point) not in self.early), None)
 
     @property
     def waits(self) -> frozenset[Turn]:

@@ -94,7 +94,7 @@ class _Planner:
         self.known = known
         self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
         self.untied: set[Point] = set(known.untied)  # see `Plan`
-        self.early: frozenset[tuple[str, str]] = frozenset()  # see `Arrangement`
+        self.early: frozenset[tuple[str, Point]] = frozenset()  # see `Arrangement`
         self.waived: set[tuple[Point, Point]] = set()  # own and other, that wait for each other whatever is planned
         self.spelling = Spelling(block, known.blocks)
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
