@@ -10,6 +10,7 @@ from math import inf
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.longest_paths import FINEST, Arc, Circle, LongestPaths
 from engage_hri.services.realizer.net.petri_net import order
+from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 
@@ -47,6 +48,8 @@ class Forecast(LongestPaths):
         self._broken: set[int] = set()
         self._unkept: set[int] = set()
         """Bounds that the plan does not keep."""
+        self._as_others: set[int] = set()
+        """Bounds that keep who is left of an instant no later than the others have passed it."""
         self._bent: set[int] = set()
         """Phases that the plan makes shorter, and the bounds of those that it makes longer, than is natural."""
         for rank, transition in enumerate(order(net) or range(size)):
@@ -154,6 +157,7 @@ class Forecast(LongestPaths):
             self._moved.setdefault((transition, self._arcs[each].target), []).append(each)
             self._start_from(self._new_node(), each, at)
         number = self._phase_from.get((behavior, transition))
+        self._stay_with(behavior, transition, at)
         if (node := self._node_of.get(behavior)) is not None:
             if number is not None and self._arcs[number].source == node:
                 return
@@ -166,6 +170,20 @@ class Forecast(LongestPaths):
         for other in self._of_behavior[behavior]:
             if self._arcs[other].target == transition:
                 self._end_at(node, other)
+
+    def _stay_with(self, behavior: str, transition: int, at: Seconds) -> None:
+        """Let no bound make the others of an instant later than this one has passed it; who is late is late.
+
+        Where one of another block has passed it, the plan says how much later the others come.
+        """
+        bounds = [self._arcs[number] for number in self._in[transition]]
+        is_kept = is_foreign(behavior) or self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
+        if not is_kept and any(arc.is_on and arc.is_bound and arc.behavior not in ("", behavior) for arc in bounds):
+            node = self._new_node()
+            self.times[node] = at
+            self._as_others.add(self._add(transition, node, 0.0, 0.0, "", is_bound=True))
+            self.require(transition)
+            self._touch(transition)
 
     def _start_from(self, node: int, number: int, at: Seconds) -> None:
         """Let an arc count from `at`, the time of a node of its own."""
@@ -333,6 +351,8 @@ class Forecast(LongestPaths):
             return
         room = {each: self._arcs[each].seconds - self._arcs[each].least for each in numbers}
         elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
+        if (as_others := next((each for each in numbers if each in self._as_others), None)) is not None:
+            elastic = [each for each in elastic if self._arcs[each].is_bound]
         boundless = [each for each in elastic if room[each] == inf]
         if boundless:
             elastic = [min(boundless, key=lambda each: (each not in self._bent, self._rank[self._arcs[each].target]))]
@@ -349,7 +369,9 @@ class Forecast(LongestPaths):
             for each in giving if share else ():
                 self._given_way.add(each)
                 self._set_seconds(each, self._arcs[each].seconds - share * room[each])
-        if not enough:
+        if not enough and as_others is not None:
+            self._break(as_others)
+        elif not enough:
             bounds = [each for each in numbers if self._arcs[each].is_bound]
             self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))
 
