@@ -21,6 +21,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.lateness import Late
 from engage_hri.services.realizer.perform.live_blocks import as_told
+from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.plan.relations import at_line
@@ -143,9 +144,7 @@ class Reporter:
     def compare(self, decisions: Decisions, point: Point) -> None:
         """Warn if a point, reached now, and those before it have not come as the block says; also one of another."""
         for broken in decisions.broken(point):
-            self._broken(
-                decisions.net.part_of[broken.point].point, broken, "came", decisions.plan, decisions.facts.reached
-            )
+            self._broken(broken, "came", decisions.plan, decisions.facts.reached)
 
     def given_up(self, plan: Plan) -> None:
         """Warn of the times that speeches give up by a new plan: once of each."""
@@ -158,18 +157,19 @@ class Reporter:
     def unkept(self, plan: Plan) -> None:
         """Warn of what the plan itself cannot keep: ties to points of other blocks that leave no time for it."""
         for broken in plan.broken:
-            part = next(
-                each for each in plan.members[plan.at[broken.point]] if each.behavior == broken.point.behavior
-            )
-            self._broken(part.point, broken, "is planned", plan, plan.times)
+            self._broken(broken, "is planned", plan, plan.times)
 
-    def _broken(self, instant: Point, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
+    def _broken(self, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
         """Warn of what is broken by more than is tolerated. times: of points that have come, or are planned."""
         if broken.seconds > self._tolerance:
-            late = broken.point.behavior if broken.direction == "later" else ""
+            point = broken.point
+            late = point.behavior if broken.direction == "later" else ""
             is_past = verb == "came"
             why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""
-            self.late(instant, broken.told(self.spelling.sync(broken.point), verb, why))
+            sync = self.spelling(point) if is_foreign(point.behavior) else self.spelling.sync(point)
+            members = plan.members[plan.at[point]] if point in plan.at else ()
+            instant = next((each.point for each in members if each.behavior == point.behavior), point)
+            self.late(instant, broken.told(sync, verb, why))
 
     def overdue(self, decisions: Decisions, late: Late) -> None:
         """Warn that a behavior takes too long. How much too late it comes in the end is told when it comes."""
@@ -180,7 +180,8 @@ class Reporter:
         """Warn that a behavior is late for an instant: once for each."""
         if instant not in self._late:
             self._late.add(instant)
-            self.warn("LATE", message, instant.behavior)
+            # What is said only of other blocks is no behavior of this one.
+            self.warn("LATE", message, "" if is_foreign(instant.behavior) else instant.behavior)
 
     def warn(self, kind: WarningKind, message: str, behavior: str = "") -> None:
         warning = WarningFeedback(

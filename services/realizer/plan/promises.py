@@ -29,9 +29,10 @@ class Broken(Struct, frozen=True):
 
     @property
     def point(self) -> Point:
-        """The one of the two that is told of: the last, but no point of another block, and not the block itself."""
-        others = (self.last, self.late, self.early)
-        return next(point for point in others if not is_foreign(point.behavior) and point != ORIGIN)
+        """The one of the two that is told of: the last, but no point of another block if one of this block is there,
+        and not the block itself."""
+        points = [point for point in (self.last, self.late, self.early) if point != ORIGIN]
+        return next((point for point in points if not is_foreign(point.behavior)), points[0])
 
     @property
     def direction(self) -> str:
@@ -110,9 +111,8 @@ class Promises:
             yield 2 * len(orders)
 
     def _take(self, said: "_Same | _Ordered", terms: tuple[Term, ...]) -> None:
-        if any(not is_foreign(term.point.behavior) and term.point != ORIGIN for term in terms):
-            for term in terms:
-                self._of[term.point] = _Link(said, term, self._of.get(term.point))
+        for term in terms:
+            self._of[term.point] = _Link(said, term, self._of.get(term.point))
 
     @property
     def points(self) -> tuple[Point, ...]:
