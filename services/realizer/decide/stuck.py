@@ -74,9 +74,12 @@ class Stuck:
         kept = [member for member in members if self._can_be_kept(member)]
         if any(self._goes_to_held(each) or self._sets_out_in_vain(each) for each in kept):
             return True
-        own = {member.behavior for member in members}
+        return bool(kept) and self._is_left_behind(transition, {member.behavior for member in members})
+
+    def _is_left_behind(self, transition: int, but: Container[str]) -> bool:
+        """True if a behavior that is stuck would be late for its fixed time before or after this instant."""
         tied = (other for each in self._tied.get(transition, ()) for other in self._plan.members[each])
-        held = [other for other in tied if other.behavior not in own and self._is_stuck(other)] if kept else []
+        held = [other for other in tied if other.behavior not in but and self._is_stuck(other)]
         return any(self._sets_out(each) <= self._plan.schedule[transition] + EPSILON for each in held)
 
     def among(self, points: Iterable[Point]) -> Set[Point]:
@@ -155,8 +158,9 @@ class Stuck:
         points = self._plan.chains[member.behavior].points
         for point in points[points.index(member.point) + 1 :]:
             here = self._plan.at[point]
-            together = (other for each in (here, *self._tied.get(here, ())) for other in self._plan.members[each])
-            if any(other.behavior != member.behavior and self._is_stuck(other) for other in together):
+            if any(other.behavior != member.behavior and self._is_stuck(other) for other in self._plan.members[here]):
+                return True
+            if self._is_left_behind(here, {member.behavior}):
                 return True
             if self._net.part_of[point].can_wait or point in self._pauses:
                 return False
