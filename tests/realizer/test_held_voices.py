@@ -54,3 +54,23 @@ async def test_a_voice_that_was_held_for_less_than_a_word_has_not_stood(since: f
     times = seen.times()
     assert times["g:stroke"].at.seconds == pytest.approx(times["s:m"].at.seconds, abs=0.02)
     assert seen.kinds() == []
+
+
+async def test_words_go_on_past_a_gap_while_what_is_held_need_not_set_out_yet() -> None:
+    words = Speech(
+        id="s", text="Good morning to all of you here and then to more.", marks=(Mark("m", 27), Mark("k", 36))
+    )
+    first = timed(Pointing(id="p", target="a", mode="LEFT_HAND"), stroke="s:m")
+    held = timed(Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND"), stroke="s:k+1")
+    async with robot(Variability()) as seen:
+        asked = seen.ask(block((words, first, held)))
+        await asyncio.sleep(1.0)
+        await steered(seen, "hold", "b", "g")
+        await asyncio.sleep(5.0)
+        times = {name: told.at.seconds for name, told in seen.times().items()}
+        await steered(seen, "continue", "b", "g")
+        await asked.outcome
+
+    assert times["s:m"] == pytest.approx(times["p:stroke"], abs=0.02)
+    assert times["s:end"] < 6.0
+    assert "g:stroke_start" not in times

@@ -103,6 +103,39 @@ async def test_an_order_with_a_point_of_another_block_that_is_past_is_told() -> 
     assert "1.50 s later than it should be: h:start <= one:s:m1" in seen.warnings()[0].message
 
 
+@pytest.mark.parametrize(
+    ("said", "ref", "way"),
+    [
+        (together("one:s:m1", "1"), "one:s:m1", "earlier"),
+        (together("one:s:end", "20"), "one:s:end", "earlier"),
+        (before("one:s:m1", "5"), "one:s:m1", "earlier"),
+        (after("one:s:end", "0"), "one:s:end", "later"),
+    ],
+)
+async def test_what_is_said_of_another_block_and_the_clock_alone_is_told_of_the_block(
+    said: object, ref: str, way: str
+) -> None:
+    tied = block((OTHER,), said, id="two")  # type: ignore[arg-type]
+    seen, outcomes = await told((0.0, block((WORDS,), id="one")), (1.5, tied))
+
+    (warning,) = seen.warnings()
+    assert (warning.block, warning.behavior, warning.kind) == ("two", "", "LATE")
+    assert f"{ref} is planned" in warning.message
+    assert f"{way} than it should be" in warning.message
+    assert {each.status for each in outcomes} == {"done"}
+
+
+async def test_beside_a_behavior_that_is_late_the_other_block_and_the_clock_are_told_of() -> None:
+    tied = block((timed(OTHER, start="one:s:end"),), together("one:s:m1", "9", "h:end"), id="two")
+    seen, outcomes = await told((0.0, block((WORDS,), id="one")), (1.5, tied))
+
+    assert {(each.block, each.behavior, each.kind) for each in seen.warnings()} == {
+        ("two", "", "LATE"),
+        ("two", "h", "LATE"),
+    }
+    assert {each.status for each in outcomes} == {"done"}
+
+
 LATE_XML = """<bml id="b">
   <head id="n" lexeme="NOD" start="0"/>
   <speech id="s"><text>one <mark name="m"/>two</text></speech>
