@@ -92,9 +92,21 @@ class Known(Struct, frozen=True, kw_only=True):
             by = self.points.get(start, 0.0) - times[start]
             if chain.behavior.id in self.begun:
                 late[start] = self.points[start]
-            if by > EPSILON or chain.behavior.id in self.due:
+            if by > EPSILON:
+                late |= _later(chain, times, by)
+            elif chain.behavior.id in self.due:
                 late |= {point: times[point] + by for point in chain.points}
         return self._with_waiting({**self.with_own(times), **late}, end)
+
+
+def _later(chain: Chain, times: Mapping[Point, Seconds], by: Seconds) -> dict[Point, Seconds]:
+    """Times of the points of a behavior that begins so much later: where it was to wait, it waits for less."""
+    before, at = times[chain.points[0]], times[chain.points[0]] + by
+    found = {chain.points[0]: at}
+    for point, segment in zip(chain.points[1:], chain.segments, strict=True):
+        at = max(times[point], at + min(segment.natural, times[point] - before))
+        found[point], before = at, times[point]
+    return found
 
 
 NOTHING = Known()
