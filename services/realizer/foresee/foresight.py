@@ -202,7 +202,8 @@ class Foresight(Observer):
             if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
                 return  # it was to be cut short
             since = self._facts.reached[before]
-            if self._facts.held_between(since, at, point.behavior):
+            is_beneath = chain.type in SHIFTS and at - since < natural  # perhaps: a look has begun over it
+            if is_beneath or self._facts.held_between(since, at, point.behavior):
                 return  # how long it would have taken, nobody knows
             changed = self.experience.learn(point.behavior, natural, at - since)
             if self.forecast is not None and changed:

@@ -40,7 +40,7 @@ from engage_hri.services.realizer.plan.relations import (
 )
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
-from engage_hri.services.realizer.plan.sharing import naming_others, share, waits_elsewhere
+from engage_hri.services.realizer.plan.sharing import naming_others, needless_turns, share, waits_elsewhere
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder, may_speak_at_once
 from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.plan.turns import by_ends, turns_in
@@ -106,6 +106,7 @@ class _Planner:
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
         self.turns = self.given = frozenset[Turn]()  # `given`: turns to begin with
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
+        self.pruned: set[Turn] = set()  # turns that were found to be needless, once
         self.parts = PartOrder()
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
@@ -285,10 +286,14 @@ class _Planner:
             tried.append(arrangement)
             if conflicts:
                 arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
-            elif arranged in tried:
-                break
-            else:
+            elif arranged not in tried:
                 arrangement = arranged
+            elif needless := needless_turns(self.turns - self.pruned, arranged.takes, self.known, self.chains):
+                self.pruned |= needless
+                self.turns, self.given = self.turns - needless, self.given - needless
+                arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
+            else:
+                break
         return Plan(
             block=with_hands(self.block, self.hands),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),

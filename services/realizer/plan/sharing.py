@@ -4,7 +4,7 @@ The others are given: what they were promised is not taken from them. A behavior
 part over and loses its way home, as within one block; before that, who comes waits, or uses the other arm.
 """
 
-from collections.abc import Callable, Container, Iterator, Mapping, Set
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Set
 from typing import NamedTuple
 
 from msgspec.structs import replace
@@ -267,3 +267,24 @@ def naming_others(present: Relations, arrangement: Arrangement) -> Relations:
 def waits_elsewhere(turn: Turn) -> bool:
     """True if the turn is to wait for a behavior of another block."""
     return is_foreign(turn[1].behavior)
+
+
+def needless_turns(
+    turns: Iterable[Turn], takes: Mapping[str, str], known: Known, chains: Mapping[str, Chain]
+) -> set[Turn]:
+    """Turns of behaviors that wait for the way home of one of another block, of which another here takes the part.
+
+    That one saves it the way home, and who comes later waits for that one. takes: as of `Arrangement`.
+    """
+    found = set()
+    for turn in turns:
+        id, point = turn
+        taker = takes.get(point.behavior, id)
+        waits = any(each[0] == id and each[1].behavior == taker for each in turns)
+        if taker == id or taker not in chains or not waits:
+            continue
+        holder = known.holders[point.behavior].chain
+        if set(chains[id].parts) & set(holder.parts) <= set(chains[taker].parts):
+            home = holder.points[least(holder) + 1 :]
+            found |= {turn} if point in home else set()
+    return found
