@@ -183,8 +183,7 @@ class Foresight(Observer):
         return {point: times[transition] for point, transition in coming.items() if transition is not None}
 
     def _transitions_followed(self) -> list[int]:
-        found = [self.plan.transition(point) for point in self.followed]
-        return [transition for transition in found if transition is not None]
+        return [each for each in map(self.plan.transition, self.followed) if each is not None]
 
     # -- behaviors under way -------------------------------------------------------------------------------------
 
@@ -367,11 +366,13 @@ class Foresight(Observer):
         instants = {point: passed.get(here, forecast.times[here]) for point, here in at.items()}
         arrivals = {point: facts.reached.get(point, instants[point]) for point in at}
         for chain in self.plan.chains.values():
-            for before, point in pairwise(chain.points):
+            for (before, point), segment in zip(pairwise(chain.points), chain.segments, strict=True):
                 is_passive = self._net.part_of[point].kind == "passive"
                 if point not in facts.reached and is_passive and at[before] != at[point]:
                     behavior, here, since = point.behavior, at[point], arrivals[before]
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
+                    if behavior not in self.plan.natural and self.plan.successors.get(behavior, "")[1:] == (point,):
+                        most = segment.natural  # Who is to take its part may come later than it has ended by itself.
                     most = inf if before in facts.reached and facts.held_between(since, now, behavior) else most
                     arrivals[point] = max(now, since + least, min(since + most, instants[point]))
         return arrivals

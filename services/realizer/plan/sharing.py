@@ -4,7 +4,7 @@ The others are given: what they were promised is not taken from them. A behavior
 part over and loses its way home, as within one block; before that, who comes waits, or uses the other arm.
 """
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Collection, Container, Iterator, Mapping, Set
 from typing import NamedTuple
 
 from msgspec.structs import replace
@@ -270,21 +270,18 @@ def waits_elsewhere(turn: Turn) -> bool:
 
 
 def needless_turns(
-    turns: Iterable[Turn], takes: Mapping[str, str], known: Known, chains: Mapping[str, Chain]
+    turns: Collection[Turn], takes: Mapping[str, str], known: Known, chains: Mapping[str, Chain]
 ) -> set[Turn]:
     """Turns of behaviors that wait for the way home of one of another block, of which another here takes the part.
 
     That one saves it the way home, and who comes later waits for that one. takes: as of `Arrangement`.
     """
-    found = set()
-    for turn in turns:
-        id, point = turn
-        taker = takes.get(point.behavior, id)
-        waits = any(each[0] == id and each[1].behavior == taker for each in turns)
-        if taker == id or taker not in chains or not waits:
-            continue
-        holder = known.holders[point.behavior].chain
-        if set(chains[id].parts) & set(holder.parts) <= set(chains[taker].parts):
-            home = holder.points[least(holder) + 1 :]
-            found |= {turn} if point in home else set()
+    found = set[Turn]()
+    candidates = [turn for turn in turns if takes.get(turn[1].behavior, turn[0]) != turn[0]]
+    waits = {(id, point.behavior) for id, point in turns} if candidates else set()
+    for id, point in candidates:
+        taker, holder = takes[point.behavior], known.holders[point.behavior].chain
+        is_led = taker in chains and (id, taker) in waits and point in holder.points[least(holder) + 1 :]
+        if is_led and set(chains[id].parts) & set(holder.parts) <= set(chains[taker].parts):
+            found.add((id, point))
     return found
