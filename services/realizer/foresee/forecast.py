@@ -72,11 +72,14 @@ class Forecast(LongestPaths):
             if bound.kind == "phase"
         }
         unkept = {(plan.at.get(each.late), plan.at.get(each.early)): each.seconds for each in plan.broken}
+        # What is tied to a point of another block keeps its distances: all of it is as late for that point.
+        abroad = {plan.at.get(each.early): each.seconds for each in plan.broken if is_foreign(each.early.behavior)}
         for bound in net.bounds:
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
             arc = self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
-            if unkept.get((bound.source, bound.target), 0.0) > bound.stopped + EPSILON:
+            missed_by = unkept.get((bound.source, bound.target)) or abroad.get(bound.target, 0.0)
+            if missed_by > bound.stopped + EPSILON:
                 self._unkept.add(arc)
             if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag + bound.stopped:
                 self._bent.add(arc)

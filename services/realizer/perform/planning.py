@@ -70,10 +70,11 @@ class Planning:
 
     async def again(self, plan: Plan, elsewhere: Mapping[str, Block]) -> Plan:
         """Plan a block that had to wait: by now the body and the other blocks are elsewhere."""
-        known = self._known(plan.block, elsewhere, plan.foreign, plan.estimates.values())
+        named = {*plan.foreign, *plan.untied}  # What could not be waited for then has come by now, perhaps.
+        known = self._known(plan.block, elsewhere, named, plan.estimates.values())
         question = self._question(plan, known)
         estimates = await self.estimates(plan.block, question)
-        return await self._agreed(plan.block, question, estimates, elsewhere, plan.foreign)
+        return await self._agreed(plan.block, question, estimates, elsewhere, named)
 
     async def _agreed(
         self,
