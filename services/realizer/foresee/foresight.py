@@ -345,8 +345,7 @@ class Foresight(Observer):
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """Expected times of all points of the block that are still to come, in seconds from the block's start."""
         times = self._each(self.from_scratch(now), now)
-        points = {point for chain in self.plan.chains.values() for point in chain.points}
-        coming = points - self._facts.reached.keys()
+        coming = {each for chain in self.plan.chains.values() for each in chain.points} - self._facts.reached.keys()
         self._expected |= {point: max(now, times[point]) for point in coming}
         self.is_surprised = False
         return {point: self._expected[point] - self._facts.began for point in coming}
@@ -371,7 +370,8 @@ class Foresight(Observer):
                 if point not in facts.reached and is_passive and at[before] != at[point]:
                     behavior, here, since = point.behavior, at[point], arrivals[before]
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
-                    if behavior not in self.plan.natural and self.plan.successors.get(behavior, "")[1:] == (point,):
+                    is_given = point not in self.plan.constrained and behavior not in self.plan.natural
+                    if is_given and self.plan.successors.get(behavior, "")[1:] == (point,):
                         most = segment.natural  # Who is to take its part may come later than it has ended by itself.
                     most = inf if before in facts.reached and facts.held_between(since, now, behavior) else most
                     arrivals[point] = max(now, since + least, min(since + most, instants[point]))
