@@ -139,8 +139,7 @@ class _Planner:
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
             if estimate and estimate.degraded:
-                line = self.lines[behavior.id]
-                self.problems.append(Problem("DEGRADED", at_line(line, estimate.degraded), behavior.id))
+                self.problems.append(Problem("DEGRADED", at_line(behavior.line, estimate.degraded), behavior.id))
 
     def _ends(self, id: str) -> Seconds:
         """Expected end of a behavior that has begun, if it goes on at its natural pace."""
@@ -262,6 +261,7 @@ class _Planner:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
+            self.parts.see(times, present.constrained)
             yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
             rounds = assembly.rounds(solution.times)
