@@ -353,7 +353,7 @@ class _Planner:
             times = foresight.foreseen(assembly, self.known, self.doubted)
             behind = tuple(foresight.awaited(assembly, self.known, self.waived))
             solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times, behind)
-            if self.order.pass_alone():
+            if (yield from self.order.pass_alone(assembly.net, assembly.at, solution.times)):
                 raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:
