@@ -189,3 +189,14 @@ def test_who_is_in_nobodys_way_keeps_the_place_that_the_document_gives_it() -> N
 
     assert made.problems == ()
     assert at(made, "early:start") < at(made, "first:start") < at(made, "later:start")
+
+
+def test_a_turn_to_begin_with_is_let_go_if_there_is_no_time_for_it() -> None:
+    late, soon = (timed(Head(id=id, lexeme="NOD"), stroke=to) for id, to in (("late", "t:end"), ("soon", "s:end")))
+    example = block((SPEECH, OTHER, late, soon))
+    turn = ("soon", Point("late", "stroke_end"))
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], turns=frozenset((turn,)))
+
+    assert made.problems == ()
+    assert at(made, "s:start") < at(made, "t:start")
+    assert turn not in made.turns

@@ -10,7 +10,7 @@ from engage_hri.services.realizer.points import Point
 
 
 class PartOrder:
-    """Behaviors that have changed places. turns: the waits that come of it, to begin with.
+    """Behaviors that have changed places. turns: the waits that come of it, and those given, to begin with.
 
     Who takes a part first is found by when the two would start, each by itself. Only what is tied to them may tell
     that there is no time for it. Then those that are in each other's way come in the order in which they would have
@@ -18,17 +18,22 @@ class PartOrder:
     not, either, back again.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, given: frozenset[Turn] = frozenset()) -> None:
+        self._given = given
         self.begin_anew()
 
     def begin_anew(self) -> None:
         """Begin again without changes: the speeches have another order, or something is gone."""
-        self.turns = frozenset[Turn]()
+        self._changed = frozenset[Turn]()
         self._times: Mapping[Point, Seconds] = {}
         self._tied: Container[Point] = ()
         self._sorted = set[str]()
         self._is_sorting = True
         self._tried = set[frozenset[str]]()
+
+    @property
+    def turns(self) -> frozenset[Turn]:
+        return self._given | self._changed
 
     def see(self, times: Mapping[Point, Seconds], tied: Container[Point]) -> None:
         """Note when points come, the first time, when nobody waits for a part yet.
@@ -44,11 +49,14 @@ class PartOrder:
         impossible: waits for which there is no time. begun: behaviors that have their parts already.
         """
         found = [each for each in impossible if each[0] in chains and chains[each[0]].type != "speech"]
+        if idle := self._given.intersection(found):
+            self._given -= idle
+            return True
         if found and self._times and self._is_sorting:
             turns = self._in_turn(found, chains, begun)
-            self._is_sorting = turns not in (self.turns, frozenset(found))
-            if self._is_sorting or self.turns:
-                self.turns = turns if self._is_sorting else frozenset()
+            self._is_sorting = turns not in (self._changed, frozenset(found))
+            if self._is_sorting or self._changed:
+                self._changed = turns if self._is_sorting else frozenset()
                 return True
         for waiter, point in sorted(found):
             pair = frozenset((waiter, point.behavior))
@@ -56,10 +64,10 @@ class PartOrder:
                 continue
             self._tried.add(pair)
             last = chains[waiter].points[least(chains[waiter])]
-            self.turns |= {(point.behavior, last)}
+            self._changed |= {(point.behavior, last)}
             return True
-        if found and self.turns:
-            self.turns = frozenset()
+        if found and self._changed:
+            self._changed = frozenset()
             return True
         return False
 

@@ -76,7 +76,7 @@ def plan_steps(
 ) -> Steps[Plan]:
     """Plan as `plan_block` does, in steps. turns: those to begin with."""
     planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known)
-    planner.turns = planner.given = turns
+    planner.parts = PartOrder(turns)
     yield from planner.read()
     return (yield from planner.plan())
 
@@ -104,7 +104,7 @@ class _Planner:
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
-        self.turns = self.given = frozenset[Turn]()  # `given`: turns to begin with
+        self.turns = frozenset[Turn]()
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.pruned: set[Turn] = set()  # turns that were found to be needless, once
         self.parts = PartOrder()
@@ -167,7 +167,7 @@ class _Planner:
         wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order that is new.
         """
         while True:
-            self.turns = (self.given | self.parts.turns) - self.overlaps
+            self.turns = self.parts.turns - self.overlaps
             said = self.relations
             present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
