@@ -10,7 +10,7 @@ from engage_hri.services.realizer.points import Point
 
 
 class PartOrder:
-    """Behaviors that have changed places. turns: the waits that come of it, and those given, to begin with.
+    """Behaviors that have changed places. turns: the waits that come of it, and those `given`, to begin with.
 
     Who takes a part first is found by when the two would start, each by itself. Only what is tied to them may tell
     that there is no time for it. Then those that are in each other's way come in the order in which they would have
@@ -19,7 +19,7 @@ class PartOrder:
     """
 
     def __init__(self, given: frozenset[Turn] = frozenset()) -> None:
-        self._given = given
+        self.given = given
         self.begin_anew()
 
     def begin_anew(self) -> None:
@@ -33,7 +33,7 @@ class PartOrder:
 
     @property
     def turns(self) -> frozenset[Turn]:
-        return self._given | self._changed
+        return self.given | self._changed
 
     def see(self, times: Mapping[Point, Seconds], tied: Container[Point]) -> None:
         """Note when points come, the first time, when nobody waits for a part yet.
@@ -49,8 +49,8 @@ class PartOrder:
         impossible: waits for which there is no time. begun: behaviors that have their parts already.
         """
         found = [each for each in impossible if each[0] in chains and chains[each[0]].type != "speech"]
-        if idle := self._given.intersection(found):
-            self._given -= idle
+        if idle := self.given.intersection(found):
+            self.given -= idle
             return True
         if found and self._times and self._is_sorting:
             turns = self._in_turn(found, chains, begun)

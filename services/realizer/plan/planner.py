@@ -290,7 +290,7 @@ class _Planner:
                 arrangement = arranged
             elif needless := needless_turns(self.turns - self.pruned, arranged.takes, self.known, self.chains):
                 self.pruned |= needless
-                self.turns, self.given = self.turns - needless, self.given - needless
+                self.turns, self.parts.given = self.turns - needless, self.parts.given - needless
                 arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
             else:
                 break
