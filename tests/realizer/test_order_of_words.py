@@ -19,6 +19,7 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.speaking_order import SpeakingOrder
+from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import Point
 from tests.realizer.oracle import consult, estimate, relaxed
 
@@ -152,6 +153,44 @@ def test_what_foreign_authors_write_is_said_in_their_order(more: str, order: str
     assert "".join(spoken(plan)) == order
 
 
+def sentence(number: int, **timing: str) -> Speech:
+    return Speech(id=f"s{number}", text="words", timing=tuple(Timing(sync, ref) for sync, ref in timing.items()))
+
+
+def test_the_last_of_many_sentences_comes_first_and_the_others_stay_where_they_are() -> None:
+    last_first = Constraint(operators=(After(ref="s49:end", syncs=("s0:start",)),))
+    plan = planned(Block(id="b", behaviors=tuple(map(sentence, range(50))), constraints=(last_first,)))
+
+    assert plan is not None
+    assert plan.problems == ()
+    assert spoken(plan) == ["s49", *(f"s{number}" for number in range(49))]
+
+
+@pytest.mark.parametrize("count", [7, 30])
+def test_many_sentences_that_begin_as_later_ones_end_are_all_on_time(count: int) -> None:
+    tied = [sentence(number, start=f"s{number + count}:end") for number in range(count)]
+    plan = planned(Block(id="b", behaviors=(*tied, *map(sentence, range(count, 2 * count)))))
+
+    assert plan is not None
+    assert plan.problems == ()
+    assert spoken(plan) == [f"s{number}" for pair in range(count) for number in (pair + count, pair)]
+
+
+def test_many_sentences_that_have_to_wait_for_others_come_in_document_order_but_for_that() -> None:
+    count = 18
+    awaited = {each: (each * 7 + 3) % count for each in range(0, count, 2)}
+    waits = [After(ref=f"s{other}:end", syncs=(f"s{each}:start",)) for each, other in awaited.items()]
+    constraints = tuple(Constraint(operators=(each,)) for each in waits)
+    plan = planned(Block(id="b", behaviors=tuple(map(sentence, range(count))), constraints=constraints))
+
+    assert plan is not None
+    assert plan.problems == ()
+    expected: dict[int, None] = {}
+    for each in range(count):
+        expected |= dict.fromkeys([awaited[each], each] if each in awaited else [each])
+    assert spoken(plan) == [f"s{number}" for number in expected]
+
+
 # -- the search through the orders, with circles as they come ------------------------------------------------------
 
 WORDS = ("a", "b", "c", "d", "e")
@@ -165,14 +204,19 @@ def circle(earlier: str, later: str) -> Circle:
     return ((Place("series", source, target, behavior=later), 0.0), (Place("phase", target, source), 1.0))
 
 
+def passes_alone(order: SpeakingOrder) -> bool:
+    at = {point: number for number, point in enumerate(ENDS)}
+    return finished(order.pass_alone(NET, at, [0.0] * len(ENDS)))
+
+
 def test_of_two_speeches_each_order_is_tried_and_then_one_is_lost() -> None:
     order = SpeakingOrder(("a", "b"), 2)
     assert (order.current, order.turns) == (("a", "b"), frozenset({("b", Point("a", "end"))}))
-    assert not order.pass_alone()
+    assert not passes_alone(order)
     assert order.refute([circle("a", "b")], NET)
     assert (order.current, order.turns) == ((), frozenset())
     assert not order.refute([circle("a", "b")], NET)
-    assert order.pass_alone()
+    assert passes_alone(order)
     assert order.current == ("a", "b")
     assert not order.refute([circle("a", "b"), circle("b", "a")], NET)  # the second does not come by this order
     assert order.refute([circle("a", "b")], NET)
@@ -189,7 +233,7 @@ def test_of_two_speeches_each_order_is_tried_and_then_one_is_lost() -> None:
 def test_of_a_large_block_few_orders_are_tried_and_none_anew(size: int, most: int) -> None:
     order = SpeakingOrder(WORDS, size)
     assert order.refute([circle("a", "b")], NET)
-    assert order.pass_alone()
+    assert passes_alone(order)
     tried: list[tuple[str, ...]] = []
     while len(tried) < 20 and order.refute([circle(*pair) for pair in pairwise(order.current)], NET):
         tried.append(order.current)

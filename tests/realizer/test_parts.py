@@ -1,19 +1,24 @@
 """Several behaviors of one block that move the same part."""
 
+from typing import Any
+
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Gesture, Head
+from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Gesture, Head, Speech
+from engage_hri.services.realizer.plan import planner
 from engage_hri.services.realizer.plan.deadlocks import clashes
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.phases import chain
+from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import Equal, Term
-from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.realizer.plan.schedule import Solution
+from engage_hri.services.realizer.plan.steps import Steps, finished
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
-from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, SPEECH, at, plan, timed, warnings
+from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, OTHER, SPEECH, at, plan, timed, warnings
 from tests.realizer.stage import after, block, together
 
 
@@ -143,3 +148,55 @@ def test_who_keeps_the_part_of_a_lost_one_may_be_without_its_points() -> None:
     losses = finished(clashes([("g", Point("f", "end")), ("h", Point("g", "stroke"))], chains, (), classes))
 
     assert [each.behavior for each in losses] == ["g"]
+
+
+def nodding(order: tuple[int, ...]) -> Plan:
+    """The plan of sentences, and of as many nods, in document order each at the end of the sentence that is named."""
+    sentences = [Speech(id=f"s{number}", text="Hi, you there.") for number in range(len(order))]
+    nods = [timed(Head(id=f"n{i}", lexeme="NOD"), stroke=f"s{sentence}:end") for i, sentence in enumerate(order)]
+    return plan(block((*sentences, *nods)))
+
+
+@pytest.mark.parametrize("order", [(8, 1, 3, 6, 7, 9, 5, 0, 4, 2), tuple(range(9, -1, -1)), (1, 0, 3, 2, 5, 4)])
+def test_nods_are_made_in_the_order_of_the_sentences_that_they_are_tied_to(order: tuple[int, ...]) -> None:
+    made = nodding(order)
+
+    assert made.problems == ()
+    starts = [at(made, f"s{number}:start") for number in range(len(order))]
+    assert starts == sorted(starts)
+
+
+def test_of_nods_in_disorder_few_plans_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    plans = 0
+    solve = planner.predict
+
+    def counted(*args: Any) -> Steps[Solution]:
+        nonlocal plans
+        plans += 1
+        return solve(*args)
+
+    monkeypatch.setattr(planner, "predict", counted)
+    nodding(tuple(number * 17 % 30 for number in range(30)))
+
+    assert plans < 60
+
+
+def test_who_is_in_nobodys_way_keeps_the_place_that_the_document_gives_it() -> None:
+    sentences = (SPEECH, OTHER)
+    early = timed(Head(id="early", lexeme="NOD"), end="9")
+    nods = [timed(Head(id=id, lexeme="NOD"), stroke=to) for id, to in (("later", "t:end"), ("first", "s:end"))]
+    made = plan(block((*sentences, early, *nods)))
+
+    assert made.problems == ()
+    assert at(made, "early:start") < at(made, "first:start") < at(made, "later:start")
+
+
+def test_a_turn_to_begin_with_is_let_go_if_there_is_no_time_for_it() -> None:
+    late, soon = (timed(Head(id=id, lexeme="NOD"), stroke=to) for id, to in (("late", "t:end"), ("soon", "s:end")))
+    example = block((SPEECH, OTHER, late, soon))
+    turn = ("soon", Point("late", "stroke_end"))
+    made = plan_block(example, [FakeBody().estimate(each) for each in example.behaviors], turns=frozenset((turn,)))
+
+    assert made.problems == ()
+    assert at(made, "s:start") < at(made, "t:start")
+    assert turn not in made.turns

@@ -291,12 +291,12 @@ def _takers(
     rank = {id: number for number, id in enumerate(ranked)}
     found: dict[str, set[str]] = {}
     for ids in users.values():
-        for earlier, later in _pairs(ids, chains):
+        for earlier, later in in_series(ids, chains):
             found.setdefault(earlier, set()).add(later)
     return {id: sorted(takers, key=rank.__getitem__) for id, takers in found.items()}
 
 
-def _pairs(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[str, str]]:
+def in_series(users: Sequence[str], chains: Mapping[str, Chain]) -> Iterator[tuple[str, str]]:
     """Each user of a part, in order, and the next that takes it over: a shift takes nothing from a gaze."""
     yield from pairwise([id for id in users if chains[id].type not in SHIFTS])
     yield from ((one, other) for one, other in pairwise(users) if chains[one].type in SHIFTS)

@@ -76,7 +76,7 @@ def plan_steps(
 ) -> Steps[Plan]:
     """Plan as `plan_block` does, in steps. turns: those to begin with."""
     planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known)
-    planner.turns = planner.given = turns
+    planner.parts = PartOrder(turns)
     yield from planner.read()
     return (yield from planner.plan())
 
@@ -104,7 +104,7 @@ class _Planner:
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
-        self.turns = self.given = frozenset[Turn]()  # `given`: turns to begin with
+        self.turns = frozenset[Turn]()
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.pruned: set[Turn] = set()  # turns that were found to be needless, once
         self.parts = PartOrder()
@@ -139,8 +139,7 @@ class _Planner:
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
             if estimate and estimate.degraded:
-                line = self.lines[behavior.id]
-                self.problems.append(Problem("DEGRADED", at_line(line, estimate.degraded), behavior.id))
+                self.problems.append(Problem("DEGRADED", at_line(behavior.line, estimate.degraded), behavior.id))
 
     def _ends(self, id: str) -> Seconds:
         """Expected end of a behavior that has begun, if it goes on at its natural pace."""
@@ -168,7 +167,7 @@ class _Planner:
         wait for, or a tie to another block; or else a behavior is gone, or the speeches are in an order that is new.
         """
         while True:
-            self.turns = (self.given | self.parts.turns) - self.overlaps
+            self.turns = self.parts.turns - self.overlaps
             said = self.relations
             present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
             try:
@@ -262,6 +261,7 @@ class _Planner:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
+            self.parts.see(times, present.constrained)
             yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
             rounds = assembly.rounds(solution.times)
@@ -290,7 +290,7 @@ class _Planner:
                 arrangement = arranged
             elif needless := needless_turns(self.turns - self.pruned, arranged.takes, self.known, self.chains):
                 self.pruned |= needless
-                self.turns, self.given = self.turns - needless, self.given - needless
+                self.turns, self.parts.given = self.turns - needless, self.parts.given - needless
                 arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
             else:
                 break
@@ -353,7 +353,7 @@ class _Planner:
             times = foresight.foreseen(assembly, self.known, self.doubted)
             behind = tuple(foresight.awaited(assembly, self.known, self.waived))
             solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times, behind)
-            if self.order.pass_alone():
+            if (yield from self.order.pass_alone(assembly.net, assembly.at, solution.times)):
                 raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:

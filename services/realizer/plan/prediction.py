@@ -73,10 +73,10 @@ def predict(
             for cycle in found.cycles:
                 yield 3 * len(cycle)
                 circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
-                room = [seconds - _least(tie) for tie, seconds in circle]
+                room = [seconds - least(tie) for tie, seconds in circle]
                 excess = sum(lag.seconds for lag in cycle)
                 if sum(room) < excess - EPSILON:
-                    hopeless.append(tuple([(tie, _least(tie)) for tie, _ in circle]))
+                    hopeless.append(tuple([(tie, least(tie)) for tie, _ in circle]))
                     continue
                 if is_dispensable([tie for tie, _ in circle]):
                     hopeless.append(circle)
@@ -115,7 +115,7 @@ def _is_beginning(tie: Place | Bound) -> bool:
     return isinstance(tie, Place) and tie.kind == "order" and not (tie.source or tie.lag or tie.behavior)
 
 
-def _least(tie: Place | Bound) -> Seconds:
+def least(tie: Place | Bound) -> Seconds:
     """The least that the lag may be."""
     if isinstance(tie, Place):
         return tie.shortest

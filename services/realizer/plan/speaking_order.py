@@ -1,18 +1,23 @@
 """The order in which the speeches of a block are said: that of the document, or else the next one that is possible.
 
 Constraints come first. Where they leave no time for one speech after another, the two change places; a speech is lost
-only when no order serves all. So first it is made sure that the speeches are possible without any order.
+only when no order serves all. So first it is made sure that the speeches are possible without any order. That tells
+which of them have to come before which; next is the document's order but for those that have to come earlier.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from heapq import heappop, heappush
 from itertools import pairwise
+from math import inf
 from typing import Literal
 
-from engage_hri.services.realizer.net.petri_net import PetriNet
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Circle
+from engage_hri.services.realizer.plan.prediction import Circle, least
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.plan.steps import PORTION, Steps
+from engage_hri.services.realizer.points import EPSILON, Point
 
 WORK = 400
 """Orders that are tried, times behaviors of the block."""
@@ -27,8 +32,9 @@ class Misordered(Exception):
 class SpeakingOrder:
     """A search through the orders of some speeches. current: the order to plan with.
 
-    Stages: `document`, the order that is tried first. `alone`: no order, to see what is impossible by itself.
-    `search`: other orders. `last`: none is left, or there is only one; what is impossible in it is lost.
+    Stages: `document`, the order that is tried first. `alone`: no order, to see what is impossible by itself, and
+    which must come before which. `search`: other orders. `last`: none is left, or there is only one; what is
+    impossible in it is lost.
     """
 
     def __init__(self, speeches: Sequence[str], size: int) -> None:
@@ -42,7 +48,7 @@ class SpeakingOrder:
         self._start(self.current)
 
     def _start(self, speeches: tuple[str, ...]) -> None:
-        self._first = speeches
+        self._first = self._nearest = speeches
         self._seen = {speeches}
         self._left: list[tuple[str, ...]] = []
         self._refuted: dict[tuple[str, str], tuple[str, ...]] = {}
@@ -50,17 +56,28 @@ class SpeakingOrder:
 
     def begin_anew(self, speeches: Collection[str]) -> None:
         """Begin again with those that are left of the speeches."""
+        nearest = tuple(each for each in self._nearest if each in speeches)
         self._start(tuple(each for each in self._first if each in speeches))
-        if self._stage != "alone":
-            self.current = self._first
-        if self._stage == "last" and self._budget:
-            self._stage = "search"
+        if self._stage == "alone":
+            return
+        if self._budget:
+            self._stage, self.current = "document", self._first
+        else:
+            self._stage, self.current, self._nearest = "last", nearest, nearest
 
-    def pass_alone(self) -> bool:
-        """Take note that the block can be scheduled. True if that was without an order, which is to be tried now."""
+    def pass_alone(self, net: PetriNet, at: Mapping[Point, int], times: Sequence[Seconds]) -> Steps[bool]:
+        """Take note that the block can be scheduled. True if that was without an order: one is to be tried now.
+
+        at: the transition of each point. times: of each transition.
+        """
         if self._stage != "alone":
             return False
-        self._stage, self.current = "search", self._first
+        before = yield from _before(self._first, net, at, times)
+        self._stage, self.current = "search", _sorted(self._first, before)
+        self._nearest = self.current
+        if self.current not in self._seen:
+            self._seen.add(self.current)
+            self._left.append(self._first)
         return True
 
     def refute(self, circles: Iterable[Circle], net: PetriNet) -> bool:
@@ -89,7 +106,7 @@ class SpeakingOrder:
         else:
             self._stage = "last"
             hopeless = (order for (one, two), order in self._refuted.items() if (two, one) in self._refuted)
-            self.current = next(hopeless, self._first)
+            self.current = next(hopeless, self._nearest)
         return True
 
     @property
@@ -114,6 +131,69 @@ class SpeakingOrder:
             order.remove(later)
             order.insert(order.index(earlier), later)
         return tuple(order)
+
+
+def _sorted(speeches: Sequence[str], before: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """The speeches in the order given, but each right after those that have to come before it.
+
+    So one of which nothing is said stays behind all that it was behind.
+    """
+    found: dict[str, None] = {}
+    begun = set[str]()
+    todo = [*reversed(speeches)]
+    while todo:
+        id = todo[-1]
+        if id in begun:
+            found[todo.pop()] = None
+        else:
+            begun.add(id)
+            todo += [each for each in reversed(before[id]) if each not in begun]
+    return tuple(found)
+
+
+def _before(
+    speeches: Sequence[str], net: PetriNet, at: Mapping[Point, int], times: Sequence[Seconds]
+) -> Steps[dict[str, list[str]]]:
+    """For each speech, those that have to come before it, in order, with every phase as short as can be.
+
+    times: of a schedule. Two that have to come before each other are in no order.
+    """
+    spare: list[list[tuple[int, Seconds]]] = [[] for _ in net.transitions]
+    """For each transition, those that wait for it, and how many seconds later than they must they come."""
+    ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
+    for number, tie in enumerate(ties):
+        seconds = times[tie.target] - times[tie.source] - least(tie)
+        if tie.kind != "idle" and -EPSILON < seconds < inf:
+            spare[tie.source].append((tie.target, max(0.0, seconds)))
+        if not number % PORTION:
+            yield PORTION // 4
+    starts, ends = ({id: at[Point(id, sync)] for id in speeches} for sync in ("start", "end"))
+    clock = _distances(0, spare)
+    yield len(clock)
+    spare[0] = []  # From each start, the way through the start of the block is known then.
+    before: dict[str, dict[str, None]] = {id: {} for id in speeches}
+    for id, start in starts.items():
+        found = _distances(start, spare)
+        yield len(found) + len(speeches) // 4
+        for other, end in ends.items():
+            distance = min(found.get(end, inf), found.get(0, inf) + clock.get(end, inf))
+            if other != id and distance < times[end] - times[start] - EPSILON:
+                before[other][id] = None
+    return {id: [each for each in before[id] if id not in before[each]] for id in speeches}
+
+
+def _distances(source: int, out: Sequence[Sequence[tuple[int, Seconds]]]) -> dict[int, Seconds]:
+    """Shortest distances from a node to all that can be reached."""
+    found: dict[int, Seconds] = {}
+    todo = [(0.0, source)]
+    while todo:
+        distance, here = heappop(todo)
+        if here not in found:
+            found[here] = distance
+            for target, length in out[here]:
+                if target not in found:
+                    heappush(todo, (distance + length, target))
+    return found
 
 
 def may_speak_at_once(id: str, chains: Mapping[str, Chain], present: Relations) -> bool:
