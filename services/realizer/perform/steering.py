@@ -11,6 +11,7 @@ from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.feedback import ON_REQUEST
 from engage_hri.services.realizer.perform.holding import Holds, Named
 from engage_hri.services.realizer.perform.live import Ending, Live, absence
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
@@ -64,7 +65,7 @@ class Steering:
                     self._holds.let_go(block, behavior)
                 case "stop":
                     self._holds.let_go(block, behavior)
-                    await self._stop(concerned, behavior, "" if behavior else "stopped on request")
+                    await self._stop(concerned, behavior, "" if behavior else ON_REQUEST)
             self._apply()
             around = self._holds.around(block, behavior) if request.to == "continue" else None
             if around is None:
