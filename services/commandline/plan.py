@@ -76,7 +76,7 @@ def _planned(block: Block, world: World, config: Config, file: Path) -> Plan:
         if NO_SUCH_BLOCK not in error.fault.reason:
             raise
         together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {file.name}`"
-        advice = f"a block that names another one cannot be planned alone; {together} plays the two, as fast as it goes"
+        advice = f"a block that names another one cannot be planned alone; {together} plays both at full speed"
         raise InputRefused(replace(error.fault, advice=advice), error.block) from error
 
 

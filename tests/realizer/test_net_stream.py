@@ -252,9 +252,7 @@ async def test_a_net_that_is_planned_anew_several_times_in_a_moment_is_told_once
 async def test_the_net_spells_points_as_the_block_does() -> None:
     watcher, _ = await watched(replace(block((GAZE, POINT)), dialect="bml-1.0"))
 
-    syncs = [
-        (each.behavior, each.sync) for instant in watcher.plans[0].transitions for each in instant.points
-    ]
+    syncs = [(each.behavior, each.sync) for instant in watcher.plans[0].transitions for each in instant.points]
     assert sorted(sync for id, sync in syncs if id == "gaze-1") == ["end", "ready", "relax", "start"]
     assert ("point-1", "strokeStart") in syncs
     assert len(syncs) == len(set(syncs))

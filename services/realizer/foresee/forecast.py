@@ -177,7 +177,9 @@ class Forecast(LongestPaths):
         Where one of another block has passed it, the plan says how much later the others come.
         """
         bounds = [self._arcs[number] for number in self._in[transition]]
-        is_kept = is_foreign(behavior) or self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
+        is_kept = (
+            is_foreign(behavior) or self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
+        )
         if not is_kept and any(arc.is_on and arc.is_bound and arc.behavior not in ("", behavior) for arc in bounds):
             node = self._new_node()
             self.times[node] = at

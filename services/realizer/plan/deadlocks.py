@@ -34,7 +34,6 @@ from engage_hri.services.realizer.plan.words import (
 )
 from engage_hri.services.realizer.points import EPSILON, Point
 
-
 FACES = types_with(family="face", lasts=True)
 
 
