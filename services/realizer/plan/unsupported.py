@@ -23,9 +23,12 @@ def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
     return "BEHAVIOR_TYPE_NOT_SUPPORTED", unperformed(behavior.element)
 
 
+def kind_of(warning: str) -> WarningKind:
+    """Kind of the warning that a body gives as the reason why it cannot do a behavior."""
+    return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
+
+
 def refused(estimate: Estimate, block: str) -> tuple[WarningKind, str, str]:
     """Kind, reason and advice of the warning about a behavior that the body cannot do."""
-    known = estimate.warning in get_args(WarningKind)
-    kind: WarningKind = estimate.warning if known else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[assignment]
     fault = estimate.fault or Fault(reason="the body cannot do it")
-    return kind, replace(fault, advice="").within(block, estimate.behavior), fault.advice
+    return kind_of(estimate.warning), replace(fault, advice="").within(block, estimate.behavior), fault.advice
