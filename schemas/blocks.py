@@ -95,7 +95,7 @@ class SteerPerformance(Request, frozen=True, kw_only=True, tag="steer_performanc
     """cmd: manager -> realizer: hold a block, let it continue, or stop it. Ends in `PerformanceSteered`.
 
     block: id of a live block. behavior: of that block; empty: all of it, so that to continue the block lets all its
-    behaviors go, too.
+    behaviors go, too. To hold a behavior that is past its last hold point is refused: it goes on to its end.
     """
 
     to: Steer

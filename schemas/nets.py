@@ -6,7 +6,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 
 
 class NetPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A sync point. behavior: empty for the start and the end of the block itself."""
+    """A sync point. behavior: empty for the start and the end of the block itself. sync: as the block spells it."""
 
     behavior: str = ""
     sync: str = ""
@@ -51,7 +51,8 @@ class Fired(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defaults=True):
     """stream: realizer: the net that a block runs on, and where its tokens are; all that a late watcher needs.
 
-    Told at the block's start, when it is planned anew since something was dropped, and every two seconds.
+    Told at the block's start, when it is planned anew, and every two seconds. Points that the block's dialect gives
+    one name are told once.
     at: when the block started. marked: numbers of the places that hold a token. fired: the transitions so far.
     """
 

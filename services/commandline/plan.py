@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block
@@ -23,6 +24,7 @@ from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.relations import NO_SUCH_BLOCK
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 
@@ -49,7 +51,7 @@ def main(options: Options) -> int:
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
         for plan in generated(source.things, around, config, str(options.file)):
-            planned = run_virtual(rehearsed(plan.block, around, config))
+            planned = _planned(plan.block, around, config, options.file)
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
@@ -64,6 +66,18 @@ def main(options: Options) -> int:
     if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
     return code
+
+
+def _planned(block: Block, world: World, config: Config, file: Path) -> Plan:
+    """The plan of a block. Its refusal since it names another block says how to try the two together."""
+    try:
+        return run_virtual(rehearsed(block, world, config))
+    except InputRefused as error:
+        if NO_SUCH_BLOCK not in error.fault.reason:
+            raise
+        together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {file.name}`"
+        advice = f"a block that names another one cannot be planned alone; {together} plays both at full speed"
+        raise InputRefused(replace(error.fault, advice=advice), error.block) from error
 
 
 def _as_text(plan: Plan) -> str:

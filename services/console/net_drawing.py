@@ -19,8 +19,10 @@ from engage_hri.services.console.wording import number
 
 TOKEN, EMPTY = "●", "○"
 LETTERS = {
-    "start": "s", "ready": "r", "stroke_start": "[", "stroke": "*", "stroke_end": "]", "relax": "x", "end": "e",
+    "start": "s", "ready": "r", "attackPeak": "p", "stroke_start": "[", "strokeStart": "[", "stroke": "*",
+    "stroke_end": "]", "strokeEnd": "]", "relax": "x", "end": "e",
 }  # fmt: skip
+"""Letters of sync points, as blocks of all dialects spell them."""
 MARK = "m"
 """Letter of a sync point that the behavior itself names: a mark in a speech."""
 BLOCK = "bml"
@@ -110,13 +112,19 @@ def picture(nets: Sequence[NetInView], width: int, height: int, now: Seconds, he
 
 def legend(nets: Iterable[NetInView]) -> str:
     """The letters that stand in the drawings of these nets, with what they mean."""
-    used = {_letter(each.sync) for net in nets for instant in net.transitions for each in instant.points}
-    words = [f"{letter}={sync}" for sync, letter in (*LETTERS.items(), ("mark", MARK)) if letter in used]
+    points = {each.sync for net in nets for instant in net.transitions for each in instant.points}
+    used = {name if (name := _without_number(sync)) in LETTERS else "mark" for sync in points}
+    words = [f"{letter}={name}" for name, letter in (*LETTERS.items(), ("mark", MARK)) if name in used]
     return " ".join((f"{TOKEN}=token", *words))
 
 
 def _letter(sync: str) -> str:
-    return LETTERS.get(sync, MARK)
+    return LETTERS.get(_without_number(sync), MARK)
+
+
+def _without_number(sync: str) -> str:
+    """The name of a point, without the number of a stroke: `stroke` of `stroke:2`."""
+    return sync.partition(":")[0]
 
 
 def _title(net: NetInView, now: Seconds | None) -> str:

@@ -100,7 +100,10 @@ def without_old(nets: Nets, now: Seconds) -> Nets:
 
 
 def told(before: NetInView | None, after: NetInView) -> Iterator[str]:
-    """Lines about what has changed in a net: a new one, instants that fired, tokens that came, the end."""
+    """Lines about what has changed in a net: a new one, instants that fired, tokens that came, the end.
+
+    Tokens that lie in a new net where they lay in the old one, by the words for it, are not told again.
+    """
     block = after.block
     if after.waits_for and (before is None or before.waits_for != after.waits_for):
         yield f"{block}: waits for {', '.join(after.waits_for)}"
@@ -115,9 +118,10 @@ def told(before: NetInView | None, after: NetInView) -> Iterator[str]:
         anew = "" if before is None else ", planned anew"
         yield f"{block}: net of {len(after.transitions)} instants and {len(after.places)} places{anew}"
         old_fired: Mapping[int, Seconds] = {} if before is None else after.fired
-        old_marked: frozenset[int] = frozenset()
+        old = {where(before, before.places[each]) for each in before.marked} if before is not None else set()
+        old_marked = {each for each in after.marked if where(after, after.places[each]) in old}
     else:
-        old_fired, old_marked = before.fired, before.marked
+        old_fired, old_marked = before.fired, {*before.marked}
     for transition, time in after.fired.items():
         if transition not in old_fired:
             instant = after.transitions[transition]

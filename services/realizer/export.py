@@ -1,42 +1,54 @@
 """A plan for people and programs: text, JSON, a drawing of its net (DOT), and the net for other tools (PNML)."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 from msgspec.structs import asdict
 
 from engage_hri.schemas.nets import NetPlanned
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net import pnml
-from engage_hri.services.realizer.net.petri_net import is_live, is_safe
+from engage_hri.services.realizer.net.petri_net import PetriNet, is_live, is_safe
 from engage_hri.services.realizer.perform.net_message import described
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.words import Spelling
+
+ADDED = ("series", "handover")
+"""Kinds of ties that nothing in the block asks for."""
 
 
 def as_text(plan: Plan) -> str:
     """The schedule, instant by instant, then what ties the instants, then what was dropped.
 
-    A star marks the critical path: what makes the block as long as it is.
+    Sync points are named as the block spells them. A star marks the critical path: what makes the block as long as
+    it is.
     """
-    net = plan.net
+    net, spelling = plan.net, Spelling(plan.block)
     by_time = sorted(range(len(net.transitions)), key=lambda each: (plan.schedule[each], each))
     soundness = ("live" if is_live(net) else "NOT live") + (", safe" if is_safe(net) else ", NOT safe")
     size = f"{len(net.transitions)} transitions, {len(net.places)} places"
     critical = frozenset(plan.critical)
     lines = [f"block {plan.block.id}: {size}, {soundness}", ""]
     lines += [
-        f"{'*' if each in critical else ' '}{plan.schedule[each]:8.3f} s  {net.transitions[each].name}"
+        f"{'*' if each in critical else ' '}{plan.schedule[each]:8.3f} s  {spelling.instant(net.transitions[each])}"
         for each in by_time
     ]
-    ties = list(_ties(plan))
-    lines += ["", *ties] if ties else []
+    for heading, ties in _ties(plan, spelling).items():
+        lines += ["", heading, *ties] if ties else []
+    lines += [""] if plan.natural else []
     lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]
     return "\n".join(lines) + "\n"
 
 
-def _ties(plan: Plan) -> Iterator[str]:
-    """A line for each tie between instants; a lower and an upper limit that are equal are one instant."""
+def _ties(plan: Plan, spelling: Spelling) -> dict[str, list[str]]:
+    """Lines for the ties between instants, each once, under headings: those that the block asks for, and the others.
+
+    A lower and an upper limit that are equal are one instant.
+    """
     net = plan.net
+    end = len(net.transitions) - 1
+    said: dict[str, None] = {}
+    added: dict[str, None] = {}
     limits: dict[tuple[int, int, Seconds], set[int]] = {}
     for bound in net.bounds:
         if bound.kind != "phase":
@@ -44,30 +56,41 @@ def _ties(plan: Plan) -> Iterator[str]:
     for place in net.places:
         if place.kind in ("phase", "idle"):
             continue
-        if (limit := limits.pop((place.source, place.target, place.lag), None)) is not None:
-            yield _tie(plan, place.target, "at", place.source, place.lag, {*place.lines, *limit})
+        tie = (place.source, place.target, place.lag)
+        if (limit := limits.pop(tie, None)) is not None:
+            said[_tie(net, spelling, "at", tie, {*place.lines, *limit})] = None
         elif place.source:
-            yield _tie(plan, place.target, "no earlier than", place.source, place.lag, place.lines)
-    for (source, target, lag), said in limits.items():
-        yield _tie(plan, target, "no later than", source, lag, said)
+            is_added = place.kind in ADDED or (place.target == end and not place.lines)
+            (added if is_added else said)[_tie(net, spelling, "no earlier than", tie, place.lines)] = None
+    for tie, lines in limits.items():
+        said[_tie(net, spelling, "no later than", tie, lines)] = None
+    return {"what the block says:": [*said], "what the planner adds:": [each for each in added if each not in said]}
 
 
-def _tie(plan: Plan, one: int, how: str, other: int, seconds: Seconds, lines: Iterable[int]) -> str:
-    """Write `  g:end  no later than  bml:start +2 s  (line 4)`."""
-    names = plan.net.transitions
-    said = ", ".join(map(str, sorted(lines)))
-    because = f"  (line {said})" if said else ""
+def _tie(net: PetriNet, spelling: Spelling, how: str, tie: tuple[int, int, Seconds], lines: Iterable[int]) -> str:
+    """Write `  g:end  no later than  bml:start +2 s  (line 4)`. tie: since which instant, to which, and seconds."""
+    since, to, seconds = tie
+    one, other = (spelling.instant(net.transitions[each]) for each in (to, since))
+    told = ", ".join(map(str, sorted(lines)))
+    because = f"  (line{'s' * (',' in told)} {told})" if told else ""
     offset = f" {seconds:+g} s" if seconds else ""
-    return f"  {names[one].name}  {how}  {names[other].name}{offset}{because}"
+    return f"  {one}  {how}  {other}{offset}{because}"
 
 
 def as_json(plan: Plan) -> str:
-    """Everything: transitions with their times, places with the initial marking, bounds, behaviors, problems."""
-    net = plan.net
+    """Everything: transitions with their times, places with the initial marking, bounds, behaviors, problems.
+
+    Sync points are named as the block spells them.
+    """
+    net, spelling = plan.net, Spelling(plan.block)
     document = {
         "block": plan.block.id,
         "transitions": [
-            {"name": transition.name, "points": list(map(str, transition.points)), "time": round(time, 6)}
+            {
+                "name": spelling.instant(transition),
+                "points": list(dict.fromkeys(map(spelling, transition.points))),
+                "time": round(time, 6),
+            }
             for transition, time in zip(net.transitions, plan.schedule, strict=True)
         ],
         "places": [asdict(place) | {"tokens": tokens} for place, tokens in zip(net.places, net.initial, strict=True)],
@@ -76,7 +99,7 @@ def as_json(plan: Plan) -> str:
         "live": is_live(net),
         "safe": is_safe(net),
         "behaviors": {
-            id: {point.sync: round(plan.predicted(point), 6) for point in chain.points}
+            id: {spelling.sync(point): round(plan.predicted(point), 6) for point in chain.points}
             for id, chain in plan.chains.items()
         },
         "natural": sorted(plan.natural),
@@ -92,21 +115,21 @@ def as_json(plan: Plan) -> str:
 
 def as_message(plan: Plan) -> NetPlanned:
     """The net as watchers are told of it, before the block has begun: with its initial marking."""
-    return described(plan, Stamp("", 0.0), plan.net.initial, {})
+    return described(plan, Stamp("", 0.0), plan.net.initial, {}, Spelling(plan.block))
 
 
 def as_pnml(plan: Plan) -> str:
-    """The net as a P/T net of ISO/IEC 15909-2; `pnml.read_pnml` reads it back."""
+    """The net as a P/T net of ISO/IEC 15909-2, with the drafts' names; `pnml.read_pnml` reads it back."""
     return pnml.as_pnml(plan.net, plan.block.id)
 
 
 def as_dot(plan: Plan) -> str:
     """The net for Graphviz: bars are transitions (framed if critical), circles places, dashed arrows bounds."""
-    net = plan.net
+    net, spelling = plan.net, Spelling(plan.block)
     critical = frozenset(plan.critical)
     lines = [f"digraph {_quoted(plan.block.id)} {{", "  rankdir=LR;", '  node [fontname="sans-serif", fontsize=10];']
     for number, transition in enumerate(net.transitions):
-        label = _quoted(f"{transition.name}\n{plan.schedule[number]:.2f} s")
+        label = _quoted(f"{spelling.instant(transition)}\n{plan.schedule[number]:.2f} s")
         frame = 2 if number in critical else 0.5
         lines.append(f"  t{number} [shape=box, style=filled, fillcolor=gray85, penwidth={frame}, label={label}];")
     for number, place in enumerate(net.places):

@@ -39,6 +39,57 @@ def test_the_json_has_every_point_with_its_time(engage: Engage, block: Path) -> 
     assert behaviors["look"]["stroke"] == behaviors["words"]["start"] > 0
 
 
+IN_BML_1_0 = """<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0">
+  <gaze id="look" target="rectangle"/>
+  <faceLexeme id="smile" lexeme="RAISE_MOUTH_CORNERS" attackPeak="look:ready"/>
+  <head id="nod" lexeme="NOD" repetition="2" start="look:end+0.5"/>
+  <head id="shake" lexeme="SHAKE"/>
+</bml>"""
+
+
+def test_a_plan_names_points_as_its_block_does_and_each_once(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "b.xml"
+    path.write_text(IN_BML_1_0)
+    text, drawn = engage("plan", path).out, engage("plan", "--format", "dot", path).out
+    document = json.loads(engage("plan", "--format", "json", path).out)
+
+    assert "  look:ready = smile:attackPeak" in text
+    for told in (text, drawn):
+        assert "_start" not in told
+        assert "look:stroke" not in told
+        assert "nod:stroke:2" in told
+    assert list(document["behaviors"]["look"]) == ["start", "ready", "relax", "end"]
+    assert list(document["behaviors"]["smile"]) == ["start", "attackPeak", "relax", "end"]
+    points = [point for each in document["transitions"] for point in each["points"]]
+    assert {"look:ready", "smile:attackPeak", "nod:strokeStart"} <= {*points}
+    assert len(points) == len({*points})
+
+
+def test_what_the_block_says_is_told_apart_from_what_is_added_and_each_line_once(
+    engage: Engage, tmp_path: Path
+) -> None:
+    path = tmp_path / "b.xml"
+    path.write_text(IN_BML_1_0)
+    said, added = engage("plan", path).out.split("what the block says:\n")[1].split("\n\n")[:2]
+
+    heading, *lines = added.splitlines()
+    assert heading == "what the planner adds:"
+    assert said == "  nod:start  at  look:end +0.5 s"
+    assert "  shake:start  no earlier than  nod:end  (line 5)" in lines
+    assert len(lines) == len({*lines})
+
+
+def test_of_a_block_that_names_another_it_is_told_how_to_try_the_two(engage: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "tied.xml"
+    path.write_text('<bml id="tied"><constraint id="c"><after ref="long:s:end"><sync ref="w:start"/></after>'
+                    '</constraint><wait id="w" duration="1"/></bml>')  # fmt: skip
+    refused = engage("plan", path)
+
+    assert refused.code == 2
+    assert "no live block is called 'long'" in refused.err
+    assert "`engage play --embedded --virtual-time --at 0,1 FIRST.xml tied.xml`" in refused.err
+
+
 def test_the_dot_is_a_graph(engage: Engage, block: Path) -> None:
     assert engage("plan", "--format", "dot", block).out.startswith('digraph "hello" {')
 

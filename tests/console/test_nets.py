@@ -242,6 +242,40 @@ def test_changes_are_told_one_by_one() -> None:
     assert list(told(after["b"], feed(after, FIGURE_4_8, 0.0, 0.3)["b"])) == ["b: ● b at rest"]
 
 
+def test_of_a_net_that_is_planned_anew_only_the_tokens_are_told_that_lie_elsewhere() -> None:
+    start = NetMarked(block="b", fired=(Fired(transition=0, time=0.0),), put=(0, 3), taken=(19,))
+    before = feed(feed({}, FIGURE_4_8, 0.0, 0.0), start, 0.0, 0.1)
+    speechless = replace(
+        FIGURE_4_8,
+        places=tuple(each for each in FIGURE_4_8.places if each.behavior != SPEECH),
+        marked=(0, 1, 2),
+        fired=(Fired(transition=0, time=0.0),),
+    )
+    assert list(told(before["b"], feed(before, speechless, 0.0, 0.2)["b"])) == [
+        "b: net of 13 instants and 17 places, planned anew", "b: ● point-1 waits for its start, with gaze-1:stroke",
+    ]  # fmt: skip
+
+
+def test_letters_stand_for_points_as_a_block_spells_them_and_for_every_stroke() -> None:
+    syncs = ("n:start", "n:strokeStart", "n:stroke", "n:stroke:2", "n:strokeEnd", "smile:attackPeak", "s:m1")
+    message = NetPlanned(
+        block="b", at=AT, places=(),
+        transitions=(
+            *(
+                NetTransition(points=(NetPoint(behavior=id, sync=sync),), time=float(time))
+                for time, (id, _, sync) in enumerate(each.partition(":") for each in syncs)
+            ),
+            instant(9.0, ":end"),
+        ),
+    )  # fmt: skip
+    net = in_view(message)
+    assert net is not None
+    rows = {line.split()[0]: "".join(line.split()[1:]) for line in drawing(net)[2:]}
+    assert rows["n"].replace("┊", "") == "s[**]"
+    assert (rows["smile"].strip("┊"), rows["s"].strip("┊")) == ("p", "m")
+    assert legend((net,)) == "●=token s=start p=attackPeak [=strokeStart *=stroke ]=strokeEnd e=end m=mark"
+
+
 def test_a_block_that_waits_for_its_turn_is_told_and_drawn_with_those_that_it_waits_for() -> None:
     running = feed({}, FIGURE_4_8, 0.0, 0.0)
     waiting = feed(running, NetWaiting(block="c", since=AT, waits_for=("b", "a")), 0.0, 0.0)

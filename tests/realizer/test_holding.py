@@ -20,7 +20,7 @@ from engage_hri.services.realizer.perform import steering
 from engage_hri.services.realizer.perform.holding import Holds
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.realizer.fake_body import FakeBody
+from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import FakeRecognition, after, block, stage, together
 from tests.realizer.steering import steered
@@ -257,9 +257,10 @@ async def test_a_hold_expires_whenever_it_began(since: float) -> None:
 
 @pytest.mark.parametrize("ends", ["interrupted", "by itself"])
 async def test_a_hold_of_a_behavior_ends_with_it(ends: str) -> None:
-    async with stage() as seen:
+    fails = FakeBody({"beat": Script(fail="stroke_end")})
+    async with stage(None if ends == "interrupted" else fails) as seen:
         performing = seen.ask(block((BEAT, Wait(id="w", duration=100.0))))
-        await asyncio.sleep(0.2 if ends == "interrupted" else 2.0)  # at 2 s on its way home, where it cannot wait
+        await asyncio.sleep(0.2 if ends == "interrupted" else 1.3)  # at 1.3 s on its way to where it fails
         await steered(seen, "hold", "b", "beat")
         await asyncio.sleep(1.0)
         if ends == "interrupted":
@@ -282,6 +283,20 @@ async def test_a_behavior_that_is_held_for_too_long_is_stopped_and_its_block_goe
 
     assert isinstance(outcome, BlockOutcome)
     assert (outcome.status, outcome.interrupted) == ("done", ("beat",))
+
+
+async def test_a_behavior_that_can_wait_nowhere_any_more_is_not_held() -> None:
+    async with stage() as seen:
+        performing = seen.ask(block((BEAT, STORY)))
+        await seen.seen("beat:relax")
+        with pytest.raises(RequestRefused, match="nothing of it can wait any more"):
+            await steered(seen, "hold", "b", "beat")
+        assert await steered(seen, "hold", "b", "s") == ("b",)
+        await asyncio.sleep(5.0)
+        assert "beat:end" in seen.times()
+        assert "s:end" not in seen.times()
+        await steered(seen, "continue", "b")
+        await performing.outcome
 
 
 async def test_a_refused_block_of_the_same_id_lets_nothing_go() -> None:

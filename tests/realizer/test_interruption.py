@@ -51,7 +51,8 @@ async def test_the_behavior_ends_and_the_block_goes_on_to_be_done() -> None:
     assert isinstance(outcome, BlockOutcome)
     assert (outcome.status, outcome.interrupted, outcome.dropped) == ("done", ("beat",), ())
     assert list(seen.times()) == ["beat:start", "s:start", "beat:ready", "beat:stroke_start", "s:m1", "s:m2", "s:end"]
-    assert [(each.kind, each.behavior) for each in seen.warnings()] == [("INTERRUPTED", "beat")]
+    told = [(each.kind, each.behavior, each.message) for each in seen.warnings()]
+    assert told == [("INTERRUPTED", "beat", "stopped on request")]
 
 
 async def test_what_waited_for_it_waits_no_longer() -> None:
@@ -201,7 +202,7 @@ async def test_speech_ends_at_a_word_and_the_words_are_told() -> None:
     assert "" != answer.spoken != text
     assert text.startswith(f"{answer.spoken} ")
     assert [(each.text, each.complete) for each in outcome.spoken] == [(answer.spoken, False)]
-    assert robot.seen.warnings()[0].message == f"interrupted after {answer.spoken!r}"
+    assert robot.seen.warnings()[0].message == f"stopped on request, after {answer.spoken!r}"
     assert outcome.status == "done"
 
 

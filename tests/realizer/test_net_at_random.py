@@ -186,7 +186,7 @@ def test_a_plan_in_words() -> None:
     names = [each.name for each in made.net.transitions]
     lines = as_text(made).splitlines()
     assert lines[0] == f"block ex: {len(names)} transitions, {len(made.net.places)} places, live, safe"
-    first, second = (number for number, line in enumerate(lines) if not line)
+    first, second, *_ = (number for number, line in enumerate(lines) if not line)
     shown = [re.fullmatch(r"([* ])\s*(\d+\.\d{3}) s  (.*)", line) for line in lines[first + 1 : second]]
     told = [(float(each[2]), each[3], each[1] == "*") for each in shown if each]
     assert len(told) == len(names) == second - first - 1
@@ -195,7 +195,7 @@ def test_a_plan_in_words() -> None:
         number = names.index(name)
         assert time == pytest.approx(made.schedule[number], abs=5e-4)
         assert is_critical == (number in made.critical)
-    ties = lines[second + 1 : -1]
+    ties = [line for line in lines[second + 1 : -1] if line.startswith("  ")]
     assert "  s:start  no earlier than  p:stroke +0.25 s" in ties
     assert "  t:start  no later than  p:end +2 s" in ties
     assert "  p:start  at  bml:start +1.5 s" in ties
@@ -204,6 +204,10 @@ def test_a_plan_in_words() -> None:
     assert len(ties) == len({place for place in made.net.places if place.kind in ("order", "series") and place.source}
                             | {bound for bound in made.net.bounds if bound.kind != "phase"})  # fmt: skip
     assert len(ties) == len(set(ties))
+    assert lines[second + 1] == "what the block says:"
+    added = lines[lines.index("what the planner adds:") + 1 : -2]
+    assert "  t:start  no earlier than  s:end  (line 5)" in added
+    assert "  p:start  at  bml:start +1.5 s" not in added
     assert lines[-1] == "ends when something takes its place, or with the block: g"
 
 

@@ -5,12 +5,18 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager, suppress
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, Composition
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlanned, NetWaiting
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.perform.net_stream import NetStream
+from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.words import Spelling
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
 from tests.realizer.test_figures import FIGURES
@@ -223,6 +229,33 @@ async def test_what_is_dropped_on_the_way_is_gone_from_the_net_and_the_others_ke
     }
     assert held == {("gaze-1", "gaze-1:stroke"), ("speech-1", "speech-1:start")}
     assert watcher.seen[-1] == watcher.initial()
+
+
+async def test_a_net_that_is_planned_anew_several_times_in_a_moment_is_told_once() -> None:
+    plans = [plan_block(block((GAZE, POINT, SPEECH)[:count])) for count in (3, 2, 1)]
+    async with MemoryHub() as hub:
+        bus, watcher = hub.join("realizer"), Watcher()
+        listening = asyncio.create_task(_listen(hub.join("watcher"), watcher), name="watch the net")
+        await asyncio.sleep(0)
+        stream = NetStream(bus, "b", Spelling(plans[0].block))
+        for plan in plans:
+            stream.planned(plan, RunningNet(plan.net, plan.members, plan.at), bus.now())
+        await asyncio.sleep(0.1)
+        stream.close()
+        listening.cancel()
+        with suppress(asyncio.CancelledError):
+            await listening
+    sizes = [len(each.transitions) for each in watcher.plans]
+    assert sizes == [len(plans[0].net.transitions), len(plans[2].net.transitions)]
+
+
+async def test_the_net_spells_points_as_the_block_does() -> None:
+    watcher, _ = await watched(replace(block((GAZE, POINT)), dialect="bml-1.0"))
+
+    syncs = [(each.behavior, each.sync) for instant in watcher.plans[0].transitions for each in instant.points]
+    assert sorted(sync for id, sync in syncs if id == "gaze-1") == ["end", "ready", "relax", "start"]
+    assert ("point-1", "strokeStart") in syncs
+    assert len(syncs) == len(set(syncs))
 
 
 async def test_what_fires_in_the_moment_of_a_new_plan_is_told_once() -> None:

@@ -7,6 +7,7 @@ import pytest
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from tests.realizer.test_losses import planned
@@ -124,3 +125,38 @@ def test_of_two_speeches_that_overlap_it_is_told_who_has_the_voice_and_no_riddle
     assert problem.message.endswith("; b:start = 1.2 is given up, so that the words are said")
     assert "would come" not in problem.message
     assert "not before" not in problem.message
+
+
+TWO_FACES = """<faceFacs id="f" au="12" start="0" end="2"/>
+<faceFacs id="f2" au="1" start="0" end="2"/>"""
+
+
+def test_of_two_faces_at_once_it_is_told_that_one_face_can_show_both() -> None:
+    block = decode_xml(ONE_POINT_0.format(TWO_FACES))
+    assert isinstance(block, Block)
+    faces = [Estimate(behavior=id, feasible=True, parts=("face",), phases=FACE) for id in ("f", "f2")]
+
+    (problem,) = plan_block(block, faces).problems
+    assert problem.message.endswith(
+        "(put both into one <face>, each as its <lexeme> or <facs>, or let one of the two begin later)"
+    )
+
+
+FACE = (
+    Phase(since="start", to="stroke", shortest=0.1, natural=0.25),
+    Phase(since="stroke", to="relax", shortest=0.0, natural=0.5),
+    Phase(since="relax", to="end", shortest=0.1, natural=0.25),
+)
+
+
+def test_a_required_behavior_that_the_body_refuses_is_told_with_one_advice() -> None:
+    block = decode_xml(ONE_POINT_0.format('<gaze id="g" target="cap" required="true"/>'))
+    assert isinstance(block, Block)
+    fault = Fault(reason="the world has no 'cap'", where="g", advice="did you mean 'cup'?")
+
+    with pytest.raises(BlockRefused) as refusal:
+        plan_block(block, [Estimate(behavior="g", feasible=False, fault=fault, warning="NO_SUCH_TARGET")])
+    assert str(refusal.value) == (
+        "b: g, line 2: the world has no 'cap' "
+        "(did you mean 'cup'?; it is required: without `required` it would be dropped)"
+    )

@@ -6,7 +6,6 @@ from math import inf
 UNSAID = inf
 """Seconds of a step of which it is not said how long it takes."""
 STEPS = (
-    (r"(?P<behavior>\S+) lasts from (?P<since>.+) to (?P<to>.+)", 1),
     (r"(?P<behavior>\S+) takes (?P<seconds>\S+) s from (?P<since>.+) to (?P<to>.+)", 1),
     (r"(?P<behavior>\S+) takes at most (?P<seconds>\S+) s from (?P<to>.+) to (?P<since>.+)", -1),
     (r"(?P<to>.+) is (at least )?(?P<seconds>\S+) s after (?P<since>.+)", 1),
@@ -29,7 +28,10 @@ def _step(text: str) -> Step:
         if (found := re.fullmatch(form, text)) and not (sign > 0 and " at most " in text):
             names = found.groupdict()
             since, to = (tuple(names[end].split(" = ")) for end in ("since", "to"))
-            return since, to, UNSAID if " lasts from " in text else sign * float(names.get("seconds") or 0.0)
+            return since, to, sign * float(names.get("seconds") or 0.0)
+    if found := re.fullmatch(r"(?P<to>\S+ (?:start|end)s) when (?P<since>\S+ (?:start|end)s)", text):
+        since, to = ((found[end][:-1].replace(" ", ":"),) for end in ("since", "to"))
+        return since, to, 0.0
     raise AssertionError(f"not a step: {text!r}")
 
 
@@ -42,6 +44,18 @@ def closed(steps: list[Step]) -> list[Step]:
         found.append(step if step[0] == found[-1][1] else _turned(step))
         assert found[-1][0] == found[-2][1], steps
     assert found[-1][1] == found[0][0], steps
+    return found
+
+
+def closed_by_behaviors(steps: list[Step]) -> list[Step]:
+    """The steps, with those that need no words: from a point of a behavior to a later one of it."""
+    found = []
+    for step, following in zip(steps, [*steps[1:], *steps[:1]], strict=True):
+        found.append(step)
+        if step[1] != following[0]:
+            owners = [{each.partition(":")[0] for each in names} for names in (step[1], following[0])]
+            assert set.intersection(*owners), steps
+            found.append((step[1], following[0], UNSAID))
     return found
 
 

@@ -145,7 +145,7 @@ class SimulatedBody(Body):
             run = Run(behavior, course, authority, self._deviations, self._occasions)
             path = self._torso.path(run.course)
         except Impossible as impossible:
-            raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
+            raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
         unwatch = authority.watch(run.bell.ring)
         self._torso.take_over(run, path)
         try:
@@ -231,7 +231,7 @@ class SimulatedBody(Body):
         try:
             course = choreography.plan(behavior, self._torso.situation(self._torso.world))
         except Impossible as impossible:
-            raise BehaviorRefused(_fault(behavior, impossible.reason)) from impossible
+            raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
         self._torso.set_base(behavior, course, authority)
         self._torso.follow()
         now = self._loop.time()
@@ -255,8 +255,8 @@ class SimulatedBody(Body):
                 yield progress
 
 
-def _fault(behavior: BlockBehavior, reason: str) -> Fault:
-    return Fault(reason=reason, where=behavior.id, service="control")
+def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
+    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
 
 
 def _out_of_reach(run: Run) -> BodyFailed:

@@ -107,7 +107,7 @@ def plan(behavior: BlockBehavior, situation: Situation) -> Course:
 def _entity(target: str, world: World) -> Entity:
     if (entity := world.entity(target)) is None:
         advice = suggestion(target, (each.id for each in world.entities), "it is empty")
-        raise Impossible("NO_SUCH_TARGET", f"the world has no {target!r} ({advice})")
+        raise Impossible("NO_SUCH_TARGET", f"the world has no {target!r}", advice)
     return entity
 
 

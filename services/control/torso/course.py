@@ -15,12 +15,13 @@ from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
 
 class Impossible(Exception):
-    """The body cannot do a behavior. kind: of the warning that says so. reason: in words."""
+    """The body cannot do a behavior. kind: of the warning that says so. reason, advice: in words."""
 
-    def __init__(self, kind: WarningKind, reason: str) -> None:
+    def __init__(self, kind: WarningKind, reason: str, advice: str = "") -> None:
         super().__init__(reason)
         self.kind = kind
         self.reason = reason
+        self.advice = advice
 
 
 class CoursePoint(Struct, frozen=True):

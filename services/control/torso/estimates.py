@@ -23,7 +23,7 @@ Added = Callable[[Seconds], Array]
 
 
 def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
-    fault = Fault(reason=impossible.reason, where=behavior.id, service="control")
+    fault = Fault(reason=impossible.reason, where=behavior.id, advice=impossible.advice, service="control")
     return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=impossible.kind)
 
 

@@ -228,7 +228,7 @@ class Repertoire:
         known = self.lexemes(table)
         close = get_close_matches(normal(lexeme), known, n=3, cutoff=0.5) if table != "facs" else []
         there = f"do you mean {' or '.join(close)}?" if close else f"there are {', '.join(known)}."
-        return f"{what}: {there} A repertoire file can add it (docs/control.md)"
+        return f"{what}: {there} A repertoire file can add it: see docs/control.md"
 
     def _check(self, raw: Mapping[str, Any], nearest: Mapping[str, Any], file: str) -> None:
         """Check that the lexemes of a file lead to paths, and these are within the limits. Raises InputRefused."""

@@ -102,6 +102,13 @@ class Decisions:
         self.foresight.expect_next(point.behavior)
         return news
 
+    def can_wait(self, behavior: str) -> bool:
+        """True if a behavior of the plan can still be made to wait; a voice always can, between two words."""
+        chain, facts = self.plan.chains[behavior], self.facts
+        is_moving = behavior in facts.begun and performer(chain.behavior) == "body" and chain.type != "speech"
+        ahead = chain.points[facts.next_number(behavior) :]
+        return not is_moving or any(self.net.part_of[point].can_wait for point in ahead)
+
     def hold_up(self, is_held: bool, now: Seconds) -> None:
         """Note that something is held from now on, of whatever block, or nothing any more.
 

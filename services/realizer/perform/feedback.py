@@ -33,7 +33,8 @@ MOVED: Seconds = 0.008
 """Seconds; a prediction that moves by less, as something was measured, is not told again."""
 PLANNED: Seconds = 0.002
 """The same for the predictions of another plan: they are no mere consequence of what was measured."""
-
+ON_REQUEST = "stopped on request"
+"""What ended a behavior or a block for which no other reason was given."""
 AGAIN: Seconds = 0.001
 """Seconds between predictions, for each point that the last one told: the cost grows with their number."""
 
@@ -195,10 +196,9 @@ class Reporter:
         self._say(warning)
 
     def interrupted(self, behavior: str, spoken: SpokenText | None, reason: str) -> None:
-        """Warn that a behavior was ended on request, or for a reason."""
-        said = f" after {spoken.text!r}" if spoken is not None else ""
-        why = f": {reason}" if reason else ""
-        self.warn("INTERRUPTED", f"interrupted{said}{why}", behavior)
+        """Warn that a behavior was ended for a reason (none: on request), and after which words."""
+        said = f", after {spoken.text!r}" if spoken is not None else ""
+        self.warn("INTERRUPTED", f"{reason or ON_REQUEST}{said}", behavior)
 
     def ended(self, status: str, began: Seconds) -> None:
         now = self._no_earlier(self._bus.now())

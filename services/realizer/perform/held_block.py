@@ -61,6 +61,10 @@ class HeldBlock:
     def _now(self) -> Seconds:
         return self._owner.report.now()
 
+    def can_wait(self, behavior: str) -> bool:
+        """True if the behavior, which is going on, can still be made to wait somewhere."""
+        return not self._owner.has_begun or self._owner.decisions.can_wait(behavior)
+
     def begin(self) -> None:
         """Hold what is held as the block begins."""
         if self.is_holding:

@@ -7,14 +7,20 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net.petri_net import Marking
 from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point
 
 
-def described(plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Seconds]) -> NetPlanned:
-    """The net of a plan with its tokens. began: when the block started. fired: transitions, seconds after that."""
+def described(
+    plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Seconds], spelling: Spelling
+) -> NetPlanned:
+    """The net of a plan with its tokens. began: when the block started. fired: transitions, seconds after that.
+
+    Points that have one name in the block's dialect are told once: in BML 1.0 a gaze's `stroke_start` is its `start`.
+    """
     transitions = [
         NetTransition(
-            points=tuple(map(_point, each.points or (FINISH,))),
+            points=tuple(dict.fromkeys(_point(point, spelling) for point in each.points or (FINISH,))),
             time=time,
         )
         for each, time in zip(plan.net.transitions, plan.schedule, strict=True)
@@ -33,8 +39,8 @@ def described(plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Se
     )
 
 
-def _point(point: Point) -> NetPoint:
-    return NetPoint(behavior=as_told(point.behavior), sync=point.sync)
+def _point(point: Point, spelling: Spelling) -> NetPoint:
+    return NetPoint(behavior=as_told(point.behavior), sync=spelling.sync(point))
 
 
 def tokens(marking: Marking) -> tuple[int, ...]:

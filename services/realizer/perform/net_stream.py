@@ -18,6 +18,7 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.live import Live
 from engage_hri.services.realizer.perform.net_message import described, firings
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.runtime.alarm import Timer
 
 EVERY: Seconds = 0.05
@@ -29,20 +30,32 @@ AGAIN: Seconds = 2.0
 class NetStream(Observer):
     """Publisher of one block's marking."""
 
-    def __init__(self, bus: Bus, block: str) -> None:
+    def __init__(self, bus: Bus, block: str, spelling: Spelling) -> None:
         self._bus = bus
         self._block = block
+        self._spelling = spelling
         self._fired: dict[int, Seconds] = {}
         """Transitions that have fired since the last message."""
+        self._net: RunningNet | None = None
+        self._is_untold = False
+        """True if the net was planned anew since the last message."""
         self._soon = Timer(self._tell)
         self._again = Timer(self._tell_all)
 
     def planned(self, plan: Plan, net: RunningNet, began: Seconds) -> None:
-        """Publish the net that runs from now on."""
+        """Publish the net that runs from now on: at once as the block begins, later in a moment.
+
+        A block that others are tied to is planned anew several times in one moment: watchers need the last alone.
+        """
+        is_first = self._net is None
         self._net = net
         self._began = began
         self._plan = plan
-        self._tell_all()
+        if is_first:
+            self._tell_all()
+        else:
+            self._is_untold = True
+            self.tell_soon()
 
     def tell_soon(self) -> None:
         """Publish what has changed since the last message, in a moment."""
@@ -60,6 +73,9 @@ class NetStream(Observer):
         self._again.set(None)
 
     def _tell(self, *, is_over: bool = False) -> None:
+        assert self._net is not None
+        if self._is_untold:
+            self._tell_all()
         put, taken = self._net.changes()
         fired, self._fired = self._fired, {}
         if fired or put or taken or is_over:
@@ -68,10 +84,12 @@ class NetStream(Observer):
             self._bus.publish(keys.NET, message)
 
     def _tell_all(self) -> None:
+        assert self._net is not None
+        self._is_untold = False
         self._net.changes()
         self._fired.clear()
         fired = {each: at - self._began for each, at in self._net.instants.items()}
-        message = described(self._plan, self._bus.stamp(self._began), self._net.marking, fired)
+        message = described(self._plan, self._bus.stamp(self._began), self._net.marking, fired, self._spelling)
         self._bus.publish(keys.NET, replace(message, block=self._block))
         self._again.set(self._bus.now() + AGAIN)
 

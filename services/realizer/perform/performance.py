@@ -55,14 +55,14 @@ class BlockPerformance:
         """held, is_held: see `HeldBlock`."""
         self._live, self.id = live, live.id
         self.plan, self._shared = plan, shared
-        self.bus = shared.bus
-        self._config = shared.config
+        self.bus, self._config = shared.bus, shared.config
         self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
-        self._net = NetStream(shared.bus, live.id)
-        self.report = Reporter(shared.bus, live.id, shared.config.skew, Spelling(plan.block, live.elsewhere))
+        spelling = Spelling(plan.block, live.elsewhere)
+        self._net = NetStream(shared.bus, live.id, spelling)
+        self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
@@ -323,7 +323,7 @@ class BlockPerformance:
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
-                said = Fault(reason=fault.reason, where=f"{self.id}: {id}", line=fault.line)
+                said = Fault(reason=fault.reason, where=f"{self.id}: {id}", line=fault.line, advice=fault.advice)
                 self._live.stop(Ending("failed", said))
         self._let_go(id)
         self.plan_again()

@@ -11,6 +11,7 @@ from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.feedback import ON_REQUEST
 from engage_hri.services.realizer.perform.holding import Holds, Named
 from engage_hri.services.realizer.perform.live import Ending, Live, absence
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
@@ -56,6 +57,11 @@ class Steering:
                 nameless = Fault(reason="names no block", advice=f"the whole robot: `steer_robot`, on {keys.ROBOT}")
                 self._desk.refuse(request.id, absence(block, behavior, self._live.values()) if block else nameless)
                 return
+            if request.to == "hold" and behavior and not any(self._can_wait(live, behavior) for live in concerned):
+                reason = "nothing of it can wait any more: it has passed its last hold point, and goes on to its end"
+                fault = Fault(reason=reason, where=f"{block}: {behavior}", advice="`stop` ends it now")
+                self._desk.refuse(request.id, fault)
+                return
             self._desk.accept(request.id)
             match request.to:
                 case "hold":
@@ -64,7 +70,7 @@ class Steering:
                     self._holds.let_go(block, behavior)
                 case "stop":
                     self._holds.let_go(block, behavior)
-                    await self._stop(concerned, behavior, "" if behavior else "stopped on request")
+                    await self._stop(concerned, behavior, "" if behavior else ON_REQUEST)
             self._apply()
             around = self._holds.around(block, behavior) if request.to == "continue" else None
             if around is None:
@@ -76,6 +82,11 @@ class Steering:
         """True if the behavior is performed, or is to be when its block begins."""
         performance = self._performances.get(live.request.id)
         return live.has_yet(behavior) if performance is None else performance.is_going_on(behavior)
+
+    def _can_wait(self, live: Live, behavior: str) -> bool:
+        """True if the behavior can still be made to wait."""
+        performance = self._performances.get(live.request.id)
+        return self.is_going_on(live, behavior) and (performance is None or performance.held.can_wait(behavior))
 
     async def interrupt(self, live: Live, behavior: str, reason: str = "") -> bool:
         """End a behavior that is going on, or take it out if its block has yet to begin.

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import types_with
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
@@ -20,6 +21,7 @@ from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import (
     AS_IN_DRAFTS,
+    LATER,
     Spelling,
     lines_by_point,
     lines_of_instants,
@@ -27,9 +29,12 @@ from engage_hri.services.realizer.plan.words import (
     see_lines,
     shortage,
     taken,
+    waits_in,
     way_round,
 )
 from engage_hri.services.realizer.points import EPSILON, Point
+
+FACES = types_with(family="face", lasts=True)
 
 
 class Loss(NamedTuple):
@@ -104,6 +109,8 @@ def _in_the_way(turn: Turn, lost: str, chains: Mapping[str, Chain], at: Seconds 
 def _instead(turn: Turn, lost: str, chains: Mapping[str, Chain], spelling: Spelling) -> str:
     later, holder = turn[0], turn[1].behavior
     other = holder if lost == later else later
+    if all(chains[each].type in FACES for each in (lost, other)):
+        return f"put both into one <face>, each as its <lexeme> or <facs>, or {LATER}"
     return other_part(lost, chains[lost].parts, chains[other].parts, spelling)
 
 
@@ -245,7 +252,7 @@ def _deadlock(
     lines = sorted(
         {line for tie in ties for line in tie.lines} | lines_of_instants(ties, net, orders, classes, chains)
     )
-    way = way_round(net, circle, is_timed=False, spelling=spelling)
+    way = waits_in(net, circle, spelling)
     fault = Fault(
         reason=f"these points wait for each other in a circle: {way}",
         where=block,

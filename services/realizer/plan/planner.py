@@ -133,9 +133,9 @@ class _Planner:
             self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
             self.dropped[behavior.id] = None
         elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
-            kind = unsupported.kind_of(estimate.warning)
-            fault = estimate.fault or Fault(reason="the body cannot do it")
-            self._drop(behavior.id, kind, fault.within(self.block.id, behavior.id))
+            kind, reason, advice = unsupported.refused(estimate, self.block.id)
+            self._refuse_if_required(behavior.id, reason, kind, advice)
+            self._drop(behavior.id, kind, f"{reason} ({advice})" if advice else reason)
         else:
             self.chains[behavior.id] = chain(behavior, estimate)
             if estimate and estimate.degraded:
@@ -147,8 +147,7 @@ class _Planner:
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind, advice: str = "") -> None:
         if id in self.relations.required:
-            required = "it is required: without `required` it would be dropped"
-            advice = "; ".join(filter(None, (advice, required)))
+            advice = "; ".join(filter(None, (advice, "it is required: without `required` it would be dropped")))
             fault = Fault(reason=reason, where=f"{self.block.id}: {id}", line=self.lines[id], advice=advice)
             raise BlockRefused(fault, kind)
 

@@ -73,6 +73,8 @@ class Order(Struct, frozen=True, gc=False):
     placed: str = ""
 
 
+NO_SUCH_BLOCK = "no live block is called"
+"""Part of the reason why a block is refused that names another one."""
 EMPTY = "has nothing in it that says what to show; it moves nothing"
 """What is told of a face or posture that names nothing."""
 DROPPED = "; the behavior is dropped"
@@ -204,7 +206,7 @@ class _Reader:
         if ref.block not in self.elsewhere:
             advice = suggestion(ref.block, self.elsewhere, "none is live")
             advice = f"only blocks that came earlier can be named, until they end; {advice}"
-            raise self.refusal(f"{text!r}: no live block is called {ref.block!r}", where, line, advice)
+            raise self.refusal(f"{text!r}: {NO_SUCH_BLOCK} {ref.block!r}", where, line, advice)
         other = self.elsewhere[ref.block]
         if ref.block not in self.theirs:
             self.theirs[ref.block] = {each.id: each for each in other.behaviors} if other is not None else {}

@@ -195,25 +195,48 @@ def _behind(net: PetriNet, tie: Tie, chain: Chain, number: int) -> list[Point]:
     return [each for each in chain.points[number:] if each in net.transitions[_from_to(tie)[1]].points]
 
 
-def way_round(net: PetriNet, circle: Circle, *, is_timed: bool = True, spelling: Spelling = AS_IN_DRAFTS) -> str:
-    """Words for each tie of a circle; phases of a behavior that follow one another are said as one.
-
-    is_timed: False if it is a circle however long its behaviors take; then it is not said how long they do.
-    """
-    ours = [phase_of(tie) for tie, _ in circle]
-    if is_timed and (together := _together(net, circle)):
+def way_round(net: PetriNet, circle: Circle, *, spelling: Spelling = AS_IN_DRAFTS) -> str:
+    """Words for each tie of a circle; phases of a behavior that follow one another are said as one."""
+    if together := _together(net, circle):
         return f"{spelling.instant(together)} is one instant"
-    first = next((number for number, id in enumerate(ours) if not id or id != ours[number - 1]), 0)
     said = []
-    for id, run in groupby((*circle[first:], *circle[:first]), lambda each: phase_of(each[0])):
-        ties = list(run)
+    for id, ties in _runs(circle):
         if id:
             since, to = (spelling.instant(net.transitions[end]) for end in (ties[0][0].source, ties[-1][0].target))
-            long = f"takes {_seconds(sum(seconds for _, seconds in ties))}" if is_timed else "lasts"
-            said.append(f"{id} {long} from {since} to {to}")
+            said.append(f"{id} takes {_seconds(sum(seconds for _, seconds in ties))} from {since} to {to}")
         else:
             said += [_said(net, tie, seconds, spelling) for tie, seconds in ties]
     return ", ".join(said)
+
+
+def waits_in(net: PetriNet, circle: Circle, spelling: Spelling) -> str:
+    """Words for a circle that is one however long its behaviors take: `a starts when b ends, b starts when a ends`.
+
+    That a behavior ends after it starts needs no words.
+    """
+    runs = _runs(circle)
+    said = []
+    for (before, _), (id, ties) in zip([*runs[-1:], *runs], runs, strict=False):
+        if not id:
+            said += [_said(net, tie, seconds, spelling) for tie, seconds in ties]
+        elif before:
+            points = net.transitions[ties[0][0].source].points
+            this, last = ([point for point in points if point.behavior == each] for each in (id, before))
+            said.append(f"{_comes(this[0], spelling)} when {_comes(last[-1], spelling)}")
+    return ", ".join(said)
+
+
+def _comes(point: Point, spelling: Spelling) -> str:
+    """Write `a starts`, `a ends`, or `a:stroke comes`."""
+    return f"{point.behavior} {point.sync}s" if point.sync in ("start", "end") else f"{spelling(point)} comes"
+
+
+def _runs(circle: Circle) -> list[tuple[str, Circle]]:
+    """The ties of a circle, with phases of one behavior that follow one another together, and whose they are."""
+    ours = [phase_of(tie) for tie, _ in circle]
+    first = next((number for number, id in enumerate(ours) if not id or id != ours[number - 1]), 0)
+    turned = (*circle[first:], *circle[:first])
+    return [(id, tuple(run)) for id, run in groupby(turned, lambda each: phase_of(each[0]))]
 
 
 def _together(net: PetriNet, circle: Circle) -> Transition | None:
