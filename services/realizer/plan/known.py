@@ -68,6 +68,10 @@ class Known(Struct, frozen=True, kw_only=True):
             return times
         return {**self.points, **{point: at for point, at in times.items() if not is_foreign(point.behavior)}}
 
+    def natural_end(self, chain: Chain) -> Seconds:
+        """Expected end of a behavior of this block that has begun, if it goes on at its natural pace."""
+        return self.points[chain.points[0]] + sum(each.natural for each in chain.segments)
+
     def _with_waiting(self, times: Mapping[Point, Seconds], end: Seconds) -> Mapping[Point, Seconds]:
         """The same times, with points of others no earlier than they can be if they wait for points of this block."""
         own = {**times, BLOCK_END: end}

@@ -15,7 +15,6 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
@@ -119,7 +118,9 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
-        if begun := sorted(self.known.begun & self.chains.keys(), key=self._ends):
+        if begun := sorted(
+            self.known.begun & self.chains.keys(), key=lambda id: self.known.natural_end(self.chains[id])
+        ):
             # Who has begun comes first; neighbors come after the last of these to end.
             self.chains = {id: self.chains[id] for id in dict.fromkeys((*begun, *self.chains))}
         self.places = tuple(self.chains)
@@ -140,10 +141,6 @@ class _Planner:
             self.chains[behavior.id] = chain(behavior, estimate)
             if estimate and estimate.degraded:
                 self.problems.append(Problem("DEGRADED", at_line(behavior.line, estimate.degraded), behavior.id))
-
-    def _ends(self, id: str) -> Seconds:
-        """Expected end of a behavior that has begun, if it goes on at its natural pace."""
-        return self.known.points[Point(id, "start")] + sum(each.natural for each in self.chains[id].segments)
 
     def _refuse_if_required(self, id: str, reason: str, kind: WarningKind, advice: str = "") -> None:
         if id in self.relations.required:
@@ -270,13 +267,12 @@ class _Planner:
             )
             undated = foresight.without_date(assembly, self.known) if given else ()
             waits = foresight.waits(assembly, self.known)
-            arranged, others = yield from share(
-                self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits
-            )
+            sharing = share(self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits)
+            arranged, others = yield from sharing
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
-            required = self.relations.required
-            if losses := (yield from clashes(turns, self.chains, required, classes, everywhere, self.spelling)):
+            rivals = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
+            if losses := (yield from rivals):
                 raise Losses(losses)
             for part in portions(conflicts):
                 for conflict in part:
