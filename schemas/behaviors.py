@@ -207,9 +207,9 @@ def expressed(behavior: Face | FaceLexeme | FaceFacs | FaceShift) -> tuple[Expre
 
 
 def is_empty(behavior: Behavior) -> bool:
-    """True for a posture, a face or a shift of these that names nothing to show. It may still keep a time."""
+    """True for a posture or a shift of the face that names nothing to show. (A face that does may keep a time.)"""
     match behavior:
-        case Face() | FaceShift():
+        case FaceShift():
             return not any(each.lexeme or each.au for each in expressed(behavior))
         case Posture() | PostureShift():
             return not behavior.stance and not any(each.lexeme for each in posed(behavior))

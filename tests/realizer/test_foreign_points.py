@@ -11,6 +11,7 @@ from engage_hri.services.realizer.perform.net_message import described, firings,
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point
 from tests.realizer.oracle import estimate
 from tests.realizer.planning import timed
@@ -104,7 +105,7 @@ def test_what_shared_a_tie_to_a_point_that_comes_too_late_stays_tied(x: float, e
 
 def test_the_message_about_a_net_has_all_of_it() -> None:
     made = planned(after("other:x:end", "n:stroke"), start="1", x=1.5)
-    message = described(made, Stamp("c", 7.0), made.net.initial, {0: 0.0, 2: 1.25})
+    message = described(made, Stamp("c", 7.0), made.net.initial, {0: 0.0, 2: 1.25}, Spelling(made.block))
 
     assert (message.block, message.at) == ("b", Stamp("c", 7.0))
     told = [[(each.behavior, each.sync) for each in one.points] for one in message.transitions]

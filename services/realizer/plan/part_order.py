@@ -87,7 +87,7 @@ class PartOrder:
         )
 
     def _leaving(self, chain: Chain) -> Seconds:
-        """When a behavior sets out for the first of its points that are tied, if that takes it its natural time."""
+        """Time at which a behavior sets out for the first of its points that are tied, at its natural pace."""
         gone = accumulate((each.natural for each in chain.segments), initial=0.0)
         passed = [(point, self._times[point] - seconds) for point, seconds in zip(chain.points, gone, strict=True)]
         return round(max(passed[0][1], min((at for point, at in passed if point in self._tied), default=0.0)), 6)
