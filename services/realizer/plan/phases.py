@@ -86,7 +86,7 @@ def _parts(behavior: BlockBehavior, estimate: Estimate | None) -> tuple[str, ...
 
 def natural_ends(chains: Mapping[str, Chain], relations: Relations) -> frozenset[str]:
     """Behaviors that last until something takes their place or all ends: the block does not say when they end."""
-    constrained = relations.constrained
+    constrained = relations.constrained | relations.untied
     return frozen(
         id
         for id, each in chains.items()

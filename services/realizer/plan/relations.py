@@ -103,7 +103,7 @@ class Relations(Struct, frozen=True, dict=True):
     """Everything that a block says about its points.
 
     unusable: behaviors that cannot be performed as written. required: those without which the block fails. blocks:
-    other blocks that it refers to.
+    other blocks that it refers to. untied: points that were tied to another block, for which there is no time.
     """
 
     equals: tuple[Equal, ...]
@@ -112,6 +112,7 @@ class Relations(Struct, frozen=True, dict=True):
     problems: tuple[Problem, ...] = ()
     unusable: frozenset[str] = frozenset()
     blocks: frozenset[str] = frozenset()
+    untied: frozenset[Point] = frozenset()
 
     @cached_property
     def named(self) -> frozenset[Point]:

@@ -41,6 +41,7 @@ def remaining(
         tuple(equals),
         tuple([Order(timed(each.earlier), timed(each.later), each.placed) for each in orders]),
         frozen(id for id in relations.required if id not in dropped),
+        untied=relations.untied,
     )
     return present, classes
 
@@ -54,10 +55,13 @@ def untied(relations: Relations, points: Container[Point]) -> Relations:
     orders = [
         each for each in relations.orders if not any(_is_of_others(end, points) for end in (each.earlier, each.later))
     ]
+    given_up = [term.point for equal, left in equals if left != equal.terms for term in left]
+    given_up += [end.point for each in {*relations.orders} - {*orders} for end in (each.earlier, each.later)]
     return replace(
         relations,
         equals=tuple([replace(equal, terms=left) for equal, left in equals if left == equal.terms or len(left) > 1]),
         orders=tuple(orders),
+        untied=frozen(point for point in given_up if not is_foreign(point.behavior)),
     )
 
 
