@@ -38,13 +38,15 @@ def constraints(case: Case) -> Iterator[Finding]:
                 if relation.kind != "same" and one is not relation.terms[0]:
                     continue
                 gap = _gap(relation, case.times[one.place] + one.offset, case.times[other.place] + other.offset)
-                if gap <= tolerance + _held(case, relation, one.place, other.place):
+                touched = _touched(instants, one.place, other.place)
+                held = _held(case, touched, one.place, other.place)
+                if gap <= tolerance + held:
                     continue
-                group = {(each.block, each.behavior) for each in _touched(instants, one.place, other.place)}
+                group = {(each.block, each.behavior) for each in touched}
                 if group & warned or _was_late_abroad(group, id, case):
                     continue
                 where = f"{relation.text}: {_shown(one, case)} against {_shown(other, case)}, off by {gap:.3f} s"
-                is_silent = gap > told + _held(case, relation, one.place, other.place)
+                is_silent = gap > told + held
                 if is_silent or not _was_past(one, other, id, case):
                     yield Finding(_law(one, other, id, case) if is_silent else "inexact", id, where)
 
@@ -70,16 +72,19 @@ def _counts(place: Place, block: str, case: Case) -> bool:
     return is_whole and not (ends and ends[0].at <= asked[block])
 
 
-def _held(case: Case, relation: Relation, *places: Place) -> float:
+def _held(case: Case, touched: set[Place], *places: Place) -> float:
     """Seconds that a relation may be off since something was held between its points, or near.
 
-    Something of these blocks, or of blocks that they share parts or points with, and may have to wait for.
+    Something of these blocks, or of blocks that they share parts or points with, and may have to wait for. A wait
+    whose end is one of these instants (`touched`) does not count the time either, from its start on.
     """
     if any(_ends_by_itself(case, place) for place in places):
         return inf
     times = [case.times[place] for place in places]
     held = merged(span for block in case.concerned(place.block for place in places) for span in case.holds(block))
-    seconds = within(held, min(times) - STANDING, max(times))
+    waits = [each for each in touched if case.blocks[each.block].behaviors[each.behavior].type == "wait"]
+    clocks = [case.times[start] for each in waits if (start := each._replace(sync="start")) in case.times]
+    seconds = within(held, min([min(times) - STANDING, *clocks]), max(times))
     return seconds + STANDING if seconds else 0.0
 
 
