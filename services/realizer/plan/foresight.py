@@ -1,6 +1,6 @@
 """Points of other blocks in the schedule of a block: when they come, and what they leave no time for."""
 
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from math import inf
 
@@ -84,6 +84,23 @@ def waits(assembly: Assembly, known: Known) -> Waits:
 def futile(impossible: Impossible) -> set[tuple[Point, Point]]:
     """Pairs of points, as of `awaited`, that wait for each other whatever is planned."""
     return {tie.pair for circle in impossible.circles for tie, _ in circle if isinstance(tie, Awaited)}
+
+
+def idle(impossible: Impossible, assembly: Assembly, order: Sequence[str]) -> set[tuple[str, str]]:
+    """Waits to leave out, as of `Assembly.waits`: of those in a circle that are mere custom only the last one.
+
+    order: behaviors of the block as the document has them.
+    """
+    rank = {id: number for number, id in enumerate(order)}
+    found = set[tuple[str, str]]()
+    for circle in impossible.circles:
+        ties = [tie for tie, _ in circle]
+        customs = [tie for tie in ties if tie.kind == "series" and assembly.waits([tie])]
+        found |= assembly.waits(tie for tie in ties if tie.kind != "series")
+        if customs:
+            ranks = [max(rank.get(each.behavior, -1) for each in assembly.members[tie.target]) for tie in customs]
+            found |= assembly.waits([customs[ranks.index(max(ranks))]])
+    return found
 
 
 def losses_to_others(

@@ -378,7 +378,7 @@ class _Planner:
                 if foreign := {point for point in late if is_foreign(point.behavior)}:
                     self.untied |= foreign
                     raise Misordered from None
-            elif idle := assembly.waits(tie for circle in impossible.circles for tie, _ in circle):
+            elif idle := foresight.idle(impossible, assembly, self.places):
                 assembler.waive(idle)
             else:
                 present, turns = assembler.relations, turns | self.order.turns
