@@ -5,7 +5,7 @@ from functools import partial
 from math import inf
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.petri_net import Place
+from engage_hri.services.realizer.net.petri_net import Bound, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.deadlocks import Loss
 from engage_hri.services.realizer.plan.handover import Turn
@@ -92,15 +92,15 @@ def idle(impossible: Impossible, assembly: Assembly, order: Sequence[str]) -> se
     order: behaviors of the block as the document has them.
     """
     rank = {id: number for number, id in enumerate(order)}
-    found = set[tuple[str, str]]()
+    left_out = list[Place | Bound]()
     for circle in impossible.circles:
         ties = [tie for tie, _ in circle]
-        customs = [tie for tie in ties if tie.kind == "series" and assembly.waits([tie])]
-        found |= assembly.waits(tie for tie in ties if tie.kind != "series")
+        customs = [tie for tie in ties if tie.kind == "series" and not tie.behavior]
+        left_out += [tie for tie in ties if tie.kind != "series"]
         if customs:
             ranks = [max(rank.get(each.behavior, -1) for each in assembly.members[tie.target]) for tie in customs]
-            found |= assembly.waits([customs[ranks.index(max(ranks))]])
-    return found
+            left_out.append(customs[ranks.index(max(ranks))])
+    return assembly.waits(left_out)
 
 
 def losses_to_others(
