@@ -263,6 +263,13 @@ class Bus(ABC):
         """Publish the message; does nothing after the participant has left."""
 
     @abstractmethod
+    def withdraw(self, *states: str) -> None:
+        """Take back the last value of these keys of class `state`: who comes later gets nothing.
+
+        For what has gone for good, as a person has. Who has it already keeps it.
+        """
+
+    @abstractmethod
     def is_heard(self, key: str) -> bool:
         """Tell whether anybody has subscribed to `key`, in any process. For streams that cost something."""
 

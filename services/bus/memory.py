@@ -184,6 +184,10 @@ class MemoryHub(Hub):
                 asker.set_result(None)
         self._askers.clear()
 
+    def withdraw(self, key: str) -> None:
+        """Forget a state."""
+        self._state.pop(key, None)
+
     def forget(self, name: str) -> None:
         """Forget a participant and its states, as if its process had ended; recent events are kept."""
         self._buses.pop(name, None)
@@ -217,6 +221,10 @@ class MemoryBus(Bus):
     def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.send(self.name, key, message)
+
+    def withdraw(self, *states: str) -> None:
+        for key in states:
+            self._hub.withdraw(key)
 
     def is_heard(self, key: str) -> bool:
         return self._hub.wants(key)

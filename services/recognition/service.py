@@ -184,4 +184,7 @@ class _Recognition:
         for statistics in self._statistics.feed(changes, self._recognizer.session.busy, self._bus.now()):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)
+        gone = [change.actor for change in changes if isinstance(change, Forgotten)]
+        self._bus.withdraw(*(keys.open_events(actor) for actor in gone))
+        self._bus.withdraw(*(keys.statistics(actor) for actor in gone if actor != "all"))
         return fault

@@ -85,6 +85,28 @@ async def test_a_late_subscriber_gets_the_last_state_once(place: Place, apart: b
 
 
 @pytest.mark.parametrize("apart", [True, False])
+async def test_a_state_that_was_withdrawn_comes_to_nobody_until_it_is_published_again(place: Place, apart: bool):
+    process = await place.process()
+    there = process.join("there")
+    here = (await place.process() if apart else process).join("here")
+    early = here.subscribe(keys.ANY_STATISTICS)
+    for actor in ("ann", "bob", "all"):
+        there.publish(keys.statistics(actor), state(1))
+    assert len(await take(early, 3)) == 3
+
+    there.withdraw(keys.statistics("ann"), keys.statistics("bob"), keys.statistics("nobody"))
+    inbox = here.subscribe(keys.ANY_STATISTICS)
+    [kept] = await take(inbox)
+    there.publish(keys.statistics("bob"), state(2))
+
+    assert (kept.key, kept.past) == (keys.statistics("all"), True)
+    for reader in (early, inbox):
+        [again] = await take(reader)
+        assert (again.key, numbers([again.message])) == (keys.statistics("bob"), [2])
+    assert here.health.lost == 0
+
+
+@pytest.mark.parametrize("apart", [True, False])
 async def test_a_late_subscriber_gets_commands_and_events_of_the_last_two_seconds_in_order(place: Place, apart: bool):
     process = await place.process()
     there = process.join("there")

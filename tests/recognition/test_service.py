@@ -1,11 +1,12 @@
 """The service on a memory bus in virtual time, with the test in the places of realizer, body and perception."""
 
+import asyncio
 from functools import partial
 
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
@@ -232,3 +233,26 @@ async def test_who_asks_before_anything_has_happened_is_told_so(hub: MemoryHub) 
     assert received is not None
     assert isinstance(received.message, Statistics)
     assert (received.message.session.events, received.message.level) == (0, "unknown")
+
+
+async def test_the_states_of_who_is_forgotten_are_withdrawn(hub: MemoryHub):
+    """Visitors come and go, each under a name of its own. Who asks later is told of those who are remembered."""
+    bus = hub.join("camera")
+
+    def look(actor: str) -> None:
+        bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor=actor, action="look", at=bus.stamp(), targets=(ROBOT,)))
+
+    async with running(hub, recognition(forgotten_after=60.0)):
+        for name in ("ann", "bob", "carl"):
+            bus.publish(keys.PERCEIVED_ACTION, ActorFound(actor=name, at=bus.stamp()))
+            look(name)
+            await asyncio.sleep(40.0)
+            bus.publish(keys.PERCEIVED_ACTION, ActorLost(actor=name, at=bus.stamp()))
+        look("dora")
+        await asyncio.sleep(1.0)
+        with hub.join("late").subscribe(keys.ANY_STATISTICS, keys.ANY_OPEN_EVENTS) as inbox:
+            told = {one.key for one in [await inbox.next() for _ in range(len(inbox))] if one is not None}
+
+    remembered = ("bob", "carl", "dora")
+    states = {key(actor) for key in (keys.statistics, keys.open_events) for actor in remembered}
+    assert told == {keys.statistics("all"), *states}

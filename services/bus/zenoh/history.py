@@ -5,8 +5,8 @@ timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=js
 commands and events go; `run=RUN`, to ask only that process.
 
 Our own processes ask `@bus/<run>/past`, of one process or of all (`*`), once for all their patterns. They get what is
-missing of a key in one reply, under that key, and at the end one with the `Counts` of all these keys: so they know
-that all has come, and that there is nothing else.
+missing of a key in one reply, under that key, and at the end one with the `Counts` of all these keys, and when the
+last key was dropped: so they know that all has come, and that there is nothing else.
 """
 
 import asyncio
@@ -38,7 +38,7 @@ BAD = (msgspec.DecodeError, UnicodeDecodeError)
 pack = msgspec.msgpack.encode
 envelopes = msgspec.msgpack.Decoder(Envelope)
 _parts = msgspec.msgpack.Decoder(list[Written])
-_counts = msgspec.msgpack.Decoder(Counts)
+_ends = msgspec.msgpack.Decoder(tuple[Counts, int])
 
 
 class _Question(Struct, frozen=True, array_like=True):
@@ -101,8 +101,8 @@ class History:
             replier = str(reply.replier_id.zid)
             with suppress(*BAD):  # counts as no answer
                 if (key := str(reply.ok.key_expr)) == keys.own(replier, "counts"):
-                    counts = _counts.decode(reply.ok.payload.to_bytes())
-                    told(replier, Past(counts, tuple(answers.pop(replier, ()))))
+                    counts, dropped = _ends.decode(reply.ok.payload.to_bytes())
+                    told(replier, Past(counts, tuple(answers.pop(replier, ())), dropped))
                 else:
                     part = _parts.decode(reply.ok.payload.to_bytes())
                     answers.setdefault(replier, []).extend(one for one in part if one.key == key)
@@ -136,7 +136,7 @@ class History:
             parts.setdefault(one.key, []).append((one.key, one.encoding, one.payload, one.envelope))
         for key, part in parts.items():
             query.reply(key, pack(part))
-        query.reply(keys.own(self._sent.run, "counts"), pack(past.counts))
+        query.reply(keys.own(self._sent.run, "counts"), pack((past.counts, past.dropped)))
         finish(query)
 
     def _asked(self, kind: keys.KeyClass, query: zenoh.Query) -> None:

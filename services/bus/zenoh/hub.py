@@ -26,15 +26,14 @@ from engage_hri.services.bus.zenoh.history import History, finish, form_asked, i
 from engage_hri.services.bus.zenoh.order import Envelope, SentLog
 from engage_hri.services.bus.zenoh.own_clock import own_clock
 from engage_hri.services.bus.zenoh.peers import Peers
+from engage_hri.services.bus.zenoh.publishers import Publishers
 from engage_hri.services.bus.zenoh.readers import Readers
 from engage_hri.services.bus.zenoh.rights import Rights
 from engage_hri.services.bus.zenoh.session import (
     LOOPBACK,
-    QOS,
     RENDEZVOUS,
     ROUTER_WITH_KEYS,
     RUST_PLACE,
-    STREAM_QOS,
     LoopBridge,
     open_client,
     open_session,
@@ -114,7 +113,7 @@ class ZenohHub(Hub):
         self._loop = asyncio.get_running_loop()
         self.clocks = Clocks(*own_clock(self._loop, self.run))
         self._sent = SentLog(self.run)
-        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._publishers = Publishers(session)
         self._source = zenoh.SourceInfo(session.id, 0)
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
@@ -184,8 +183,7 @@ class ZenohHub(Hub):
         self.readers.close()
         self._history.close()
         self.peers.close()
-        for publisher in self._publishers.values():
-            publisher.undeclare()  # type: ignore[no-untyped-call]
+        self._publishers.close()
         try:
             self.session.close()  # type: ignore[no-untyped-call]
         except zenoh.ZError as error:  # a link that is stuck at the other end: all that is ours has been given back
@@ -209,30 +207,27 @@ class ZenohHub(Hub):
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
             envelope = Envelope(bus.name, self.clocks.own, now)
-        self._publisher(key, ordered).put(
+        self._publishers.of(key, ordered).put(
             payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp, source_info=self._source
         )
         self.readers.offer(Received(key, message, bus.name, now, life=self.run))
 
+    def withdraw(self, key: str) -> None:
+        """Forget a state that this process has published."""
+        self._sent.withdraw(key)
+        self._publishers.drop(key)
+
     def is_heard(self, key: str) -> bool:
         """Tell whether anybody has subscribed to `key`, as far as Zenoh knows."""
-        status: Any = self._publisher(key, keys.key_class(key) != "stream").matching_status  # its stub says bool
+        status: Any = self._publishers.of(key, keys.key_class(key) != "stream").matching_status  # its stub says bool
         return status.matching or self.readers.want(key)
-
-    def _publisher(self, key: str, ordered: bool) -> zenoh.Publisher:
-        publisher = self._publishers.get(key)
-        if publisher is None:
-            qos = QOS if ordered else STREAM_QOS
-            publisher = self.session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE, **qos)
-            self._publishers[key] = publisher
-        return publisher
 
     def _send_pulse(self) -> None:
         """Publish the recent counts, a few times: they show a receiver that it lost the last message of a burst."""
         recent = self._sent.recent(self._loop.time())
         self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent else None
         if recent:
-            self._publisher(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
+            self._publishers.of(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
 
 
 class ZenohBus(Bus):
@@ -263,6 +258,10 @@ class ZenohBus(Bus):
     def _send(self, key: str, message: Message) -> None:
         if not self._gone:
             self._hub.publish(self, key, message)
+
+    def withdraw(self, *states: str) -> None:
+        for key in states:
+            self._hub.withdraw(key)
 
     def is_heard(self, key: str) -> bool:
         return self._hub.is_heard(key)

@@ -8,12 +8,16 @@ one process arrive in its order across keys, each once, whether they came live, 
 What a message claims of itself anybody can write; what a process answers, only that process can. So its answer
 decides: what was there before the question and is beyond the counts of the answer was never published.
 
+A key lasts as long as something of it is kept, for there is no end of people and clients, whose names stand in keys.
+One that comes later begins above all counts that were dropped. So a receiver that knew it is not misled; and any
+receiver asks, and learns from the answer which keys are left.
+
 Zenoh's own advanced subscribers do this per key: a replayed history and what is recovered after a cut come in no
 order across keys. Sync points and outcomes live on different keys and must not overtake one another, hence this file
 (measured in docs/decisions/0005).
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from itertools import chain
 
@@ -33,7 +37,7 @@ class Envelope(Struct, frozen=True, array_like=True):
 
     Which process sent it, Zenoh says: nothing here can name another.
     number: among all ordered messages of its process, from 1; 0 on a stream, and of a program without envelopes.
-    nth: among the messages of its process on this key, from 1.
+    nth: among the messages of its process on this key, from 1; from `base` + 1 on a key that may have been before.
     """
 
     source: str
@@ -41,6 +45,7 @@ class Envelope(Struct, frozen=True, array_like=True):
     sent: Seconds
     number: int = 0
     nth: int = 0
+    base: int = 0
 
 
 class Written(Struct, frozen=True, array_like=True):
@@ -69,15 +74,24 @@ class Missing(Struct, frozen=True):
 
 
 class Past(Struct, frozen=True):
-    """The answer of a process: what was missing, in order, and its counts of all keys that were asked for."""
+    """The answer of a process: what was missing, in order, and its counts of all keys that were asked for.
+
+    dropped: number of its last message before it last dropped a key.
+    """
 
     counts: Counts
     written: tuple[Written, ...]
+    dropped: int = 0
+
+    def count(self, one: Written) -> int:
+        """Count of the key of this message when the process answered; its own, if the key was dropped since."""
+        was_dropped = one.key not in self.counts and one.envelope.number <= self.dropped
+        return one.envelope.nth if was_dropped else self.counts.get(one.key, 0)
 
     def of(self, wanted: Callable[[str], bool]) -> "Past":
         """The part of it that is about these keys."""
         counts = {key: nth for key, nth in self.counts.items() if wanted(key)}
-        return Past(counts, tuple(one for one in self.written if wanted(one.key)))
+        return Past(counts, tuple(one for one in self.written if wanted(one.key)), self.dropped)
 
 
 class SentLog:
@@ -87,23 +101,52 @@ class SentLog:
         self.run = run
         self.number = 0
         self.counts: Counts = {}
+        """Of each key of which something is kept."""
         self._written_at: dict[str, Seconds] = {}
-        self._kept: deque[Written] = deque(maxlen=kept)
+        self._most = kept
+        self._kept: deque[Written] = deque()
+        self._kept_of: Counter[str] = Counter()
+        """Number of messages in `_kept`, by key."""
         self._states: dict[str, Written] = {}
+        self._bases: Counts = {}
+        """Highest count that any dropped key had when this one began, by key."""
+        self._base = 0
+        self._dropped = 0
 
     def write(
         self, key: str, encoding: str, payload: bytes, source: str, clock: str, now: Seconds, stamp: object = None
     ) -> Written:
         """Number the next message and keep it."""
         self.number += 1
-        nth = self.counts[key] = self.counts.get(key, 0) + 1
-        written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth), stamp)
+        base = self._bases.setdefault(key, self._base)
+        nth = self.counts[key] = self.counts.get(key, base) + 1
+        written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth, base), stamp)
         self._written_at[key] = now
         if keys.key_class(key) == "state":
             self._states[key] = written
         else:
-            self._kept.append(written)
+            self._keep(written)
         return written
+
+    def _keep(self, written: Written) -> None:
+        self._kept.append(written)
+        self._kept_of[written.key] += 1
+        if len(self._kept) > self._most:
+            oldest = self._kept.popleft().key
+            self._kept_of[oldest] -= 1
+            if not self._kept_of[oldest]:
+                del self._kept_of[oldest]
+                self._drop(oldest)
+
+    def withdraw(self, key: str) -> None:
+        """Forget a state: nobody gets it any more. One that was never published is none."""
+        if self._states.pop(key, None) is not None:
+            self._drop(key)
+
+    def _drop(self, key: str) -> None:
+        self._base = max(self._base, self.counts.pop(key))
+        self._dropped = self.number
+        del self._written_at[key], self._bases[key]
 
     def past(self, wanted: Callable[[str], bool], missing: Missing, oldest: Seconds) -> Past:
         """Answer `missing`; a first joiner gets the last states, and the rest from the time `oldest` on."""
@@ -114,7 +157,7 @@ class SentLog:
             if one.key in counts and self._is_missing(one, missing, oldest)
         ]
         written.sort(key=_number)
-        return Past(counts, tuple(written))
+        return Past(counts, tuple(written), self._dropped)
 
     def _is_missing(self, one: Written, missing: Missing, oldest: Seconds) -> bool:
         is_state = one.key in self._states
@@ -207,11 +250,11 @@ class Follower:
             if nth <= seen or self._last.get(key) == one.envelope:
                 self._seen[key] = max(nth, seen)
                 continue
-            if past is not None and nth > max(seen, past.counts.get(key, 0)) + 1:
+            if past is not None and nth > max(seen, past.count(one)) + 1:
                 unknown.append(one)
                 continue
             if not (first and key not in self._seen) and not _may_skip(key):
-                self.lost += nth - seen - 1
+                self.lost += nth - max(seen, one.envelope.base) - 1
             self._deliver(one)
             deliver.append((one, first and (key, nth) not in live))
         if past is not None:
@@ -226,15 +269,24 @@ class Follower:
 
     def _disproved(self, past: Past) -> list[Written]:
         """Correct the counts by the answer; returns what is held, without what the answer should know and doesn't."""
-        for key, seen in self._seen.items():
-            if seen > (count := past.counts.get(key, 0)):
+        for key, seen in tuple(self._seen.items()):
+            count = past.counts.get(key)
+            if count is None:
+                self._forget(key, past.dropped)
+            elif seen > count:
                 # The last true state comes again: it was overwritten.
                 self._seen[key] = max(0, count - 1) if _may_skip(key) else count
                 self.forged += 1
         before, since = self._held[: self._held_before], self._held[self._held_before :]
-        published = [one for one in before if one.envelope.nth <= past.counts.get(one.key, 0)]
+        published = [one for one in before if one.envelope.nth <= past.count(one)]
         self.forged += len(before) - len(published)
         return published + since
+
+    def _forget(self, key: str, dropped: int) -> None:
+        """Forget a key of which its process knows nothing: it was dropped, or never there."""
+        del self._seen[key]
+        last = self._last.pop(key, None)
+        self.forged += last is not None and last.number > dropped
 
 
 def _may_skip(key: str) -> bool:
