@@ -10,7 +10,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
 from engage_hri.schemas.body import AbortBehavior
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
@@ -73,12 +73,12 @@ class FragmentRunner:
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
-    def check_room(self, waiting: int, id: str) -> None:
-        """Raise InputRefused if fragment `id` is one too many. waiting: those that wait to be admitted."""
-        if (number := len(self._live) + waiting) >= self._config.fragments:
-            reason = f"{number} fragments are waiting or performed, which is the limit"
-            advice = "wait until one has ended; `generation.fragments` is the limit"
-            raise InputRefused(Fault(reason=reason, where=id, advice=advice))
+    def full(self, waiting: int, id: str) -> Fault | None:
+        """A fault if fragment `id` is one too many; else None. waiting: those that wait to be admitted."""
+        if (number := len(self._live) + waiting) < self._config.fragments:
+            return None
+        reason = f"{number} fragments are waiting or performed, which is the limit"
+        return Fault(reason=reason, where=id, advice="wait until one has ended; `generation.fragments` is the limit")
 
     def admit(self, request: PerformFragment, world: World) -> None:
         """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""

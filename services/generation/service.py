@@ -133,8 +133,10 @@ class _Generation:
     def _admit(self, request: PerformFragment, now: Seconds, until: Seconds) -> None:
         """Hand a fragment to the runner, or keep it while the world lacks what it needs. until: when to give up."""
         world = self._world(now)
+        if (full := self._runner.full(len(self._early), request.fragment.id)) is not None:
+            self._desk.refuse(request.id, full)  # nobody else is told: there may be thousands
+            return
         try:
-            self._runner.check_room(len(self._early), request.fragment.id)
             if world is None or (now < until and lacks_people(request.fragment, world)):
                 self._early[request.id] = (request, until)
             else:

@@ -8,6 +8,7 @@ deadlines, and follows the table.
     effects = asking.tick(now)                         # whenever `asking.deadline` has come
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from math import inf
@@ -29,6 +30,7 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.requests.asked import Asked, Server
 from engage_hri.services.requests.asking_effects import (
     Complain,
     Effect,
@@ -40,35 +42,10 @@ from engage_hri.services.requests.asking_effects import (
 from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.window import Window
 
 _Said = Answer | None
 """The answer of the server that is the event; None with all other events."""
-
-
-class _Asked:
-    """One request. run: the life of the server that accepted it."""
-
-    def __init__(self, expression: str, request: Request) -> None:
-        self.expression = expression
-        self.server = keys.server_of(expression)
-        self.kind = kind_of(request)
-        self.request = request
-        self.cancel: Cancel | None = None
-        self.state = State.SENT
-        self.run = ""
-        self.resend_after: Seconds = 0.0
-
-
-class _Server:
-    """The requests that one server is asked to keep alive.
-
-    period: seconds between two `KeepAlive`. soon: seconds until the one after the next.
-    """
-
-    def __init__(self, period: Seconds) -> None:
-        self.kept: dict[str, _Asked] = {}
-        self.period = period
-        self.soon = period
 
 
 SHORTEST_PULSE: Seconds = 0.05
@@ -76,7 +53,7 @@ SHORTEST_PULSE: Seconds = 0.05
 ANEW = "send it again under a new id"
 
 # Members that are used with each message: an enum is slow to look one up.
-_ENDED, _FINISHED = State.ENDED, Event.FINISHED
+_SENT, _ENDED, _FINISHED = State.SENT, State.ENDED, Event.FINISHED
 _OVER = (State.GIVEN_UP, State.ENDED)
 _RESEND, _GRACE, _PATIENCE, _CANCEL, _SWALLOW = _CLOCKS = (
     Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
@@ -92,8 +69,9 @@ class Asking:
         self._requester = requester
         self._life = life
         self._patience = patience
-        self._asked: dict[str, _Asked] = {}
-        self._servers: dict[str, _Server] = {}
+        self._asked: dict[str, Asked] = {}
+        self._servers: dict[str, Server] = {}
+        self._windows = defaultdict[str, Window](partial(Window, patience.window))
         self._runs: dict[str, str] = {}
         """Participants that are there: the life of each."""
         self._gone: set[str] = set()
@@ -134,7 +112,7 @@ class Asking:
         asked = self._asked.get(request.id)
         if asked is None:
             request = replace(request, requester=self._requester, life=self._life, lease=self._lease(request))
-            asked = self._asked[request.id] = _Asked(expression, request)
+            asked = self._asked[request.id] = Asked(expression, request)
         elif (fault := _id_taken(asked, request)) is not None:
             return [TellEnd(request.id, RequestRefused(fault))]
         elif asked.cancel is None:
@@ -154,17 +132,24 @@ class Asking:
         self._cancel(id, reason, now)
         return self._new_effects()
 
-    def forget(self, id: str) -> None:
+    def forget(self, id: str, now: Seconds) -> list[Effect]:
         """Forget a request that could not even be sent."""
         if (asked := self._asked.pop(id, None)) is not None:
             self._let_go(asked)
             for clock in _CLOCKS:
                 self._deadlines.clear((clock, id))
+            self._answered(asked, now)
+        return self._new_effects()
 
     def _cancel(self, id: str, reason: str, now: Seconds) -> None:
         asked = self._asked.get(id)
-        if asked is not None and asked.cancel is None:
-            asked.cancel = self._cancellation(asked, reason)
+        if asked is None or asked.cancel is not None:
+            return
+        asked.cancel = self._cancellation(asked, reason)
+        if self._windows[asked.server].has_waiting(id):
+            fault = Fault(reason="cancelled before it was sent", where=id, service=asked.server)
+            self._step(asked, Event.REFUSED, now, Refused(id=id, fault=fault))
+        else:
             self._step(asked, Event.CANCELLED, now)
 
     def hear(self, answer: Answer, now: Seconds, server: str) -> list[Effect]:
@@ -211,7 +196,7 @@ class Asking:
 
     # -- one request ----------------------------------------------------------------------------------------------
 
-    def _asked_of(self, server: str) -> Iterable[_Asked]:
+    def _asked_of(self, server: str) -> Iterable[Asked]:
         return [asked for asked in self._asked.values() if asked.server == server]
 
     def _new_effects(self) -> list[Effect]:
@@ -219,12 +204,16 @@ class Asking:
         effects, self._effects = self._effects, []
         return effects
 
-    def _step(self, asked: _Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
+    def _step(self, asked: Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
         """Let `event` happen to a request: take its row of the table and do what that says."""
         before = asked.state
         asked.state, actions = TABLE[before][event]
         for action in actions:
             _ACTIONS[action](self, asked, now, answer)
+        if before is _SENT and asked.state is not _SENT:
+            if self._windows[asked.server].has_waiting(asked.request.id):
+                asked.state = _ENDED  # there is nothing that the server could answer
+            self._answered(asked, now)
         if asked.state is not before and asked.state in _OVER:
             self._let_go(asked)
             id = asked.request.id
@@ -234,97 +223,106 @@ class Asking:
             if asked.state is _ENDED:
                 del self._asked[id]
 
-    def _send_and_repeat(self, asked: _Asked, now: Seconds, answer: _Said, *, is_first: bool) -> None:
+    def _answered(self, asked: Asked, now: Seconds) -> None:
+        """Send the next of those that wait for the server to keep up."""
+        following = self._windows[asked.server].leave(asked.request.id)
+        if following is not None:
+            self._send_and_repeat(self._asked[following], now, None, is_first=True)
+            self._await_answer(self._asked[following], now, None)
+
+    def _send_and_repeat(self, asked: Asked, now: Seconds, answer: _Said, *, is_first: bool) -> None:
         after = self._patience.first_resend if is_first else 2 * asked.resend_after
         asked.resend_after = min(after, self._patience.longest_resend)
         if asked.server in self._gone:
             return  # Sent when it is back: what nobody gets now would all come then.
+        if asked.state is _SENT and not self._windows[asked.server].enter(asked.request.id):
+            return
         self._send(asked, now, None)
         wait = asked.resend_after
         if asked.cancel is None and asked.server in self._runs:  # it may have begun: sending it renews it
             wait = min(wait, _period(asked.request))
         self._deadlines.set((_RESEND, asked.request.id), now + wait)
 
-    def _send(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _send(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
         self._effects.append(Publish(expression, asked.cancel or asked.request))
 
-    def _withdraw(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _withdraw(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         asked.cancel = asked.cancel or self._cancellation(asked, "given up")
         self._send_and_repeat(asked, now, answer, is_first=True)
 
-    def _send_no_more(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _send_no_more(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_RESEND, asked.request.id))
 
-    def _keep_soon(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _keep_soon(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, self._patience.first_resend)
 
-    def _keep_now(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _keep_now(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, 0.0)
 
-    def _wait_grace(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _wait_grace(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_GRACE, asked.request.id), now + self._patience.grace)
         self._send_no_more(asked, now, answer)
         if asked.cancel is None:
             self._deadlines.clear((_PATIENCE, asked.request.id))
 
-    def _stop_grace(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _stop_grace(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_GRACE, asked.request.id))
 
-    def _await_answer(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
-        if asked.server in self._runs:
+    def _await_answer(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+        if asked.server in self._runs and not self._windows[asked.server].has_waiting(asked.request.id):
             self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.silence)
 
-    def _await_end(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _await_end(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.cancel)
 
-    def _swallow(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _swallow(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_SWALLOW, asked.request.id), now + self._patience.swallow)
 
-    def _tell_accepted(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_accepted(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._effects.append(TellAccepted(asked.request.id))
 
-    def _tell_outcome(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_outcome(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         assert isinstance(answer, Outcome)
         self._effects.append(TellEnd(asked.request.id, answer))
 
-    def _tell_refused(self, asked: _Asked, now: Seconds, answer: _Said, *, error: type[EngageError]) -> None:
+    def _tell_refused(self, asked: Asked, now: Seconds, answer: _Said, *, error: type[EngageError]) -> None:
         assert isinstance(answer, Refused)
         self._effects.append(TellEnd(asked.request.id, error(answer.fault)))
 
-    def _tell_failed(self, asked: _Asked, now: Seconds, answer: _Said, *, error: type[EngageError], why: str) -> None:
+    def _tell_failed(self, asked: Asked, now: Seconds, answer: _Said, *, error: type[EngageError], why: str) -> None:
         self._fail(asked, error, why)
 
-    def _tell_silent(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_silent(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._fail(asked, RunFailed, f"is there, but has not answered for {self._patience.silence:g} s")
 
-    def _tell_unstoppable(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_unstoppable(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         why = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
         fault = self._fail(asked, NeverEnded, why, f"is {asked.server} stuck? It is not asked any more")
         self._effects.append(Complain(fault))
 
-    def _fail(self, asked: _Asked, error: type[EngageError], why: str, advice: str = ANEW) -> Fault:
+    def _fail(self, asked: Asked, error: type[EngageError], why: str, advice: str = ANEW) -> Fault:
         fault = Fault(reason=f"{asked.server} {why}", where=asked.request.id, advice=advice, service=asked.server)
         self._effects.append(TellEnd(asked.request.id, error(fault)))
         return fault
 
-    def _cancellation(self, asked: _Asked, reason: str) -> Cancel:
+    def _cancellation(self, asked: Asked, reason: str) -> Cancel:
         request = asked.request
         return Cancel(id=request.id, requester=self._requester, life=self._life, of=kind_of(request), reason=reason)
 
     # -- keeping alive --------------------------------------------------------------------------------------------
 
-    def _keep(self, asked: _Asked, now: Seconds, answer: _Said) -> None:
+    def _keep(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_RESEND, asked.request.id))
         self._deadlines.clear((_PATIENCE, asked.request.id))
         server = self._servers.get(asked.server)
         if server is None:
-            server = self._servers[asked.server] = _Server(self._patience.pulse)
+            server = self._servers[asked.server] = Server(self._patience.pulse)
         server.kept[asked.request.id] = asked
         server.period = max(SHORTEST_PULSE, min(server.period, _period(asked.request)))
         self._renew_soon(asked.server, now, server.period)
 
-    def _let_go(self, asked: _Asked, now: Seconds = 0.0, answer: _Said = None) -> None:
+    def _let_go(self, asked: Asked, now: Seconds = 0.0, answer: _Said = None) -> None:
         server = self._servers.get(asked.server)
         if server is not None and server.kept.pop(asked.request.id, None) is not None and not server.kept:
             del self._servers[asked.server]
@@ -356,7 +354,7 @@ def _period(request: Request) -> Seconds:
     return min(request.lease, request.unheard or inf) / 3
 
 
-def _id_taken(asked: _Asked, request: Request) -> Fault | None:
+def _id_taken(asked: Asked, request: Request) -> Fault | None:
     """A fault if `request` must not have the id of `asked`; None if it is an update of that."""
     known, kind = asked.kind, kind_of(request)
     if asked.state is State.GIVEN_UP:
@@ -368,7 +366,7 @@ def _id_taken(asked: _Asked, request: Request) -> Fault | None:
     return Fault(reason=reason, where=request.id, advice=f"give this {kind} another id")
 
 
-_ACTIONS: Mapping[Do, Callable[[Asking, _Asked, Seconds, _Said], None]] = {
+_ACTIONS: Mapping[Do, Callable[[Asking, Asked, Seconds, _Said], None]] = {
     Do.SEND: partial(Asking._send_and_repeat, is_first=True),
     Do.SEND_AGAIN: partial(Asking._send_and_repeat, is_first=False),
     Do.SEND_ONCE: Asking._send,

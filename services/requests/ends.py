@@ -135,7 +135,8 @@ class Requester:
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
-                    self._could_not_send(effect.message.id, error)
+                    # At the end of this very list: it may be long.
+                    effects += self._could_not_send(effect.message.id, error)
             elif isinstance(effect, asking_effects.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
                     pending.accept()
@@ -150,14 +151,14 @@ class Requester:
                 self._bus.publish(keys.fault(self._bus.name), effect.fault)
         self._alarm.set(self._asking.deadline)
 
-    def _could_not_send(self, id: str, error: Exception) -> None:
+    def _could_not_send(self, id: str, error: Exception) -> list[asking_effects.Effect]:
         """End a request that has no encoded form (half a character in its text, for instance); the others go on."""
-        self._asking.forget(id)
         fault = Fault(
             reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
         )
         if (pending := self._pending.pop(id, None)) is not None:
             pending.end(RequestRefused(error.fault if isinstance(error, InputRefused) else fault))
+        return self._asking.forget(id, self._bus.now())
 
     def _publish(self, expression: str, message: Message) -> None:
         self._bus.publish(keys.command(expression, self._bus.role, self._bus.name), message)

@@ -1,4 +1,4 @@
-"""Time limits of a requester. Pure."""
+"""Limits of a requester. Pure."""
 
 from msgspec import Struct
 
@@ -6,7 +6,7 @@ from engage_hri.schemas.units import Seconds
 
 
 class Patience(Struct, frozen=True, kw_only=True):
-    """Time limits of a requester, in seconds.
+    """Limits of a requester, times in seconds.
 
     first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
     grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By
@@ -14,6 +14,7 @@ class Patience(Struct, frozen=True, kw_only=True):
     pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
     cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
     leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.
+    window: number of requests that a server may have before it without an answer; more wait here.
     """
 
     first_resend: Seconds = 0.3
@@ -24,3 +25,4 @@ class Patience(Struct, frozen=True, kw_only=True):
     cancel: Seconds = 30.0
     silence: Seconds = 30.0
     swallow: Seconds = 60.0
+    window: int = 64

@@ -4,6 +4,8 @@ import random
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from msgspec import structs
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
@@ -38,22 +40,40 @@ class Client:
         self.name = name
         self.run = run
         self.life = life = life_of(run, 1)
-        self.machine = Asking(name, life, PATIENCE)
+        self.machine = Asking(name, life, structs.replace(PATIENCE, window=world.window))
         self.is_alive = True
         self.ends: dict[str, list[Outcome | EngageError]] = defaultdict(list)
         self.asked: list[str] = []
         self.cancelled: set[Asked] = set()
+        self.first_sent: list[str] = []
+        self.unanswered: set[str] = set()
+        """Requests on their way: sent, and nothing has come back."""
+
+    def _publish(self, message: Request) -> None:
+        if isinstance(message, Cancel):
+            self.unanswered.discard(message.id)
+        elif message.id not in self.first_sent:
+            self.first_sent.append(message.id)
+            self.unanswered.add(message.id)
+            assert len(self.unanswered) <= self.world.window, "more on their way than the server is to have"
+        self.world.to_server(self, message)
+
+    def hear(self, answer: Answer) -> None:
+        if (answer.requester, answer.life) == (self.name, self.life):
+            self.unanswered.discard(answer.id)
+        self.carry_out(self.machine.hear(answer, self.world.now, "realizer"))
 
     def carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:
             match effect:
                 case asking_effects.Publish(message=message):
-                    self.world.to_server(self, message)
+                    self._publish(message)
                 case asking_effects.Renew(live=live):
                     still = KeepAlive(live=live, at=Stamp("w", self.world.now), requester=self.name, life=self.life)
                     self.world.to_server(self, still)
                 case asking_effects.TellEnd(id=id, end=end):
                     self.ends[id].append(end)
+                    self.unanswered.discard(id)
                     if isinstance(end, RunFailed) and "is gone" in end.fault.reason:
                         self.world.judge_gone(Asked(self.name, self.life, id))
         self.world.wake(self.machine.deadline, self.tick)

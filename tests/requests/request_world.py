@@ -29,6 +29,7 @@ class World:
         """is_fair: nobody dies and no link is cut; a tenth of the messages is lost."""
         self.chance = random.Random(seed)
         self.lies = random.Random(f"{seed} lies")
+        self.window = random.Random(f"{seed} window").choice([1, 2, 64])
         self.is_fair = is_fair
         self.now = 0.0
         self.heap: list[tuple[float, int, Callable[[], None]]] = []
@@ -115,7 +116,7 @@ class World:
 
     def hear(self, client: Client, answer: Answer) -> None:
         if client.is_alive:
-            client.carry_out(client.machine.hear(answer, self.now, "realizer"))
+            client.hear(answer)
 
     # -- lives: tokens come and go a moment later than what they tell of -----------------------------------------
 
@@ -290,6 +291,8 @@ class World:
             assert client.machine.ids == ()
             assert client.machine.deadline is None, "something is pending for ever"
         for client in self.all_clients:
+            in_order = [id for id in client.asked if id in client.first_sent]
+            assert client.first_sent == in_order, "sent in another order than asked"
             for id in client.asked:
                 ends = client.ends[id]
                 assert len(ends) == 1 if client.is_alive else len(ends) <= 1, (client.name, id, ends)

@@ -333,3 +333,24 @@ async def test_what_cannot_be_encoded_is_refused_alone(hub: MemoryHub):
 
     assert server.taken == [block("whole")]
     await server.die(hub)
+
+
+async def test_ten_thousand_requests_at_once_come_as_the_server_keeps_up_each_once_and_in_order(hub: MemoryHub):
+    """Also beside those that have no encoded form, and those that are cancelled while they wait."""
+    server = Server(hub)
+    async with Requester(hub.join("client")) as requests:
+        before = hub.sent
+        asked = [
+            requests.send(keys.BLOCK, block(f"b{number}", of="" if number % 100 != 7 else "\ud800"))
+            for number in range(10_000)
+        ]
+        first = hub.sent - before
+        for number in range(9_000, 9_100):
+            requests.cancel(f"b{number}")
+        ends = await asyncio.gather(*(pending.outcome for pending in asked), return_exceptions=True)
+
+    refused = {number for number, end in enumerate(ends) if isinstance(end, RequestRefused)}
+    assert refused == {*range(7, 10_000, 100), *range(9_000, 9_100)}
+    assert first == Patience().window
+    assert server.taken == [block(f"b{number}") for number in range(10_000) if number not in refused]
+    await server.die(hub)

@@ -1,0 +1,32 @@
+"""What the asking side knows of one request, and of one server."""
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.requests import Cancel, Request, kind_of
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.requests.asking_table import State
+
+
+class Asked:
+    """One request. run: the life of the server that accepted it."""
+
+    def __init__(self, expression: str, request: Request) -> None:
+        self.expression = expression
+        self.server = keys.server_of(expression)
+        self.kind = kind_of(request)
+        self.request = request
+        self.cancel: Cancel | None = None
+        self.state = State.SENT
+        self.run = ""
+        self.resend_after: Seconds = 0.0
+
+
+class Server:
+    """The requests that one server is asked to keep alive.
+
+    period: seconds between two `KeepAlive`. soon: seconds until the one after the next.
+    """
+
+    def __init__(self, period: Seconds) -> None:
+        self.kept: dict[str, Asked] = {}
+        self.period = period
+        self.soon = period
