@@ -1,4 +1,4 @@
-"""What the asking side knows of one request, and of one server."""
+"""Record of one request at its requester, and of one server. Pure."""
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.requests import Cancel, Request, kind_of

@@ -1,4 +1,4 @@
-"""How many requests a server may have before it, without an answer to any of them. Pure.
+"""Limit of the requests that a server has before it, without an answer to any of them. Pure.
 
 Who asks for ten thousand things at once would else fill the links and the queue of the server, which are the others'
 too, and would send again what only has not come yet.
