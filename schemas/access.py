@@ -180,6 +180,16 @@ def may_have_sent(run: str, key: str) -> bool:
     return any(_is_marked(run, role, row, key) for role in ROLES for row in rows(role, "publishes"))
 
 
+@lru_cache(4096)
+def rank(run: str) -> int:
+    """Rank of the process with id `run` among those whose words contradict one another; the first is 0.
+
+    The robot and its senses go before those who ask something of it, and these before those who only watch.
+    """
+    ranks = ((*keys.SERVICES, "perception"), ("manager", "operator", "wizard"))
+    return next((at for at, roles in enumerate(ranks) if run.startswith(tuple(map(_role_mark, roles)))), len(ranks))
+
+
 def _is_marked(run: str, role: str, row: str, key: str) -> bool:
     if not run.startswith(_role_mark(role)) or not keys.matches(owned(row, "*"), key):
         return False

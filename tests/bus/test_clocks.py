@@ -115,3 +115,12 @@ def test_clocks_that_come_and_go_are_forgotten():
 
     known = [number for number in range(2 * KEPT) if clocks.local(Stamp(f"loop-{number}", 1.0)) != 100.0]
     assert known == list(range(KEPT, 2 * KEPT))
+
+
+def test_a_clock_that_was_measured_is_not_forgotten_for_those_that_are_only_heard_of():
+    clocks = Clocks("here", lambda: 100.0)
+    clocks.measured("robot", 99.0, 50.0, 99.1)
+    for number in range(2 * KEPT):
+        clocks.heard(f"loop-{number}", 50.0, 100.0)
+
+    assert clocks.local(Stamp("robot", 50.0)) == pytest.approx(99.05)

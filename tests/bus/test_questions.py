@@ -17,7 +17,7 @@ from engage_hri.services.bus.zenoh import hub
 from engage_hri.services.bus.zenoh.history import History
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.order import Missing, Past
-from engage_hri.services.bus.zenoh.peers import Peers
+from engage_hri.services.bus.zenoh.peers import CLOCK_TRIPS, Peers
 from engage_hri.services.bus.zenoh.readers import RUNS_KEPT, TRIES
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
 
@@ -163,6 +163,33 @@ async def test_processes_that_read_one_clock_do_not_ask_one_another_for_the_time
 
     assert here.clocks.local(Stamp("boot-elsewhere", 1000.0)) == pytest.approx(0.0, abs=0.5)
     for each in (far, there, here):
+        await each.close()
+
+
+@pytest.mark.parametrize("is_first", [False, True])
+async def test_what_time_a_machine_has_says_one_of_its_processes_and_no_other(
+    monkeypatch: pytest.MonkeyPatch, is_first: bool
+):
+    """A liar says that it is on the robot's machine. With keys it need not have come later to be disbelieved."""
+    robot, end = f"asked-{os.getpid()}", free_endpoint()
+    here, hubs = await open_hub(robot, listen=[end]), {}
+    if is_first:
+        monkeypatch.setattr(here.peers, "_rank", lambda run: 0 if "true" in hubs and run == hubs["true"].run else 1)
+    for name, ahead in sorted({"true": 1000.0, "lie": 5000.0}.items(), reverse=not is_first):
+        clock = ("boot-elsewhere", lambda ahead=ahead: ahead + time.monotonic())
+        monkeypatch.setattr(hub, "own_clock", lambda *_, clock=clock: clock)
+        each = hubs[name] = await open_hub(robot, connect=[end])
+        for _ in range(CLOCK_TRIPS + 1):  # each is asked after the last question for the time
+            await each.peers.round_trip(here.run, PATIENCE)
+            await here.peers.round_trip(each.run, PATIENCE)
+
+    here.peers._measure_clocks()
+    for each in hubs.values():
+        for _ in range(CLOCK_TRIPS + 1):
+            await here.peers.round_trip(each.run, PATIENCE)
+
+    assert here.clocks.local(Stamp("boot-elsewhere", 1000.0)) == pytest.approx(0.0, abs=0.5)
+    for each in (*hubs.values(), here):
         await each.close()
 
 

@@ -76,7 +76,8 @@ class Clocks:
 
     def _put(self, clock: str, offset: _Offset) -> None:
         if clock not in self._offsets and len(self._offsets) >= KEPT:
-            del self._offsets[next(iter(self._offsets))]
+            unmeasured = (name for name, known in self._offsets.items() if not isfinite(known.low))
+            del self._offsets[next(unmeasured, next(iter(self._offsets)))]
         self._offsets[clock] = offset
 
     def error(self, clock: str) -> Seconds:

@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 import zenoh
 
-from engage_hri.schemas import keys
+from engage_hri.schemas import access, keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
@@ -118,7 +118,9 @@ class ZenohHub(Hub):
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
         self._closed = False
-        self.peers = Peers(session, self.bridge, self._sent, self.clocks, places)
+        self.peers = Peers(
+            session, self.bridge, self._sent, self.clocks, places, access.rank if rights is not None else None
+        )
         self._history = History(session, self.bridge, self._sent)
         trusts = rights.trusts if rights else None
         self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, trusts)

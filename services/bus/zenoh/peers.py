@@ -33,9 +33,18 @@ class Peers:
     """
 
     def __init__(
-        self, session: zenoh.Session, bridge: LoopBridge, sent: SentLog, clocks: Clocks, places: Sequence[str] = ()
+        self,
+        session: zenoh.Session,
+        bridge: LoopBridge,
+        sent: SentLog,
+        clocks: Clocks,
+        places: Sequence[str] = (),
+        rank: Callable[[str], int] | None = None,
     ) -> None:
-        """places: endpoints at which others may connect to this process."""
+        """places: endpoints at which others may connect to this process.
+
+        rank: of the process with this run, by its keys: the lowest is believed what time its machine has.
+        """
         self.processes: set[str] = set()
         self.publishers: set[str] = set()
         self.names: dict[str, set[str]] = {}
@@ -49,7 +58,8 @@ class Peers:
         self._sent = sent
         self._watchers: list[asyncio.Future[None]] = []
         self._clock_of: dict[str, str] = {}
-        """Clocks of the processes that are there."""
+        """Clocks of the processes that are there, those that came first first."""
+        self._rank = rank or (lambda run: 0)
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         self._declared: tuple[Any, ...] = (
             session.declare_queryable(keys.own(sent.run, "clock"), bridge.on_loop(self._tell_time)),
@@ -101,7 +111,7 @@ class Peers:
             if there:
                 self.processes.add(run)
                 self._clock_of[run] = subject[1]
-                if subject[1] != self.clocks.own:
+                if subject[1] != self.clocks.own and self._witness(subject[1]) == run:
                     self.measure_clock(run)
             else:
                 self.processes.discard(run)
@@ -118,6 +128,13 @@ class Peers:
         elif len(subject) == 2 and subject[0] == "alive":
             self.note(subject[1], run, there)
         self._wake_watchers()
+
+    def _witness(self, clock: str) -> str:
+        """The process that is asked for this clock: of those that say that they have it the first that came.
+
+        Anybody can say so. With keys those of the robot go before others.
+        """
+        return min((run for run, its in self._clock_of.items() if its == clock), key=self._rank, default="")
 
     @property
     def reachable(self) -> tuple[Reachable, ...]:
@@ -186,13 +203,10 @@ class Peers:
         )
 
     def _measure_clocks(self) -> None:
-        """Read all clocks again: they drift apart. Of the processes of one machine the first is asked."""
+        """Read all clocks again: they drift apart. Of the processes of one machine one is asked."""
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
-        asked = {self.clocks.own}
-        for run in sorted(self.processes):
-            if (clock := self._clock_of[run]) not in asked:
-                asked.add(clock)
-                self.measure_clock(run)
+        for clock in set(self._clock_of.values()) - {self.clocks.own}:
+            self.measure_clock(self._witness(clock))
 
     def measure_clock(self, run: str, trips: int = CLOCK_TRIPS) -> None:
         """Read the clock of a process in a few round trips."""
@@ -204,6 +218,8 @@ class Peers:
                 return
             with suppress(*BAD):
                 told = _instants.decode(got.ok.payload.to_bytes())
+                if self._witness(told.clock) != run:
+                    return
                 self.clocks.measured(told.clock, asked, told.seconds, answered)
                 if trips > 1:
                     self.measure_clock(run, trips - 1)
