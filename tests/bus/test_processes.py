@@ -15,7 +15,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.bus.zenoh import hub as hub_module
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.session import PEER_AFAR
 from engage_hri.services.requests.ends import Requester
 from tests.bus.peer import FAR
 from tests.bus.places import PATIENCE, free_endpoint, messages, take
@@ -209,3 +211,19 @@ async def test_stamps_of_another_machine_are_read_through_the_measured_offset(to
     assert stamp.seconds - bus.now() > 12000.0
     assert 0.0 < hub.clocks.error(stamp.clock) < PATIENCE
     assert abs(bus.local(stamp) - (stamp.seconds - FAR)) <= hub.clocks.error(stamp.clock)
+
+
+async def test_a_peer_of_other_machines_is_told_what_it_will_not_find_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    robot, end = f"afar-{os.getpid()}", free_endpoint()
+    near = await open_hub(robot, listen=[end])
+    await (await open_hub(robot, connect=[end], mode="peer")).close()
+    assert caplog.messages == []
+
+    monkeypatch.setattr(hub_module, "is_on_this_machine", lambda endpoint: False)
+    for mode in ("peer", "client"):
+        await (await open_hub(robot, connect=[end], mode=mode)).close()  # type: ignore[arg-type]
+
+    assert [line for line in caplog.messages if "--connect for each" in line] == [PEER_AFAR]
+    await near.close()

@@ -2,16 +2,22 @@
 
 import asyncio
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import jsonschema  # type: ignore[import-untyped]
 import pytest
 import yaml  # type: ignore[import-untyped]
 
+from engage_hri.services.commandline.certificates import initialize
+from tests.bus.places import free_endpoint
 from tests.lab.lab import laboratory, missing
 from tests.lab.test_reach import BML, LONG, engage, until
 
@@ -56,9 +62,10 @@ def test_every_service_has_its_place_in_every_recipe() -> None:
     assert all(each["command"] == ["run", name] for name, each in compose.items() if name != "router")
 
 
-def test_the_compose_file_keeps_to_the_specification() -> None:
+@pytest.mark.parametrize("file", ["compose.yaml", "compose.keys.yaml"])
+def test_the_compose_files_keep_to_the_specification(file: str) -> None:
     checker = jsonschema.Draft7Validator(json.loads(SCHEMA.read_text()))
-    compose = yaml.safe_load((FILES / "compose.yaml").read_text())
+    compose = yaml.safe_load((FILES / file).read_text())
 
     checker.validate(compose)
     compose["services"]["router"]["comand"] = ["router"]
@@ -67,25 +74,107 @@ def test_the_compose_file_keeps_to_the_specification() -> None:
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
-@pytest.mark.parametrize("unit", ["engage-router.service", "engage@.service"])
-def test_systemd_finds_nothing_wrong_with_the_units(unit: str, tmp_path: Path) -> None:
-    text = (FILES / unit).read_text()
-    assert "/usr/local/bin/engage " in text
-    there = tmp_path / unit
-    there.write_text(text.replace("/usr/local/bin/engage", sys.executable))
-    checked = subprocess.run(["systemd-analyze", "verify", str(there)], capture_output=True, text=True)
+@pytest.mark.parametrize(
+    ("unit", "more"),
+    [
+        ("engage-router.service", ""),
+        ("engage-router.service", "router-keys.conf"),
+        ("engage@.service", ""),
+        ("engage@.service", "keys.conf"),
+    ],
+)
+def test_systemd_finds_nothing_wrong_with_the_units(unit: str, more: str, tmp_path: Path) -> None:
+    """more: the file that is put beside the unit, for keys."""
+    files = {unit: tmp_path / unit, more: tmp_path / f"{unit}.d" / "keys.conf"} if more else {unit: tmp_path / unit}
+    command = ["systemd-analyze", "verify", str(tmp_path / unit)]
+    for name, there in files.items():
+        there.parent.mkdir(exist_ok=True)
+        there.write_text((FILES / name).read_text().replace("/usr/local/bin/engage", sys.executable))
+    checked = subprocess.run(command, capture_output=True, text=True)
     assert (checked.returncode, checked.stderr) == (0, "")
-    there.write_text(text)  # with a program that is not there
-    assert subprocess.run(["systemd-analyze", "verify", str(there)], capture_output=True).returncode != 0
+    for name, there in files.items():
+        there.write_text((FILES / name).read_text() + "Usr=nobody\n")
+        wrong = subprocess.run(command, capture_output=True, text=True)
+        assert wrong.returncode != 0 or "Usr" in wrong.stderr, name
 
 
 def test_the_units_and_containers_name_variables_that_are_read() -> None:
     from engage_hri.services.bus.config import PREFIX, BusConfig, environment
 
-    texts = [(FILES / each).read_text() for each in ("bus.env", "compose.yaml")]
+    texts = [(FILES / each).read_text() for each in ("bus.env", "bus-keys.env", "compose.yaml", "compose.keys.yaml")]
     names = {name for text in texts for name in re.findall(r"\b(ENGAGE_BUS_\w+)", text)}
 
-    assert names == {"ENGAGE_BUS_ROBOT", "ENGAGE_BUS_CONNECT"}
+    assert names == {"ENGAGE_BUS_ROBOT", "ENGAGE_BUS_CONNECT", "ENGAGE_BUS_KEYS"}
     assert {PREFIX + each.upper() for each in BusConfig.__struct_fields__} >= names
-    variables = dict(line.split("=", 1) for line in texts[0].splitlines() if "=" in line and not line.startswith("#"))
-    assert environment(variables) == {"bus": {"robot": "melvin", "connect": ["tcp/10.77.0.1:7447"]}}
+    tables = [
+        environment(dict(line.split("=", 1) for line in text.splitlines() if "=" in line and line[0] != "#"))
+        for text in texts[:2]
+    ]
+    assert tables == [
+        {"bus": {"robot": "melvin", "connect": ["tcp/10.77.0.1:7447"]}},
+        {"bus": {"robot": "melvin", "connect": ["tls/10.77.0.1:7447"], "keys": "/etc/engage/keys"}},
+    ]
+
+
+class Container(NamedTuple):
+    """A service of a compose file, as a process of this machine can be started for it."""
+
+    command: list[str]
+    environment: dict[str, str]
+
+
+def containers(variables: dict[str, str], *files: str) -> dict[str, Container]:
+    """The containers of compose files, one over the other. A folder that is mounted stands for the place where it is.
+
+    variables: those that the files take from their environment.
+    """
+
+    def filled(match: re.Match[str]) -> str:
+        return variables.get(match["name"]) or match["default"] or ""
+
+    found: dict[str, Container] = {}
+    for file in files:
+        text = re.sub(r"\$\{(?P<name>\w+)(?::[-?](?P<default>[^}]*))?\}", filled, (FILES / file).read_text())
+        for name, its in yaml.safe_load(text)["services"].items():
+            before = found.get(name, Container([], {}))
+            mounted = {there: here for here, there, *_ in (each.split(":") for each in its.get("volumes", ()))}
+            environment = {key: mounted.get(value, value) for key, value in its["environment"].items()}
+            found[name] = Container(its.get("command", before.command), before.environment | environment)
+    return found
+
+
+@pytest.mark.real_time
+async def test_what_the_containers_of_a_robot_with_keys_run_is_a_robot_with_keys(tmp_path: Path) -> None:
+    """Without the containers: the same commands and variables, each with the keys that its container sees."""
+    endpoint = free_endpoint()
+    host, port = endpoint.removeprefix("tcp/").split(":")
+    ring, block = tmp_path / "keys", tmp_path / "greeting.xml"
+    initialize(ring, "robot", [("manager", "alice")], [host], 2)
+    block.write_text(BML)
+    variables = {"ENGAGE_KEYS": str(ring), "ENGAGE_ROUTER": host}
+    async with AsyncExitStack() as stack:
+        for name, container in containers(variables, "compose.yaml", "compose.keys.yaml").items():
+            words = [each.replace("0.0.0.0:7447", f"{host}:{port}") for each in container.command]
+            itself = {key: value.replace(":7447", f":{port}") for key, value in container.environment.items()}
+            process = await stack.enter_async_context(started(*words, **itself))
+            await until(process, "router is ready" if name == "router" else "is ready")
+        where = ("--connect", f"tls/{host}:{port}", "--keys", str(ring / "alice"))
+        player = await stack.enter_async_context(started("play", str(block), *where))
+        told, _ = await asyncio.wait_for(player.communicate(), LONG)
+
+    assert player.returncode == 0, told.decode()
+
+
+@asynccontextmanager
+async def started(*arguments: str, **environment: str) -> AsyncIterator[asyncio.subprocess.Process]:
+    """A command of ours, with these variables of the environment; it ends with the context."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "engage_hri", *arguments, env={**os.environ, **environment},
+        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        if process.returncode is None:
+            process.terminate()
+        await process.communicate()

@@ -18,7 +18,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.config import Mode, is_encrypted, mode_of
+from engage_hri.services.bus.config import Mode, is_encrypted, is_on_this_machine, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.clocks import Clocks
@@ -31,6 +31,7 @@ from engage_hri.services.bus.zenoh.readers import Readers
 from engage_hri.services.bus.zenoh.rights import Rights
 from engage_hri.services.bus.zenoh.session import (
     LOOPBACK,
+    PEER_AFAR,
     RENDEZVOUS,
     ROUTER_WITH_KEYS,
     RUST_PLACE,
@@ -78,6 +79,8 @@ async def open_hub(
     else:
         session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
         places = tuple(listen) or (LOOPBACK,)
+        if not all(map(is_on_this_machine, connect)):
+            LOG.warning("%s", PEER_AFAR)
     link = ProcessFacts(
         zenoh=version("eclipse-zenoh"), mode="peer" if places else "client", connect=tuple(connect),
         holder=keys.holder.common_name if keys else "", until=keys.holder.until if keys else None,

@@ -22,6 +22,11 @@ ROUTER_WITH_KEYS = "tls/localhost:7447"
 RENDEZVOUS = "tcp/127.0.0.1:7447"
 """Endpoint at which the processes of one machine find one another: the first listens there, all others connect."""
 LOOPBACK = "tcp/127.0.0.1:0"
+PEER_AFAR = (
+    "a peer of other machines: after a cut it finds again only those that it names itself (--connect for each); "
+    "a client of a router finds all (`engage router`)"
+)
+"""Warning: Zenoh does not dial again whom it has met through others."""
 LEASE_MS = 2000
 """Time in which a silent link counts as alive: with shorter ones peers seem to go and come on cuts of 0.4 s."""
 STALL_US = 200_000
