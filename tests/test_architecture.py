@@ -26,7 +26,7 @@ MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 PURE_MACHINERY = {
     "services/requests/asked.py", "services/requests/asking.py", "services/requests/asking_effects.py",
     "services/requests/asking_table.py",
-    "services/requests/deadlines.py", "services/requests/window.py",
+    "services/requests/deadlines.py", "services/requests/ended.py", "services/requests/window.py",
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",

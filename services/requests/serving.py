@@ -7,7 +7,6 @@ and id, and calls each by a name that no other request of this server has or had
     effects = serving.answer(name, Accepted(id=name), now)      # what the service decides
 """
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from math import inf
@@ -33,6 +32,7 @@ from engage_hri.schemas.requests import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.deadlines import Deadlines
+from engage_hri.services.requests.ended import Ended
 from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.records import Key, Record, content_of, event_of, key_of
 from engage_hri.services.requests.serving_effects import Complain, Effect, Hand, Hold, Publish
@@ -40,8 +40,6 @@ from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
 
 GRACE: Seconds = 2.0
 """Seconds that a requester may be gone before its requests end: a restart of the router looks like a death."""
-ENDED_KEPT = 1024
-"""Number of ended requests that are remembered, to answer them if they come again."""
 LIFELESS_KEPT: Seconds = 10.0
 """Seconds for which an ended request that names no life is remembered: longer than any wait to send one again."""
 LAPSED = "nobody has renewed it"
@@ -77,7 +75,7 @@ class Serving:
         self._newest: dict[Key, Record] = {}
         """The newest request of each key, of any kind."""
         self._named: dict[str, Record] = {}
-        self._ended: OrderedDict[str, Record] = OrderedDict()
+        self._ended = Ended()
         self._names = Names()
         self._runs: dict[str, str] = {}
         self._deadlines: Deadlines[tuple[Event, str]] = Deadlines()
@@ -237,7 +235,7 @@ class Serving:
         return record
 
     def _forget(self, record: Record) -> None:
-        self._ended.pop(record.name, None)
+        self._ended.discard(record)
         self._named.pop(record.name, None)
         if self._known.get((record.key, record.kind)) is record:
             del self._known[record.key, record.kind]
@@ -255,9 +253,8 @@ class Serving:
                 self._deadlines.clear(clock)
             if record.state is _ENDED:
                 record.ended_at = now
-                self._ended[record.name] = record
-                if len(self._ended) > ENDED_KEPT:
-                    self._forget(next(iter(self._ended.values())))
+                for oldest in self._ended.add(record):
+                    self._forget(oldest)
 
     # -- actions of the table, each with the message that has caused it -------------------------------------------
 

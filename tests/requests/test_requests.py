@@ -14,8 +14,9 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Request
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
+from engage_hri.services.requests.ended import EACH, MOST
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, RequestRefused
-from engage_hri.services.requests.serving import ENDED_KEPT, GRACE
+from engage_hri.services.requests.serving import GRACE
 from tests.bus.performer import Server, answered, bare, block, extent
 from tests.commanding import command, key_of
 
@@ -298,26 +299,35 @@ async def test_a_server_that_ends_a_request_twice_has_a_bug(hub: MemoryHub):
     await server.die(hub)
 
 
-async def test_a_desk_forgets_the_oldest_ended_requests_and_no_live_one(hub: MemoryHub):
-    bus = hub.join("realizer")
+@pytest.mark.parametrize("is_huge", [False, True])
+async def test_a_desk_forgets_the_oldest_ended_requests_of_who_sends_many_and_no_live_one(
+    hub: MemoryHub, is_huge: bool
+):
+    """Nobody can have it forget what another has sent. is_huge: few requests, of many bytes."""
+    bus, quiet = hub.join("realizer"), hub.join("quiet")
     desk = RequestDesk(bus, "realizer", lambda cancel: None)
     inbox = bus.subscribe(*RequestDesk.patterns("realizer"))
-    states = bus.subscribe(keys.ANY_REQUEST_STATE)
-    for number in range(ENDED_KEPT + 2):
-        command(bus, keys.BLOCK, block(str(number)))
-        received = await inbox.next()
-        assert received is not None
-        assert desk.take(received) is not None
-        if number:
-            desk.refuse(str(number), Fault(reason="no"))
+    states = bus.subscribe(keys.ANY_REQUEST_STATE, capacity=100_000)
 
-    def is_forgotten(id: str) -> bool:
-        return desk.take(Received(key_of(bus, keys.BLOCK), block(id), "client", 0.0, life=bus.run)) is not None
+    def is_new(sender: MemoryBus, id: str, of: str = "") -> bool:
+        key = key_of(sender, keys.BLOCK)
+        return desk.take(Received(key, block(id, of=of), sender.name, 0.0, life=sender.run)) is not None
+
+    assert is_new(quiet, "mine")
+    desk.refuse("mine", Fault(reason="no"))
+    size = 2**20 if is_huge else 0
+    number = 2 * MOST // (EACH + size)
+    for each in range(number):
+        assert is_new(bus, str(each), of="x" * size)
+        if each:
+            desk.refuse(str(each), Fault(reason="no"))
 
     assert desk.is_live("0")
-    assert is_forgotten("1")
-    assert not is_forgotten("2")
-    assert len(states) == ENDED_KEPT + 2
+    assert is_new(bus, "1", of="x" * size)
+    assert not is_new(bus, str(number - 1), of="x" * size)
+    assert not is_new(quiet, "mine")
+    assert len(inbox) == 0
+    assert len(states) == number + 2
 
 
 async def test_what_cannot_be_encoded_is_refused_alone(hub: MemoryHub):
