@@ -38,6 +38,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
 from engage_hri.schemas.holds import BodyHeld, Held
+from engage_hri.schemas.limits import LARGEST
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -111,20 +112,30 @@ def encode_json(message: Message) -> bytes:
 
 
 def published(message: Message) -> tuple[bytes, str]:
-    """Encode a message as it is published. Returns payload and encoding."""
-    if isinstance(message, OUTWARD):
-        return encode_json(message), encoding_of(message, "json")
-    return encode(message), encoding_of(message)
+    """Encode a message as it is published. Returns payload and encoding. Raises InputRefused: it is too large."""
+    form = "json" if isinstance(message, OUTWARD) else "msgpack"
+    payload = encode_json(message) if form == "json" else encode(message)
+    if len(payload) > LARGEST:
+        raise InputRefused(_too_large(payload, type(message).__name__))
+    return payload, encoding_of(message, form)
+
+
+def _too_large(payload: bytes, where: str) -> Fault:
+    return Fault(
+        reason=f"{len(payload)} bytes; at most {LARGEST} are read", where=where, advice="split it into several"
+    )
 
 
 def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
-    """Decode a payload. Raises InputRefused: another major version, an unknown form, or bad content."""
+    """Decode a payload. Raises InputRefused: another major version, an unknown form, too large, or bad content."""
     decoder = _decoder_of(encoding)
+    form, _, schema = encoding.partition(";")
+    if len(payload) > LARGEST:
+        raise InputRefused(_too_large(payload, schema or form))
     try:
         return decoder.decode(payload)  # type: ignore[no-any-return]
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         reason = f"a text that is not UTF-8 ({error.reason})" if isinstance(error, UnicodeDecodeError) else str(error)
-        form, _, schema = encoding.partition(";")
         raise InputRefused(Fault(reason=reason, where=schema or form)) from error
 
 

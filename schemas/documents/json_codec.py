@@ -17,9 +17,9 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_grammar import snake
-from engage_hri.schemas.documents.xml_source import LARGEST
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.limits import LARGEST
 from engage_hri.schemas.tool_call import from_tool, is_tool_input
 from engage_hri.schemas.utf8 import BYTE_ORDER_MARK, is_utf8, utf8
 

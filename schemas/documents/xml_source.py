@@ -11,6 +11,7 @@ from typing import cast
 from lxml import etree
 
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.limits import LARGEST
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
@@ -25,8 +26,6 @@ SSML = "http://www.w3.org/2001/10/synthesis"
 XML = "http://www.w3.org/XML/1998/namespace"
 _OF_THE_DOCUMENT = frozenset({XML, "http://www.w3.org/2001/XMLSchema-instance"})
 """Namespaces of attributes that say something of the document, and nothing of what is to be performed."""
-LARGEST = 4 * 1024 * 1024
-"""Bytes. A block of a thousand behaviors has about 200 kB."""
 DEEPEST = 64
 """Levels of nesting."""
 

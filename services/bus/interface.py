@@ -9,7 +9,7 @@ import logging
 import platform
 import time
 from abc import ABC, abstractmethod
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from enum import Enum, auto
 from typing import Generic, Self, TypeVar
@@ -19,6 +19,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Request, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
@@ -88,20 +89,19 @@ KEYS_KEPT = 4096
 class Subscription(Reading[Received]):
     """A bounded queue of received messages, in order across all its keys; read it with `async for` or `next`.
 
-    Used by one task at a time. When full the oldest message is dropped and counted in `overflowed`.
+    Used by one task at a time. When full, the oldest message of the process that has most in it is dropped and
+    counted in `overflowed`: a flood costs nobody else anything. Who comes and goes is never dropped.
     """
 
     def __init__(
         self, patterns: Iterable[str], keep: Keep, capacity: int, on_close: Callable[["Subscription"], None]
     ) -> None:
         self.patterns = tuple(patterns)
-        self.keep = keep
-        self.capacity = capacity
-        self.overflowed = 0
+        self.keep, self.capacity, self.overflowed = keep, capacity, 0
         self._queue: deque[Received] = deque()
+        self._lives = Counter[str]()
         self._waiting: asyncio.Future[None] | None = None
-        self._on_close = on_close
-        self._closed = False
+        self._on_close, self._closed = on_close, False
         self._carriers: dict[str, str | None] = {}
 
     def wants(self, key: str) -> bool:
@@ -123,16 +123,32 @@ class Subscription(Reading[Received]):
         """Put a message in the queue; called by the bus."""
         if self._closed:
             return
+        self._lives[received.life] += 1
         if self.keep is Keep.LATEST:
             for index, queued in enumerate(self._queue):
                 if queued.key == received.key:
-                    del self._queue[index]
+                    self._remove(index)
                     break
         elif len(self._queue) >= self.capacity:
-            self._queue.popleft()
-            self.overflowed += 1
+            self._make_room()
         self._queue.append(received)
         self._wake()
+
+    def _make_room(self) -> None:
+        for life, _ in self._lives.most_common():
+            for index, queued in enumerate(self._queue):
+                if queued.life == life and not isinstance(queued.message, PeerAlive | PeerGone):
+                    self._remove(index)
+                    self.overflowed += 1
+                    return
+
+    def _remove(self, index: int) -> Received:
+        received = self._queue[index]
+        del self._queue[index]
+        self._lives[received.life] -= 1
+        if not self._lives[received.life]:
+            del self._lives[received.life]
+        return received
 
     def _wake(self) -> None:
         if self._waiting is not None and not self._waiting.done():
@@ -160,7 +176,7 @@ class Subscription(Reading[Received]):
                 self._waiting = None
                 if timer is not None:
                     timer.cancel()
-        return self._queue.popleft() if self._queue else None
+        return self._remove(0) if self._queue else None
 
     def close(self) -> None:
         if not self._closed:

@@ -1,5 +1,6 @@
 """Command `engage router`: passes on what the processes of several machines send one another."""
 
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,10 @@ from engage_hri.schemas.access import ROUTER
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal
 from engage_hri.services.runtime.configuration import bus_config
+
+ZENOH_THREADS = "(rx: (worker_threads: 32))"
+"""Threads of Zenoh that receive; it has two. One is busy for up to 10 s with closing the link of a machine that was cut
+off, and while all are, the router hears nobody, of no robot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +40,7 @@ class Options:
 
 def main(options: Options) -> int:
     """Route until a signal."""
+    os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)  # read when the first session opens
     folder = bus_config(keys=str(options.keys or "")).keys
     run_until_signal(_route(options, read_keys(folder, ROUTER) if folder else None))
     return DONE

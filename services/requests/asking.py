@@ -42,6 +42,7 @@ from engage_hri.services.requests.asking_effects import (
 from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.records import unwieldy
 from engage_hri.services.requests.window import Window
 
 _Said = Answer | None
@@ -110,6 +111,8 @@ class Asking:
         within: seconds after which the request is cancelled if it has not ended.
         """
         asked = self._asked.get(request.id)
+        if (bad := unwieldy(request, keys.server_of(expression))) is not None:
+            return [TellEnd(request.id, RequestRefused(bad))]
         if asked is None:
             request = replace(request, requester=self._requester, life=self._life, lease=self._lease(request))
             asked = self._asked[request.id] = Asked(expression, request)

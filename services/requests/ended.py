@@ -27,7 +27,7 @@ class Ended:
 
     def add(self, record: Record) -> list[Record]:
         """Remember a request that has ended; returns those that are to be forgotten for it."""
-        sender, size = record.sender, EACH + len(encode(record.request))
+        sender, size = record.sender, EACH + len(encode(record.request))  # type: ignore[arg-type]
         self._of.setdefault(sender, OrderedDict())[record.name] = (record, size)
         self._bytes[sender] = self._bytes.get(sender, 0) + size
         self._all += size
@@ -45,7 +45,7 @@ class Ended:
     def discard(self, record: Record) -> None:
         """Forget a request, if it is here."""
         sender = record.sender
-        known = self._of.get(sender, {}).pop(record.name, None)
+        known = self._of[sender].pop(record.name, None) if sender in self._of else None
         if known is None:
             return
         self._bytes[sender] -= known[1]

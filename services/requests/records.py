@@ -4,9 +4,13 @@ from math import inf
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.requests import Answer, Cancel, Request, kind_meant
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Request, kind_meant
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.serving_table import Event, State
+
+LONGEST = 1000
+"""Letters of an id, and of a life: answers name them, and answers are kept."""
 
 Key = tuple[str, str, str]
 """Requester, life and id. Only one request of a key is live at a time."""
@@ -54,3 +58,13 @@ def event_of(record: Record, request: Request) -> Event:
 def content_of(request: Request) -> Request:
     """The request without the fields that are no content."""
     return replace(request, revision=0, lease=0.0)
+
+
+def unwieldy(command: Request | KeepAlive, server: str) -> Fault | None:
+    """A fault if an id or the life in a command is too long to be answered; None otherwise."""
+    ids = [each.id for each in command.live] if isinstance(command, KeepAlive) else [command.id]
+    most = max(map(len, (command.life, *ids)))
+    if most <= LONGEST:
+        return None
+    reason = f"an id of {most} letters; at most {LONGEST} are read"
+    return Fault(reason=reason, where=type(command).__name__, service=server)

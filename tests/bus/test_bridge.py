@@ -4,11 +4,24 @@ import asyncio
 import os
 
 import pytest
+import zenoh
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.messages import Message, encode
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.services.bus.interface import Keep, Received, Subscription
+from engage_hri.services.bus.zenoh import session
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.session import Arrived
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, matched, messages, numbers, state
+
+BLOCK = zenoh.CongestionControl.BLOCK
+
+
+def arrived(item: object) -> list[Arrived]:
+    """Messages in an item of a queue."""
+    return [one for one in (item if isinstance(item, tuple) else (item,)) if isinstance(one, Arrived)]
+
 
 pytestmark = pytest.mark.real_time
 
@@ -24,7 +37,7 @@ async def test_a_message_that_waits_for_the_loop_keeps_nothing_of_zenohs_buffers
 
     speaker.publish(key, state(1))
     queue, deadline = here.bridge._streams if key == keys.NET else here.bridge._ordered, loop.time() + PATIENCE
-    while not (waiting := [item for _, item in tuple(queue) if isinstance(item, Arrived)]):
+    while not (waiting := [one for _, item in tuple(queue) for one in arrived(item)]):
         assert loop.time() < deadline
 
     assert [each.key for each in waiting] == [key]
@@ -32,3 +45,60 @@ async def test_a_message_that_waits_for_the_loop_keeps_nothing_of_zenohs_buffers
     assert numbers(await messages(inbox)) == [1]
     await there.close()
     await here.close()
+
+
+async def test_a_flood_of_one_process_costs_the_others_nothing(monkeypatch: pytest.MonkeyPatch):
+    """Who comes and goes is told, what others send arrives, and a question is answered, however much waits."""
+    robot, end = f"flooded-{os.getpid()}", free_endpoint()
+    here = await open_hub(robot, listen=[end])
+    hubs = [await open_hub(robot, connect=[end]) for _ in range(3)]
+    loud, quiet, comer = (hub.join(name) for hub, name in zip(hubs, ("loud", "quiet", "comer"), strict=True))
+    for hub in hubs:
+        await acquainted(here, hub)
+    inbox = here.join("here").subscribe(keys.FEEDBACK, keys.ANY_ALIVE, capacity=100)
+    for hub in hubs:
+        await matched(hub, keys.FEEDBACK)
+
+    monkeypatch.setattr(session, "CROWD_OF_ONE", 1000 * session.EACH)
+    for _ in range(3000):  # nothing runs on the loop meanwhile
+        hubs[0].session.put(keys.FEEDBACK, encode(state(0)), encoding="application/msgpack", congestion_control=BLOCK)
+    comer.declare_alive()
+    quiet.publish(keys.FEEDBACK, state(1))
+    trip = asyncio.create_task(hubs[1].peers.round_trip(here.run, PATIENCE))
+
+    found: set[object] = set()
+    async with asyncio.timeout(PATIENCE):
+        while len(found) < 2:
+            received = await inbox.next()
+            assert received is not None
+            if isinstance(received.message, PeerAlive) and received.message.participant == "comer":
+                found.add("comer")
+            if received.source == "quiet":
+                found.add("quiet")
+    assert await trip is not None
+    assert here.bridge.traffic.dropped > 0
+    assert here.bridge._came == here.bridge._left == {}
+    await loud.leave()
+    for hub in (*hubs, here):
+        await hub.close()
+
+
+def test_a_full_queue_drops_of_the_loudest_and_never_who_comes_and_goes():
+    closed: list[Subscription] = []
+    inbox = Subscription(["**"], Keep.EVERY, 10, closed.append)
+
+    def offer(life: str, message: Message, number: int) -> None:
+        inbox.offer(Received(f"engage/v1/evt/{life}/fault", message, life, float(number), life=life))
+
+    for number in range(4):
+        offer("quiet", state(number), number)
+    for number in range(8):
+        offer("", PeerGone(participant=f"p{number}"), number)
+    for number in range(1000):
+        offer("loud", state(number), number)
+
+    kept = list(inbox._queue)
+    assert len([one for one in kept if isinstance(one.message, PeerGone)]) == 8
+    assert [one.at for one in kept if one.life == "loud"] == [999.0]
+    assert [one.at for one in kept if one.life == "quiet"] == [3.0]
+    assert inbox.overflowed == 1002

@@ -30,6 +30,10 @@ from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
 BATCH = 32
 """Number of replies in one go: a question for everything must not hold up the loop."""
+PATTERNS = 64
+"""Number of patterns in a question for the past. Each key that there is gets compared with each."""
+LONGEST = 1024 * 1024
+"""Bytes of such a question: it has a count for each key that the asking process knows."""
 CATCH_UP: Seconds = 1.0
 """Time that a process has to hand out its past."""
 
@@ -61,7 +65,7 @@ class History:
         self._sent = sent
         self._open = True
         self._declared: tuple[Any, ...] = tuple(
-            session.declare_queryable(keys.of_class(kind), bridge.on_loop(partial(self._asked, kind)))
+            session.declare_queryable(keys.of_class(kind), bridge.questions(partial(self._asked, kind)))
             for kind in keys.KEPT_CLASSES
         )
 
@@ -69,7 +73,7 @@ class History:
         """Show that this process has a past from now on, and be asked for it: watchers never have one."""
         past, log = (keys.own(self._sent.run, subject) for subject in ("past", "log"))
         self._declared += (
-            self._session.declare_queryable(past, self._bridge.on_loop(self._missing_asked)),
+            self._session.declare_queryable(past, self._bridge.questions(self._missing_asked)),
             self._session.liveliness().declare_token(log),
         )
 
@@ -123,10 +127,15 @@ class History:
 
     def _missing_asked(self, query: zenoh.Query) -> None:
         try:
-            asked = _questions.decode(query.payload.to_bytes() if query.payload else b"")
+            payload = query.payload.to_bytes() if query.payload else b""
+            if len(payload) > LONGEST:
+                raise InputRefused(Fault(reason=f"a question of {len(payload)} bytes; at most {LONGEST} are read"))
+            asked = _questions.decode(payload)
+            if len(asked.patterns) > PATTERNS:
+                raise InputRefused(Fault(reason=f"{len(asked.patterns)} patterns; at most {PATTERNS} are answered"))
             expressions = [zenoh.KeyExpr(pattern) for pattern in asked.patterns]
-        except (zenoh.ZError, *BAD) as error:
-            refuse(query, Fault(reason=str(error)), "json")
+        except (zenoh.ZError, EngageError, *BAD) as error:
+            refuse(query, error.fault if isinstance(error, EngageError) else Fault(reason=str(error)), "json")
             finish(query)
             return
         oldest = self._loop.time() - keys.HISTORY_MAX_AGE - asked.missing.age

@@ -350,7 +350,7 @@ class ZenohBus(Bus):
                 finish(query)
 
         session = self._hub.session
-        self._answers.append(session.declare_queryable(key, self._hub.bridge.on_loop(reply)))
+        self._answers.append(session.declare_queryable(key, self._hub.bridge.questions(reply)))
         # A participant that asked too early learns from this token that it may ask again.
         self._answers.append(session.liveliness().declare_token(keys.own(self._hub.run, f"answers/{key}")))
 

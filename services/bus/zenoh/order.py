@@ -28,6 +28,8 @@ from engage_hri.schemas.units import Seconds
 
 KEPT = 4096
 """Number of messages that a process keeps for subscribers that missed them."""
+KEPT_BYTES = 16 * 1024 * 1024
+"""Bytes of these messages, of all together; the last is kept whatever its size."""
 PULSE_FOR: Seconds = 3.0
 """Time after a message for which its count is published, for receivers that lost the last one of a burst."""
 
@@ -104,6 +106,7 @@ class SentLog:
         """Of each key of which something is kept."""
         self._written_at: dict[str, Seconds] = {}
         self._most = kept
+        self._bytes = 0
         self._kept: deque[Written] = deque()
         self._kept_of: Counter[str] = Counter()
         """Number of messages in `_kept`, by key."""
@@ -131,12 +134,14 @@ class SentLog:
     def _keep(self, written: Written) -> None:
         self._kept.append(written)
         self._kept_of[written.key] += 1
-        if len(self._kept) > self._most:
-            oldest = self._kept.popleft().key
-            self._kept_of[oldest] -= 1
-            if not self._kept_of[oldest]:
-                del self._kept_of[oldest]
-                self._drop(oldest)
+        self._bytes += len(written.payload)
+        while len(self._kept) > self._most or (self._bytes > KEPT_BYTES and len(self._kept) > 1):
+            oldest = self._kept.popleft()
+            self._bytes -= len(oldest.payload)
+            self._kept_of[oldest.key] -= 1
+            if not self._kept_of[oldest.key]:
+                del self._kept_of[oldest.key]
+                self._drop(oldest.key)
 
     def withdraw(self, key: str) -> None:
         """Forget a state: nobody gets it any more. One that was never published is none."""

@@ -62,7 +62,7 @@ class Peers:
         self._rank = rank or (lambda run: 0)
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         self._declared: tuple[Any, ...] = (
-            session.declare_queryable(keys.own(sent.run, "clock"), bridge.on_loop(self._tell_time)),
+            session.declare_queryable(keys.own(sent.run, "clock"), bridge.questions(self._tell_time)),
         )
 
     def stand(self, on_publisher: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:

@@ -84,7 +84,7 @@ class Readers:
         self._flushing: list[tuple[str, zenoh.Query]] = []
         self._decoded: tuple[Written, Message | None] | None = None
         self._declared: tuple[Any, ...] = (
-            session.declare_queryable(keys.own(sent.run, "flush"), bridge.on_loop(self._flush_asked)),
+            session.declare_queryable(keys.own(sent.run, "flush"), bridge.questions(self._flush_asked)),
             session.declare_subscriber(keys.ANY_PULSE, bridge.samples(self._pulse_heard)),
         )
 

@@ -41,8 +41,14 @@ TELL_AFTER: Seconds = 3.0
 """Time without a router after which it is told that there is none."""
 RETRY_MS = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
 BATCH = 256
-CROWD = 65_536
+CROWD = 262_144
 """Number of messages waiting for the loop from which on even ordered ones are dropped (and asked for again)."""
+CROWD_OF_ONE = 16 * 1024 * 1024
+"""Bytes of one process' messages waiting for the loop from which on more of them are dropped."""
+EACH = 1024
+"""Bytes that a message takes at least."""
+QUESTIONS = 4096
+"""Number of questions waiting for the loop from which on more get no answer."""
 STREAM_CROWD = 1024
 
 CAUSAL = zenoh.Priority.DATA
@@ -209,6 +215,8 @@ class LoopBridge:
     """Queues from Zenoh's threads to the loop: one for all ordered keys; one for streams, the oldest dropped first.
 
     A callback appends an item and wakes the loop if need be, nothing else: any waiting there stalls the link.
+    Messages of a process of which too much waits are dropped, and questions if there are too many. Who comes and
+    goes, and the answers to what was asked here, come in any case: nobody would ask for them again.
     """
 
     def __init__(self, failed: Callable[[Exception, str], None]) -> None:
@@ -218,12 +226,16 @@ class LoopBridge:
         self._loop = asyncio.get_running_loop()
         self._ordered: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._streams: deque[tuple[Callable[[Any], None], Any]] = deque(maxlen=STREAM_CROWD)
+        self._came: dict[str, int] = {}
+        self._left: dict[str, int] = {}
+        """Bytes by process: of what came since nothing waited, and of what of that waits no longer. Zenoh's threads
+        write the one, the loop the other. Two threads may write at once, and then the limit is a little wider."""
         self._woken = False
         self._woken_at = 0.0
         self._open = True
 
     def on_loop(self, enter: Callable[[Any], None], end: Callable[[Any], None] | None = None) -> Any:
-        """Make a handler for Zenoh: `enter` runs on the loop with each item, `end` when there will be no more."""
+        """Make a handler for tokens, or for replies: `enter` runs on the loop with each, `end` at last."""
 
         def ended() -> None:
             if end is not None:
@@ -232,19 +244,42 @@ class LoopBridge:
         # indirect=False: else Zenoh starts a Python thread for each of these.
         return zenoh.handlers.Callback(lambda item: self._let_in(enter, item), ended, indirect=False)
 
+    def questions(self, enter: Callable[[zenoh.Query], None]) -> Any:
+        """Make a handler for a queryable. A question that is dropped ends without an answer."""
+
+        def sort(query: zenoh.Query) -> None:
+            self._let_in_of("", CROWD_OF_ONE // QUESTIONS, enter, query)
+
+        return zenoh.handlers.Callback(sort, indirect=False)
+
     def samples(self, enter: Callable[[Arrived], None]) -> Any:
-        """Make a handler for subscribers: as `on_loop`, but samples that may be dropped take the streams' queue."""
+        """Make a handler for subscribers. Samples that may be dropped take the streams' queue."""
 
         def sort(sample: zenoh.Sample) -> None:
+            arrived = copied(sample)
             if sample.congestion_control == zenoh.CongestionControl.DROP:
                 if len(self._streams) == STREAM_CROWD:
                     self.traffic.dropped += 1
-                self._streams.append((enter, copied(sample)))
+                self._streams.append((enter, arrived))
                 self._wake()
-            else:
-                self._let_in(enter, copied(sample))
+                return
+            sender = f"{arrived.sender or arrived.stamped_by} "  # not the one that stands for questions
+            self._let_in_of(sender, EACH + len(arrived.payload), enter, arrived)
 
         return zenoh.handlers.Callback(sort, indirect=False)
+
+    def _let_in_of(self, sender: str, size: int, enter: Callable[[Any], None], item: Any) -> None:
+        came = self._came.get(sender, 0)
+        if came - self._left.get(sender, 0) > CROWD_OF_ONE or len(self._ordered) >= CROWD:
+            self.traffic.dropped += 1
+        else:
+            self._came[sender] = came + size
+            self._let_in(self._pass_on, (sender, size, enter, item))
+
+    def _pass_on(self, waited: tuple[str, int, Callable[[Any], None], Any]) -> None:
+        sender, size, enter, item = waited
+        self._left[sender] = self._left.get(sender, 0) + size
+        enter(item)
 
     @property
     def waiting(self) -> int:
@@ -257,9 +292,6 @@ class LoopBridge:
         self._streams.clear()
 
     def _let_in(self, enter: Callable[[Any], None], item: Any) -> None:
-        if len(self._ordered) >= CROWD:
-            self.traffic.dropped += 1
-            return
         self._ordered.append((enter, item))
         self._wake()
 
@@ -293,3 +325,5 @@ class LoopBridge:
                 self._woken = True
                 self._woken_at = self._loop.time()
                 self._loop.call_soon(self._drain)
+            elif not self._ordered:
+                self._came, self._left = {}, {}
