@@ -14,8 +14,8 @@ from engage_hri.services.commandline.process import DONE, forever, run_until_sig
 from engage_hri.services.runtime.configuration import bus_config
 
 ZENOH_THREADS = "(rx: (worker_threads: 32))"
-"""Threads of Zenoh that receive; it has two. One is busy for up to 10 s with closing the link of a machine that was cut
-off, and while all are, the router hears nobody, of no robot."""
+"""Threads of Zenoh that receive; it has two. One is busy for up to 10 s with closing the link of a machine that was
+cut off, and while all are, the router hears nobody, of no robot."""
 
 
 @dataclass(frozen=True, kw_only=True)
