@@ -47,7 +47,7 @@ from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_table import State
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.pending import Pending
-from engage_hri.services.requests.records import LONGEST, unwieldy
+from engage_hri.services.requests.records import unwieldy
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.runtime.alarm import Alarm
 
@@ -275,7 +275,7 @@ class RequestDesk:
             is_ours = keys.is_command_of(self._server, received.key)
             return self._take(message, received, self._bus.now()) if is_ours else None
         match message:
-            case Unreadable(id=id, life=life, kind=kind, fault=fault) if id and max(len(id), len(life)) <= LONGEST:
+            case Unreadable(id=id, life=life, kind=kind, fault=fault) if id:
                 # What could be read names the request, which may be live, or have ended.
                 if borrowed(life, received, self._server) is not None:
                     return None
@@ -298,16 +298,19 @@ class RequestDesk:
             self._bus.log.warning(
                 "%s: %s comes from %r; it counts as the sender's own", self._server, what, requester
             )
-        fault = unwieldy(message, self._server) or borrowed(message.life, received, self._server)
-        if fault is not None:
+        if (fault := borrowed(message.life, received, self._server)) is not None:
             self._bus.publish(keys.fault(self._server), fault)
             return None
         if requester != message.requester or not message.life:
             message = replace(message, requester=requester, life=message.life or sender)
+        fault = unwieldy(message, self._server)
         if isinstance(message, KeepAlive):
+            if fault is not None:
+                self._bus.publish(keys.fault(self._server), fault)
+                return None
             sent = min(now, self._bus.local(message.at))
             return self._carry_out(self._serving.keep_alive(message, sent, now, sender))
-        if (fault := misplaced(message, received.key)) is not None:
+        if (fault := fault or misplaced(message, received.key)) is not None:
             return self._carry_out(self._serving.refuse(message, fault))
         return self._carry_out(self._serving.take(message, now, sender))
 

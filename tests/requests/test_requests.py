@@ -11,11 +11,12 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.requests import Accepted, Cancel, Request
+from engage_hri.schemas.requests import Accepted, Cancel, Refused, Request
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.requests.ended import EACH, MOST
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, RequestRefused
+from engage_hri.services.requests.records import LONGEST
 from engage_hri.services.requests.serving import GRACE
 from tests.bus.performer import Server, answered, bare, block, extent
 from tests.commanding import command, key_of
@@ -363,4 +364,23 @@ async def test_ten_thousand_requests_at_once_come_as_the_server_keeps_up_each_on
     assert refused == {*range(7, 10_000, 100), *range(9_000, 9_100)}
     assert first == Patience().window
     assert server.taken == [block(f"b{number}") for number in range(10_000) if number not in refused]
+    await server.die(hub)
+
+
+async def test_an_id_that_is_too_long_is_refused_and_not_remembered(hub: MemoryHub):
+    """Our own requester does not even send it."""
+    server, client, long = Server(hub), hub.join("client"), "x" * (LONGEST + 1)
+    states = client.subscribe(keys.ANY_REQUEST_STATE)
+    async with Requester(client) as requests:
+        with pytest.raises(RequestRefused, match=f"an id of {LONGEST + 1} letters; at most {LONGEST}"):
+            await requests.send(keys.BLOCK, block(long)).outcome
+    assert len(states) == 0
+
+    command(client, keys.BLOCK, block(long))
+    told = await states.next()
+
+    assert told is not None
+    assert isinstance(told.message, Refused)
+    assert told.message.id == long
+    assert server.desk._serving._known == {}
     await server.die(hub)
