@@ -9,6 +9,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus
@@ -256,3 +257,21 @@ async def test_the_states_of_who_is_forgotten_are_withdrawn(hub: MemoryHub):
     remembered = ("bob", "carl", "dora")
     states = {key(actor) for key in (keys.statistics, keys.open_events) for actor in remembered}
     assert told == {keys.statistics("all"), *states}
+
+
+async def test_where_a_person_looks_is_known_again_once_perception_is_back(hub: MemoryHub):
+    """As after a cut: perception says once that a look has begun."""
+    bus, camera = hub.join("realizer"), hub.join("camera")
+    camera.declare_alive()
+    async with running(hub, recognition()), Requester(bus) as requests:
+        camera.publish(keys.WORLD, world())
+        perceive(camera, "blue-square")
+        await asyncio.sleep(1.0)
+        hub.announce("camera", PeerGone(participant="camera"))
+        await asyncio.sleep(5.0)
+        hub.announce("camera", PeerAlive(participant="camera", run=camera.run))
+        await asyncio.sleep(1.0)
+        outcome = await requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square")).outcome
+
+    assert isinstance(outcome, EventOutcome)
+    assert (outcome.state, outcome.delay) == ("succeeded", 0.0)
