@@ -309,14 +309,14 @@ class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_d
 class RobotState(Struct, frozen=True, kw_only=True, tag="robot_state", omit_defaults=True):
     """state and stream: control, the present state of the body, seldom and often.
 
-    left_arm, right_arm: the forearms. looking_at: entity id; empty: nothing.
-    speaking: the words that are being said; empty: silence.
+    gaze: from the eyes. left_arm, right_arm: the forearms. None: it has no eyes, or no such arm.
+    looking_at: entity id; empty: nothing. speaking: the words that are being said; empty: silence.
     """
 
     at: Stamp
     pose: BodyPose
-    gaze: Ray
-    left_arm: Ray
-    right_arm: Ray
+    gaze: Ray | None = None
+    left_arm: Ray | None = None
+    right_arm: Ray | None = None
     looking_at: str = ""
     speaking: str = ""

@@ -6,15 +6,16 @@ and `tests/control/contract.py` is the suite that it has to pass.
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
-from typing import Literal
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from typing import ClassVar, Literal
 
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Ray
-from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
@@ -218,27 +219,63 @@ class MovementAuthority:
 class BodyState(Struct, frozen=True, kw_only=True):
     """Measurements of a body at one instant.
 
-    pose: joint angles, radians. gaze: from the eyes. left_arm, right_arm: from the elbow, through the hand.
+    pose: joint angles, radians. gaze: from the eyes. left_arm, right_arm: from the elbow, through the hand. A body
+    without eyes or without that arm has None there.
     moving: true while anything moves or speaks. looking_at: id of the entity on the gaze axis; empty: none.
     speaking: the text that is being said; empty: none.
     """
 
     pose: BodyPose
-    gaze: Ray
-    left_arm: Ray
-    right_arm: Ray
     moving: bool
+    gaze: Ray | None = None
+    left_arm: Ray | None = None
+    right_arm: Ray | None = None
     looking_at: str = ""
     speaking: str = ""
+
+
+class MouthShape(Struct, frozen=True):
+    """A shape of the lips, from an instant on.
+
+    at: loop time, seconds. opening: 0 closed to 1 wide open. width: -1 rounded to 1 spread; 0 at rest.
+    """
+
+    at: Seconds
+    opening: float
+    width: float = 0.0
 
 
 class Body(ABC):
     """A robot, or a simulation of one. Its methods are called on the event loop and must not block.
 
     capabilities: what it can do, for planners: types of behaviors, joints and their limits.
+    Settings: of a driver with settings, the type of its one argument; a `msgspec.Struct` in which everything has a
+    default. `control.drivers.NAME` of the configuration is read into it.
+    on_fault: called with what goes wrong outside of any behavior, such as a lost connection. Whoever runs the body
+    replaces it.
+    on_lips: called by a voice with all the mouth shapes of what it begins to say, in time order, and with none when
+    it falls silent early. Whoever runs the body replaces it.
     """
 
+    Settings: ClassVar[type[Struct] | None] = None
     capabilities: Capabilities
+    on_fault: Callable[[Fault], None] = staticmethod(lambda fault: None)
+    on_lips: Callable[[Sequence[MouthShape]], None] = staticmethod(lambda shapes: None)
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        """Connect to the hardware, for the body of `async with`; tasks of a driver live in here. By default nothing.
+
+        Raises:
+            InputRefused: it cannot be had, with what to do.
+        """
+        yield
+
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:  # noqa: B027
+        """Move the lips with a voice: replace all shapes that are to come. By default nothing.
+
+        shapes: in time order; the last one closes the mouth. Empty: the voice has fallen silent.
+        """
 
     @abstractmethod
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:

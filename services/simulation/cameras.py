@@ -7,7 +7,7 @@ so does the world if a fault makes it unsteady.
 from collections.abc import Iterator
 
 from engage_hri.schemas.actions import ActorFound, ActorLost
-from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.body import Ray, RobotState
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
@@ -52,10 +52,13 @@ class Cameras:
         self._exact.enter(now)
 
     def feed(self, message: Message, now: Seconds) -> None:
-        if isinstance(message, RobotState):
-            self._sightlines.robot_eyes = message.gaze.origin
-        else:
-            self._exact.feed(message, now)
+        match message:
+            case RobotState(gaze=Ray(origin=eyes)):
+                self._sightlines.robot_eyes = eyes
+            case RobotState():
+                pass  # without eyes people look where the robot stands
+            case _:
+                self._exact.feed(message, now)
 
     def world(self, now: Seconds) -> World:
         """The table as the cameras see it now."""

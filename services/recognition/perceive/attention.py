@@ -14,7 +14,7 @@ from itertools import chain
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Action
-from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.body import Ray, RobotState
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
@@ -123,8 +123,8 @@ class Attention:
                 self._world_at = at
                 self._gaze_targets.see(observation, at)
                 actions += self._manipulated(self._manipulation.feed(observation, at), at)
-            case RobotState() if is_place(observation.gaze.origin):
-                self._gaze_targets.see_face(self._robot, observation.gaze.origin)
+            case RobotState(gaze=Ray(origin=eyes)) if is_place(eyes):
+                self._gaze_targets.see_face(self._robot, eyes)
         return actions
 
     def take_report(self, report: Symbolic, at: Seconds) -> list[Symbolic]:
