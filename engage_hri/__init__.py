@@ -17,11 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from engage_hri.schemas.behaviors import Gaze as Gaze
+    from engage_hri.schemas.behaviors import Head as Head
     from engage_hri.schemas.behaviors import Pointing as Pointing
     from engage_hri.schemas.behaviors import Reference as Reference
     from engage_hri.schemas.behaviors import Speech as Speech
     from engage_hri.schemas.behaviors import SpeechOption as SpeechOption
     from engage_hri.schemas.blocks import Block as Block
+    from engage_hri.schemas.body import JointLimit as JointLimit
+    from engage_hri.schemas.body import Ray as Ray
     from engage_hri.schemas.faults import EngageError as EngageError
     from engage_hri.schemas.faults import Fault as Fault
     from engage_hri.schemas.faults import InputRefused as InputRefused
@@ -46,10 +49,12 @@ if TYPE_CHECKING:
     from engage_hri.services.control.body import Body as Body
     from engage_hri.services.control.body import MovementAuthority as MovementAuthority
     from engage_hri.services.control.body import Reached as Reached
+    from engage_hri.services.control.ordinary import OrdinaryBody as OrdinaryBody
 
 _PLACES = {
-    "engage_hri.schemas.behaviors": ("Gaze", "Pointing", "Reference", "Speech", "SpeechOption"),
+    "engage_hri.schemas.behaviors": ("Gaze", "Head", "Pointing", "Reference", "Speech", "SpeechOption"),
     "engage_hri.schemas.blocks": ("Block",),
+    "engage_hri.schemas.body": ("JointLimit", "Ray"),
     "engage_hri.schemas.faults": ("EngageError", "Fault", "InputRefused", "RequestRefused", "RunFailed"),
     "engage_hri.schemas.fragments": ("FragmentOutcome", "TurnFragment"),
     "engage_hri.schemas.recognition": ("ConnectionEvent", "Statistics"),
@@ -59,6 +64,7 @@ _PLACES = {
     "engage_hri.services.client.results": ("PerformFailed",),
     "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.control.body": ("Arrived", "MovementAuthority", "BehaviorRefused", "Body", "Reached"),
+    "engage_hri.services.control.ordinary": ("OrdinaryBody",),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
@@ -74,10 +80,14 @@ __all__ = [
     "Fault",
     "FragmentOutcome",
     "Gaze",
+    "Head",
     "InputRefused",
+    "JointLimit",
     "MovementAuthority",
+    "OrdinaryBody",
     "PerformFailed",
     "Pointing",
+    "Ray",
     "Reached",
     "Reference",
     "RequestRefused",

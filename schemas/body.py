@@ -276,16 +276,18 @@ class NoPointZone(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class JointLimit(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Range and greatest speed and acceleration of a joint. part: the body part that it belongs to."""
+    """Range and greatest speed and acceleration of a joint.
+
+    joint: its name. part: the body part that it belongs to. low, high: the ends of its range.
+    speed: the greatest, radians per second. acceleration: the greatest, radians per second squared.
+    """
 
     joint: str
     part: str
     low: Radians
     high: Radians
     speed: float
-    """rad/s"""
     acceleration: float
-    """rad/s^2"""
 
 
 class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_defaults=True):

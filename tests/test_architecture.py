@@ -14,6 +14,8 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
+from tests.shells import SHELLS
+
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST = 400
 """Lines."""
@@ -34,34 +36,6 @@ PURE_MACHINERY = {
     "services/client/event_stream.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
-SHELLS = {
-    "services/realizer/perform/performance.py",  # awaits bodies
-    "services/realizer/perform/control_link.py",  # asks the body
-    "services/realizer/perform/recognition_link.py",  # asks recognition
-    "services/control/shown.py",  # publishes what the body shows
-    "services/control/estimates.py",  # publishes mistakes of the body
-    "services/realizer/perform/feedback.py",  # publishes feedback
-    "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
-    "services/realizer/perform/behavior_run.py",  # awaits sync points
-    "services/realizer/perform/futures.py",  # resolves them
-    "services/realizer/perform/planning.py",  # asks the body
-    "services/realizer/perform/rehearsing.py",  # asks it again
-    "services/realizer/perform/ends_of_runs.py",  # awaits the ends of behaviors
-    "services/realizer/perform/net_stream.py",  # publishes the marking
-    "services/realizer/perform/steering.py",  # holds, continues and stops
-    "services/realizer/perform/live.py",  # resolved when a block has ended
-    "services/generation/body_link.py",  # asks the body
-    "services/generation/fragment_runner.py",  # awaits the blocks of fragments
-    "services/control/body.py",  # the interface of bodies: coroutines
-    "services/control/torso/body.py",  # a body that moves on the loop's clock
-    "services/control/waiting.py",  # waits for a moment or a change of authority
-    "services/simulation/still.py",  # a world, published once
-    "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
-    "services/hostile/visitor.py",  # an honest client
-    "services/console/follow.py",  # subscribes
-    "services/console/live.py",  # draws
-}
-"""Files beside `service.py` that are not pure. Each is a decision: keep the list short."""
 VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
@@ -73,8 +47,8 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
-    " > variability > config",
+    "services/control": "service > drivers > torso > composed ordinary voice > shown"
+    " > actions estimates unheard waiting > live > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",

@@ -26,10 +26,10 @@ the bus, and stands on the page of [messages](messages.md).
 """
 SECTIONS = {
     "Driving a robot": ("connect", "Robot"),
-    "What you give it": ("TurnFragment", "Reference", "SpeechOption", "Speech", "Gaze", "Pointing", "Block"),
+    "What you give it": ("TurnFragment", "Reference", "SpeechOption", "Speech", "Gaze", "Pointing", "Head", "Block"),
     "What comes back": ("FragmentOutcome", "ConnectionEvent", "Statistics", "World", "Entity"),
     "Language models": ("perform_call", "stream", "tool_definition", "summary", "Summary"),
-    "Writing a body": ("Body", "MovementAuthority", "Arrived", "Reached"),
+    "Writing a body": ("Body", "OrdinaryBody", "MovementAuthority", "Arrived", "Reached", "JointLimit", "Ray"),
     "What goes wrong": (
         "EngageError", "InputRefused", "RunFailed", "PerformFailed", "RequestRefused", "BehaviorRefused", "Fault",
     ),
@@ -39,7 +39,7 @@ BESIDE = {
     "What comes back": ("schemas.blocks.BlockOutcome", "schemas.recognition.OpenEvents"),
     "Writing a body": (
         "schemas.body.Capabilities", "schemas.body.Estimate", "schemas.body.Phase", "services.control.body.BodyState",
-        "services.control.body.Spoke",
+        "services.control.body.Spoke", "services.control.body.MouthShape",
     ),
     "What goes wrong": ("services.control.body.BodyFailed", "schemas.faults.NoReply"),
 }  # fmt: skip

@@ -8,7 +8,7 @@ from rich.console import Console
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.options import Simulated, VirtualTime, Written
+from engage_hri.services.commandline.options import Embodied, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run
 from engage_hri.services.commandline.tangram import play_tangram
@@ -22,7 +22,7 @@ DEFAULTS = ("recognition.gaze_resolution=table",)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Written, Simulated):
+class Options(Written, Simulated, Embodied):
     virtual_time: VirtualTime = False
 
 

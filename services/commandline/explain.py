@@ -16,7 +16,7 @@ from rich.text import Text
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
 from engage_hri.services.commandline.generating import Unplanned, generated
-from engage_hri.services.commandline.options import Configured, WorldFile
+from engage_hri.services.commandline.options import Embodied, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_source, read_world
@@ -32,7 +32,7 @@ NAMED = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Configured):
+class Options(Embodied):
     file: Annotated[Path, typer.Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")]
     format: Annotated[
         Literal["text", "json"], typer.Option(help="A table for each reference, or a list of all pairs.")

@@ -25,7 +25,7 @@ class Unplanned(RunFailed):
 
 
 def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
-    """Plan fragments one after the other, with the simulated body at home before each. A block is its own plan.
+    """Plan fragments one after the other, with the configured body at home before each. A block is its own plan.
 
     Raises InputRefused or Unplanned, as performing them would.
     """
@@ -33,7 +33,7 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
-    from engage_hri.services.control.torso.body import SimulatedBody
+    from engage_hri.services.control.drivers import made
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.generation.head.inhibitions import Leases
     from engage_hri.services.generation.pipeline import glance, plan, targets
@@ -42,7 +42,7 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     from engage_hri.services.generation.references.policy import Unreferable
     from engage_hri.services.generation.turns.policy import TurnPolicy
 
-    body = SimulatedBody(config.control.no_point_zones, config.control.variability)
+    body = made(config.control)
     permits = Leases(config.generation).permits()
     turns = TurnPolicy(config.robot, config.generation)
 
@@ -65,11 +65,11 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
         try:
             if not turn.backchannel:
                 discourse = discourse.in_turn(turn.turn, turn.addressee)
-            made = plan(
+            planned = plan(
                 fragment, turn, world, body.capabilities, motions, permits, config.generation, discourse=discourse
             )
-            discourse = discourse.naming(fragment.id, [mention.object for mention in made.mentions])
-            plans.append(made)
+            discourse = discourse.naming(fragment.id, [mention.object for mention in planned.mentions])
+            plans.append(planned)
         except Unreferable as error:
             where = f"{source}: {fragment.id}: {error.fault.where}"
             fault = replace(error.fault, where=where, line=_line(fragment, error.fault.where))

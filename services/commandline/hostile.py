@@ -1,11 +1,9 @@
 """Command `engage hostile`: seeded attacks on the whole robot, in this process and in virtual time."""
 
-import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from typing import Annotated
 
 import typer
@@ -17,10 +15,11 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.options import Configured, Quiet
+from engage_hri.services.commandline.options import Embodied, Quiet
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import still
 from engage_hri.services.control.body import Body
+from engage_hri.services.control.drivers import made
 from engage_hri.services.control.service import embody
 from engage_hri.services.hostile.trial import KINDS, Attack, Client, Kind, Report, run
 from engage_hri.services.runtime.service import Ready, Service
@@ -32,8 +31,8 @@ BodyMaker = Callable[[], Body]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Configured):
-    """Options of the command. body: `package.module:Class`, made without arguments."""
+class Options(Embodied):
+    """Options of the command. Without `--body` a lying body takes the place of yours."""
 
     runs: Annotated[int, typer.Option(metavar="N", min=1, help="Attacks, each with the next seed.")] = 20
     seed: Annotated[int, typer.Option(metavar="S", help="Of the first.")] = 0
@@ -41,14 +40,13 @@ class Options(Configured):
     only: Annotated[
         list[str] | None, typer.Option(metavar="messages|requests|body", help="Repeatable; else all three.")
     ] = None
-    body: Annotated[str, typer.Option(metavar="MODULE:CLASS", help="Your own body, in place of the lying one.")] = ""
     quiet: Quiet = False
 
 
 def main(options: Options) -> int:
     kinds = _kinds(options.only or ())
     config = options.load()
-    make = body_class(options.body) if options.body else None
+    make = partial(made, config.control) if options.body else None
     console = Console(quiet=options.quiet)
     counts: Counter[str] = Counter()
     bad: list[Report] = []
@@ -98,35 +96,16 @@ def whole_robot(config: Config | None = None, body: BodyMaker | None = None) -> 
 
 
 async def _embody(bus: Bus, ready: Ready, config: Config, make: BodyMaker) -> None:
-    try:
-        body = make()
-    except Exception as error:
-        name = getattr(make, "__name__", str(make))
-        reason = f"the body {name} could not be made: {type(error).__name__}: {error}"
-        raise InputRefused(Fault(reason=reason, advice="it is made without arguments, on a simulated SDK")) from error
-    await embody(bus, ready, config.control, body, covered_for=config.covered_for)
-
-
-def body_class(name: str) -> BodyMaker:
-    """Import the class of a body. Raises InputRefused if there is none."""
-    place, _, attribute = name.partition(":")
-    if "" not in sys.path:
-        sys.path.insert(0, "")  # the current folder, as with `python -m`
-    try:
-        found = getattr(import_module(place), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
-        advice = "--body package.module:Class"
-        raise InputRefused(Fault(reason=f"no body {name!r}: {error}", advice=advice)) from error
-    if not (isinstance(found, type) and issubclass(found, Body)):
-        raise InputRefused(Fault(reason=f"{name} is no class of a Body", advice="see docs/control.md"))
-    return found
+    await embody(bus, ready, config.control, make(), covered_for=config.covered_for)
 
 
 def _tell(console: Console, report: Report, options: Options) -> None:
     only = "".join(f" --only {kind}" for kind in options.only or ())
-    body = f" --body {options.body}" if options.body else ""
     config = f" --config {options.config}" if options.config else ""
-    settings = config + "".join(f" --set {setting}" for setting in options.overrides)
+    settings = config + "".join(f" --set {setting}" for setting in options.settings or ())
+    body = "".join(f" --body {body}" for body in options.body or ()) + (
+        f" --voice {options.voice}" if options.voice else ""
+    )
     again = f"engage hostile --seed {report.attack.seed} --runs 1 --seconds {options.seconds:g}{only}{body}{settings}"
     console.print(f"seed {report.attack.seed}: {again}", style="bold", highlight=False, soft_wrap=True)
     for line in report.wrong:

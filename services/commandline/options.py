@@ -88,6 +88,31 @@ class Configured:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Embodied(Configured):
+    """Options for the robot's body."""
+
+    body: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[PARTS=]BODY",
+            help="The robot's body: a name, FILE.py:CLASS or package.module:CLASS; head,face=BODY takes only these "
+            "parts of it. May be repeated. See docs/control.md.",
+            show_default="simulated",
+        ),
+    ] = None
+    voice: Annotated[
+        str | None, typer.Option(metavar="BODY", help="The robot's voice, in place of the one of its body.")
+    ] = None
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options, which are stronger than `--set`."""
+        given = {"body": self.body, "voice": self.voice}
+        own = [f"control.{key}={json.encode(value).decode()}" for key, value in given.items() if value]
+        return (*super().overrides, *own)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Connected(Configured):
     """Options for the robot and the bus. Without endpoints the bus is that of this machine."""
 

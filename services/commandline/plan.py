@@ -18,7 +18,7 @@ from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
-from engage_hri.services.commandline.options import Configured, Strict, WorldFile
+from engage_hri.services.commandline.options import Embodied, Strict, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
@@ -33,7 +33,7 @@ HIGHEST = 40
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Configured):
+class Options(Embodied):
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)]
     format: Annotated[Literal["text", "json", "dot", "pnml"], typer.Option(help="How to print the net.")] = "text"
     world: WorldFile = None
@@ -92,12 +92,12 @@ def _as_text(plan: Plan) -> str:
 
 
 async def rehearsed(block: Block, world: World, config: Config) -> Plan:
-    """Plan a block as a realizer does that has nothing else to perform, with the simulated body at home."""
+    """Plan a block as a realizer does that has nothing else to perform, with the configured body at home."""
     from engage_hri.services.realizer.perform.planning import planned_alone
 
     async with MemoryHub(config.robot, decodes=False) as hub:
         hub.join("simulation").publish(keys.WORLD, world)
-        async with running(hub, {"control": roster.service("control", config)}):
+        async with running(hub, {"control": roster.service("control", config, connects=False)}):
             await asyncio.sleep(0.1)  # control has seen the world by then
             try:
                 return await planned_alone(hub.join("plan"), block, config.realizer)

@@ -26,7 +26,7 @@ from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import checking, roster
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
-from engage_hri.services.commandline.options import Connected, Strict, VirtualTime, WorldFile, Written
+from engage_hri.services.commandline.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
 from engage_hri.services.commandline.played import Played
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique_name
@@ -42,7 +42,7 @@ PATIENCE: Seconds = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Written, Connected):
+class Options(Written, Embodied, Connected):
     files: Annotated[
         list[Path],
         typer.Argument(metavar="FILE...", help="EBML turn fragments or BML blocks (XML), or JSON of either."),
@@ -101,7 +101,14 @@ class Job(NamedTuple):
 
 
 def main(options: Options) -> int:
-    private = {"--world": options.world, "--human": options.human, "--virtual-time": options.virtual_time}
+    private = {
+        "--body": options.body,
+        "--voice": options.voice,
+        "--world": options.world,
+        "--human": options.human,
+        "--virtual-time": options.virtual_time,
+    }
+
     for option, given in private.items():
         if given and not options.embedded:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))

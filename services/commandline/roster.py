@@ -20,10 +20,13 @@ FUNCTIONS = {
 """Coroutine function in the `service.py` of each service."""
 
 
-def service(name: str, config: RobotConfig) -> Service:
-    """Bind a service's coroutine function to its section of the configuration. Raises InputRefused."""
+def service(name: str, config: RobotConfig, **more: object) -> Service:
+    """Bind a service's coroutine function to its section of the configuration. Raises InputRefused.
+
+    more: further arguments of that function.
+    """
     if name not in NAMES:
         raise InputRefused(Fault(reason=f"no service {name!r}", advice=f"one of {', '.join(NAMES)}"))
     module = import_module(f"engage_hri.services.{name}.service")
     shared = {"covered_for": config.covered_for} if name in ("generation", "control") else {}
-    return partial(getattr(module, FUNCTIONS[name]), config=getattr(config, name), **shared)
+    return partial(getattr(module, FUNCTIONS[name]), config=getattr(config, name), **shared, **more)

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.options import Listening
+from engage_hri.services.commandline.options import Embodied, Listening
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
@@ -17,7 +18,7 @@ from engage_hri.services.runtime.service import serve
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Listening):
+class Options(Embodied, Listening):
     """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
 
     service: Annotated[roster.ServiceName, typer.Argument(help="Which service.", show_default=False)]
@@ -31,6 +32,8 @@ def ready_line(name: str) -> str:
 
 def main(options: Options) -> int:
     """Serve until a signal."""
+    if (options.body or options.voice) and options.service != "control":
+        raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
     on_robot = options.service in ROBOT
     config = options.read(RobotConfig, elsewhere=ELSEWHERE) if on_robot else options.load()
     run_until_signal(_serve(options, config))

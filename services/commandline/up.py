@@ -17,7 +17,7 @@ from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, scene_view
-from engage_hri.services.commandline.options import Listening, Simulated, Written
+from engage_hri.services.commandline.options import Embodied, Listening, Simulated, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run_until_signal
 from engage_hri.services.commandline.roster import ROBOT
@@ -26,6 +26,7 @@ from engage_hri.services.commandline.supervisor import Child, supervised
 from engage_hri.services.commandline.tangram import ending
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import following
+from engage_hri.services.control import drivers
 from engage_hri.services.runtime.service import Service, running
 
 WITHOUT_TASK = ("simulation.human=attentive",)
@@ -36,7 +37,7 @@ STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Written, Simulated, Listening):
+class Options(Written, Simulated, Embodied, Listening):
     task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False
     in_one: Annotated[
         bool,
@@ -47,6 +48,7 @@ class Options(Written, Simulated, Listening):
 def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
     config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
+    drivers.check(config.control)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         run_until_signal(_up(options, config, outputs, console))

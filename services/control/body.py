@@ -8,7 +8,7 @@ import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from msgspec import Struct
 
@@ -18,6 +18,9 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+
+if TYPE_CHECKING:
+    from engage_hri.services.control.config import ControlConfig
 
 AbortMode = Literal["relax", "freeze"]
 Revocation = Literal["relax", "freeze", "taken_over"]
@@ -262,12 +265,21 @@ class Body(ABC):
     on_fault: Callable[[Fault], None] = staticmethod(lambda fault: None)
     on_lips: Callable[[Sequence[MouthShape]], None] = staticmethod(lambda shapes: None)
 
+    @classmethod
+    def configured(cls, config: "ControlConfig", settings: Any) -> Self:
+        """Make a body as the configuration says: with its settings as the one argument, if it has any.
+
+        config: the whole section `control`. settings: a value of the type `Settings`; None: it has none.
+        """
+        return cls() if settings is None else cls(settings)  # type: ignore[call-arg]
+
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
         """Connect to the hardware, for the body of `async with`; tasks of a driver live in here. By default nothing.
 
         Raises:
-            InputRefused: it cannot be had, with what to do.
+            RunFailed: it cannot be had now, with what to do; `engage up` tries again.
+            InputRefused: it can never be had with these settings.
         """
         yield
 

@@ -1,6 +1,7 @@
 """Configuration of control: how it reports, zones that are never pointed into, and faults of the simulated body."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from msgspec import Struct
 
@@ -76,6 +77,10 @@ class Variability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The section `control`.
 
+    body: the driver of the robot's body, one name or a list; see docs/control.md. `head,face=NAME` takes only these
+        parts of a driver.
+    voice: the driver of its voice; empty: the one that the body has.
+    drivers: the settings of drivers, a table for each, by the name of its class or entry point.
     state_rate: looks at the body per second while anything moves, and `RobotState` messages for who asks for all.
     dead_man: seconds without a message of the requester after which its behaviors end, unless the request names a
         lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
@@ -89,6 +94,14 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     no_point_zones: tuple[NoPointZone, ...] = ()
     variability: Variability = Variability()
     repertoire: str | tuple[str, ...] = ()
+    body: str | tuple[str, ...] = "simulated"
+    voice: str = ""
+    drivers: Mapping[str, Mapping[str, Any]] = {}
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The drivers in `body`, each as it is named there."""
+        return (self.body,) if isinstance(self.body, str) else self.body
 
     @property
     def repertoire_files(self) -> tuple[str, ...]:

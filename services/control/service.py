@@ -1,8 +1,7 @@
 """The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
-from contextlib import aclosing
-from pathlib import Path
+from contextlib import aclosing, nullcontext
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
@@ -26,9 +25,9 @@ from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.references import type_name
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control import variability
@@ -44,7 +43,9 @@ from engage_hri.services.control.body import (
     Reached,
     Spoke,
 )
+from engage_hri.services.control.composed import VOICE_ADVICE, unsupported
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.drivers import made
 from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.live import LiveBehavior
 from engage_hri.services.control.shown import Shown
@@ -54,11 +55,25 @@ from engage_hri.services.runtime.service import Ready
 
 
 async def embody(
-    bus: Bus, ready: Ready, config: ControlConfig, body: Body | None = None, *, covered_for: Seconds = COVERED_FOR
+    bus: Bus,
+    ready: Ready,
+    config: ControlConfig,
+    body: Body | None = None,
+    *,
+    covered_for: Seconds = COVERED_FOR,
+    connects: bool = True,
 ) -> None:
-    """Serve until cancelled. body: the simulated one unless given. covered_for: see `CoveredObjects`."""
-    body = body or simulated_body(config)
-    async with asyncio.TaskGroup() as tasks:
+    """Serve until cancelled.
+
+    body: the one of the configuration unless given. covered_for: see `CoveredObjects`.
+    connects: False where nothing is to move, and the body is asked for estimates alone.
+
+    Raises InputRefused or RunFailed: there is no such body, or it cannot be had.
+    """
+    body = body or made(config)
+    if "speech" not in body.capabilities.types:
+        bus.log.warning("control: the body %s has no voice: %s", body.capabilities.body, VOICE_ADVICE)
+    async with body.connected() if connects else nullcontext(), asyncio.TaskGroup() as tasks:
         control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.estimate)
@@ -72,23 +87,6 @@ async def embody(
                         control.take(received)
             finally:
                 control.close()
-
-
-def simulated_body(config: ControlConfig) -> Body:
-    """Create the simulated torso. Imported here: a robot with its own body never loads it. Raises InputRefused."""
-    from engage_hri.services.control.torso.body import SimulatedBody
-    from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
-
-    repertoire = extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
-    return SimulatedBody(config.no_point_zones, config.variability, repertoire)
-
-
-def _read(file: str) -> str:
-    try:
-        return utf8(Path(file).read_bytes(), file)
-    except OSError as error:
-        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
 
 
 class _Control:
@@ -113,6 +111,7 @@ class _Control:
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
+        body.on_fault = self._tell_fault
         self.shown = Shown(bus, body, self._actions, config.state_rate)
 
     # -- reads --------------------------------------------------------------------------------------------------
@@ -120,11 +119,19 @@ class _Control:
     def estimate(self, question: Message) -> Message:
         if not isinstance(question, EstimateBehaviors):
             raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
-        refused = [_refused(item.behavior) for item in question.items]
+        refused = [self._refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
-        others = [item for item in question.others if _refused(item.behavior) is None]
+        others = [item for item in question.others if self._refused(item.behavior) is None]
         estimates = iter(self._estimates.take(known, self._body.rehearse(known, self._world, others)))
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
+
+    def _refused(self, behavior: BlockBehavior) -> Estimate | None:
+        """The estimate of a behavior that makes no sense or is nothing for this body; None: the body may be asked."""
+        try:
+            check_behavior(behavior)
+        except InputRefused as error:
+            return Estimate(behavior=behavior.id, feasible=False, fault=error.fault, warning="CANNOT_CREATE_BEHAVIOR")
+        return None if type_name(behavior) in self._body.capabilities.types else unsupported(behavior)
 
     def describe(self, question: Message) -> Message:
         if not isinstance(question, DescribeBody):
@@ -322,6 +329,12 @@ class _Control:
         label = live.label if live is not None and of_head else ""
         self.shown.note_look(label, at)
 
+    def _tell_fault(self, fault: Fault) -> None:
+        """Publish what went wrong with the body outside of any behavior."""
+        self._bus.log.warning("control: %s", fault)
+        self._bus.publish(keys.fault("control"), fault)
+        self.shown.look_soon()
+
     # -- dead man -----------------------------------------------------------------------------------------------
 
     def _hold(self, name: str, until: Seconds | None) -> None:
@@ -354,12 +367,3 @@ class _Control:
     def close(self) -> None:
         self.desk.close()
         self.shown.close()
-
-
-def _refused(behavior: BlockBehavior) -> Estimate | None:
-    """The estimate of a behavior that makes no sense; None: the body may be asked."""
-    try:
-        check_behavior(behavior)
-    except InputRefused as error:
-        return Estimate(behavior=behavior.id, feasible=False, fault=error.fault, warning="CANNOT_CREATE_BEHAVIOR")
-    return None

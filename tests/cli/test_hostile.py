@@ -48,9 +48,9 @@ def test_what_goes_wrong_is_told_with_the_command_that_does_it_again(engage: Eng
     ("option", "value", "reason"),
     [
         ("--only", "kindness", "no attack 'kindness' (one of messages, requests, body)"),
-        ("--body", "nowhere:Body", "no body 'nowhere:Body'"),
-        ("--body", f"{__name__}:Unplugged", "the body Unplugged could not be made: OSError: no serial port"),
-        ("--body", "engage_hri.services.control.body:sync_points", "is no class of a Body"),
+        ("--body", "nowhere:Body", "body nowhere:Body: it cannot be imported: ModuleNotFoundError"),
+        ("--body", f"{__name__}:Unplugged", ":Unplugged: its driver breaks as it is made: OSError: no serial port"),
+        ("--body", "builtins:dict", "it makes a dict, and no body (it is to be a class that inherits"),
     ],
 )
 def test_what_is_no_attack_is_refused(engage: Engage, option: str, value: str, reason: str) -> None:

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
 
 import pytest
 
@@ -114,10 +114,11 @@ class Suite:
         raise NotImplementedError
 
     @pytest.fixture
-    async def body(self) -> Body:
+    async def body(self) -> AsyncIterator[Body]:
         body = self.make()
-        body.see(self.world)
-        return body
+        async with body.connected():
+            body.see(self.world)
+            yield body
 
     def holds(self, body: Body, behavior: BlockBehavior) -> tuple[str, ...]:
         """Where it can wait; in a speech where the body says so, at marks between two words."""

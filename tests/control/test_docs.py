@@ -2,68 +2,76 @@
 
 import asyncio
 import re
+import sys
 import types
-from collections.abc import AsyncIterator
+from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Leg, resting
+from engage_hri.services.control.torso.path import JointMotion, Leg, resting
 from engage_hri.services.control.torso.path import Path as Way
 from tests.control.contract import BodyContract
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 
 
-def driver() -> types.ModuleType:
-    """The first Python block of the page, as a module."""
-    module = types.ModuleType("pan_tilt")
-    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
-    exec(compile(code, str(PAGE), "exec"), module.__dict__)
-    return module
+CODE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
 
 
-class SimulatedSdk:
-    """Two motors that go where they are told in the time they are told, and 50 measurements a second."""
+class Motors:
+    """SDK of two motors that go where they are told in the time they are told, and lag by `LAG`."""
 
-    def __init__(self, body: Body | None = None) -> None:
-        self.motion: Motion | None = None
-        self.limits = driver().PanTilt(None).capabilities.joints
+    def __init__(self) -> None:
+        self.motions: list[tuple[float, Motion]] = []
+        self.is_connected = False
 
-    def goto(self, goal: tuple[float, float], seconds: float) -> None:
+    def connect(self) -> None:
+        self.is_connected = True
+
+    def move(self, goal: dict[str, float], seconds: float) -> None:
+        assert self.is_connected
         now = asyncio.get_running_loop().time()
-        start = self.motion.at(now) if self.motion else resting((0.0, 0.0))
-        self.motion = Motion(Way(start, [Leg(goal=goal, seconds=seconds)], self.limits), now)
+        leg = Leg(goal=(goal["pan"], goal["tilt"]), seconds=seconds)
+        self.motions.append((now, Motion(Way(self._at(now), [leg], driver().PanTilt.joints), now)))
 
-    def angles(self) -> tuple[float, float]:
-        if self.motion is None:
-            return (0.0, 0.0)
-        pan, tilt = self.motion.at(asyncio.get_running_loop().time()).q
-        return float(pan), float(tilt)
+    def measured(self) -> dict[str, float]:
+        assert self.is_connected
+        pan, tilt = self._at(asyncio.get_running_loop().time() - LAG).q
+        return {"pan": float(pan), "tilt": float(tilt)}
 
-    def is_moving(self) -> bool:
-        return self.motion is not None and asyncio.get_running_loop().time() < self.motion.end
+    def _at(self, time: float) -> JointMotion:
+        motion = next((motion for start, motion in reversed(self.motions) if start <= time), None)
+        return motion.at(time) if motion else resting((0.0, 0.0))
 
-    async def measurements(self) -> AsyncIterator[tuple[float, float]]:
-        while True:
-            await asyncio.sleep(0.02)
-            yield self.angles()
+
+LAG = 0.02
+
+
+@cache
+def driver() -> types.ModuleType:
+    """The first Python block of the page, as a module, on a simulated SDK."""
+    sdk = types.ModuleType("pan_tilt_sdk")
+    sdk.Motors = Motors  # type: ignore[attr-defined]
+    module = types.ModuleType("pan_tilt")
+    with patch.dict(sys.modules, {"pan_tilt_sdk": sdk}):
+        exec(compile(CODE, str(PAGE), "exec"), module.__dict__)
+    return module
 
 
 class TestPanTilt(BodyContract):
     tolerance = 0.15
 
     def make(self) -> Body:
-        body = driver().PanTilt(SimulatedSdk())
+        body = driver().PanTilt()
         assert isinstance(body, Body)
         return body
 
 
 def test_a_newcomers_driver_is_short():
-    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
-
-    assert len([line for line in code.splitlines() if line.strip()]) <= 122
+    assert len([line for line in CODE.splitlines() if line.strip()]) <= 40
 
 
 def test_the_table_of_types_is_as_the_rows_have_it() -> None:

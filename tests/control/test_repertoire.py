@@ -174,7 +174,8 @@ async def test_what_is_near_is_performed_and_the_estimate_names_both(
 
 
 def test_a_file_adds_and_overrides_and_the_page_shows_how() -> None:
-    (shown,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    page = PAGE.read_text(encoding="utf-8").partition("### Repertoire")[2]
+    (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     mine = BUILT_IN.extended(shown, "mine.toml")
 
     assert mine.find("gesture", "conduit").path == BUILT_IN.find("gesture", "BEAT").path

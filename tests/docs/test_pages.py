@@ -40,6 +40,8 @@ EXCUSED = {
     "make docs": "tests/docs/test_site.py builds it and looks at the result",
     "make generate": "writes into the tree; tests/docs/test_generated.py compares",
     ".venv/bin/engage up": "is what all pages are run against",
+    "engage up --body pan_tilt.py:PanTilt --voice silent": "needs an SDK; tests/cli/test_bodies.py has one",
+    "engage up --body head,face=reachy.py:Head --body left_arm,right_arm=simulated --voice silent": "the same",
     ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
     ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",
 }

@@ -40,7 +40,9 @@ class Public(NamedTuple):
 
     @property
     def doc(self) -> str:
-        return ast.get_docstring(self.node) or ""
+        """What it says of itself, or what it inherits from the method that it overrides."""
+        method = getattr(THINGS[self.owner], self.node.name) if self.owner else None
+        return ast.get_docstring(self.node) or (inspect.getdoc(method) if method is not None else "") or ""
 
     def __str__(self) -> str:
         return self.name

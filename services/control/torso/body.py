@@ -8,12 +8,15 @@ import asyncio
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from math import inf, radians
+from pathlib import Path
+from typing import Self
 
 from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.control import variability
 from engage_hri.services.control.body import (
@@ -26,7 +29,7 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
 )
-from engage_hri.services.control.config import Variability
+from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.torso import choreography, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
@@ -34,7 +37,7 @@ from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.rehearsal import rehearsed
-from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire, extended
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.timeline import utter
@@ -66,6 +69,12 @@ class SimulatedBody(Body):
         self._occasions = 0
         self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
         """The last pose, as a message, and the rays of eyes and arms in it: often nothing has moved since."""
+
+    @classmethod
+    def configured(cls, config: ControlConfig, settings: None) -> Self:
+        """Make a torso with the zones, deviations and repertoire of the section `control`. Raises InputRefused."""
+        repertoire = extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
+        return cls(config.no_point_zones, config.variability, repertoire)
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -253,6 +262,14 @@ class SimulatedBody(Body):
         async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
             async for progress in utterance:
                 yield progress
+
+
+def _read(file: str) -> str:
+    try:
+        return utf8(Path(file).read_bytes(), file)
+    except OSError as error:
+        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
 
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:

@@ -1,0 +1,282 @@
+"""A body of several drivers, each with parts of its own: a head from one, the voice from another.
+
+A behavior goes to the first driver that performs its type and can do it with the parts that it has here. Each driver
+knows only its own joints; what one says of poses is completed with where the others are.
+"""
+
+import asyncio
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Sequence
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, Ray
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import (
+    BehaviorRefused,
+    Body,
+    BodyState,
+    MouthShape,
+    MovementAuthority,
+    Progress,
+)
+
+GAZE_PART, LIPS_PART, VOICE_PART = "head", "face", "voice"
+"""Parts whose owner tells the gaze axis, has the lips, and says what is being said."""
+ARMS = ("left_arm", "right_arm")
+PARTS_OF_TYPES = {
+    **dict.fromkeys(("gaze", "gazeShift", "headDirectionShift", "head"), (GAZE_PART,)),
+    **dict.fromkeys(("face", "faceLexeme", "faceFacs", "faceShift"), (LIPS_PART,)),
+    **dict.fromkeys(("pointing", "gesture"), ARMS),
+    **dict.fromkeys(("posture", "postureShift", "pose"), ("torso", *ARMS)),
+    "speech": (VOICE_PART,),
+}
+"""Parts of which a type of behavior needs one, where a driver has such parts."""
+
+
+VOICE_ADVICE = "--voice espeak to be heard, --voice silent to take the time of words alone"
+
+
+class Member(NamedTuple):
+    """A driver in a composed body. name: as it was asked for. parts: those of its parts that it has here."""
+
+    name: str
+    body: Body
+    parts: tuple[str, ...]
+
+    @property
+    def is_whole(self) -> bool:
+        return set(self.parts) == set(self.body.capabilities.parts)
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Types of behaviors that it can perform with the parts that it has here."""
+        return tuple(name for name in self.body.capabilities.types if self._can(name))
+
+    def _can(self, name: str) -> bool:
+        needed = [part for part in PARTS_OF_TYPES.get(name, ()) if part in self.body.capabilities.parts]
+        return not needed or any(part in self.parts for part in needed)
+
+    def has(self, part: str) -> bool:
+        """True if it has this part here. A driver with all its parts may have given the part another name."""
+        return part in self.parts or (self.is_whole and part not in self.body.capabilities.parts)
+
+
+def composed(members: Sequence[Member]) -> Body:
+    """Make one body of several; a single one with all its parts stays as it is. Raises InputRefused: a conflict."""
+    if len(members) == 1 and members[0].is_whole:
+        return members[0].body
+    if not members:
+        raise InputRefused(Fault(reason="no body is named", where="control.body", advice="such as `simulated`"))
+    return ComposedBody(members)
+
+
+class ComposedBody(Body):
+    """Several bodies as one. Capabilities add up."""
+
+    def __init__(self, members: Sequence[Member]) -> None:
+        """Join `members`. Raises InputRefused: two of them have the same part or the same joint."""
+        self._members = tuple(members)
+        _refuse_conflicts(self._members)
+        self.capabilities = _joined(self._members)
+        self._world = World(entities=())
+        for member in self._members:
+            member.body.on_fault = self._tell_fault
+            member.body.on_lips = self.move_lips
+
+    def _tell_fault(self, fault: Fault) -> None:
+        self.on_fault(fault)
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        async with AsyncExitStack() as stack:
+            for member in self._members:
+                await stack.enter_async_context(member.body.connected())
+            yield
+
+    # -- planning -----------------------------------------------------------------------------------------------
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        _, estimate = self._best(behavior, pose, world)
+        return self._completed(estimate, pose)
+
+    def rehearse(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Sequence[Estimate]:
+        told: dict[int, Estimate] = {}
+        owners = [self._owner(item.behavior, item.pose, world) for item in items]
+        whose = [self._owner(item.behavior, item.pose, world) for item in others]
+        for member in self._members:
+            mine = [number for number, owner in enumerate(owners) if owner is member]
+            beside = [item for item, owner in zip(others, whose, strict=True) if owner is member]
+            if mine:
+                estimates = member.body.rehearse([items[number] for number in mine], world, beside)
+                told |= dict(zip(mine, (_within(member, each) for each in estimates), strict=True))
+        for number, owner in enumerate(owners):
+            if owner is None:
+                told[number] = unsupported(items[number].behavior)
+        return [self._completed(told[number], item.pose) for number, item in enumerate(items)]
+
+    def _owner(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Member | None:
+        """The driver that is to perform a behavior; None: nobody performs its type."""
+        able = self._able(behavior)
+        return able[0] if len(able) == 1 else self._best(behavior, pose, world)[0]
+
+    def _able(self, behavior: BlockBehavior) -> list[Member]:
+        name = type_name(behavior)
+        return [member for member in self._members if name in member.types]
+
+    def _best(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> tuple[Member | None, Estimate]:
+        """The first driver that can perform a behavior, and its estimate; else the first one's reason."""
+        refused: tuple[Member | None, Estimate] | None = None
+        for member in self._able(behavior):
+            estimate = _within(member, member.body.estimate(behavior, pose, world))
+            if estimate.feasible:
+                return member, estimate
+            refused = refused or (member, estimate)
+        return refused or (None, unsupported(behavior))
+
+    def _completed(self, estimate: Estimate, pose: BodyPose | None) -> Estimate:
+        """Complete the poses of an estimate with the joints of the other drivers."""
+        if estimate.pose_after is None and estimate.pose_end is None:
+            return estimate
+        here = _joints(self._pose())
+        if pose is not None:
+            here |= _joints(pose)
+        after, end = (
+            None if told is None else BodyPose(joints=tuple((here | _joints(told)).values()))
+            for told in (estimate.pose_after, estimate.pose_end)
+        )
+        return replace(estimate, pose_after=after, pose_end=end)
+
+    # -- motion -------------------------------------------------------------------------------------------------
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        member, estimate = self._best(behavior, None, self._world)
+        if member is None or not estimate.feasible:
+            raise BehaviorRefused(estimate.fault or Fault(reason="it cannot be done", where=behavior.id))
+        async with aclosing(member.body.perform(behavior, authority)) as stream:
+            async for progress in stream:
+                yield progress
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            for member in self._members:
+                # A whole driver is asked as the caller asks, so that it takes also what is in no list home.
+                mine = (
+                    ()
+                    if not parts and member.is_whole
+                    else tuple(p for p in parts or member.parts if p in member.parts)
+                )
+                if mine or not parts:
+                    tasks.create_task(member.body.home(mine), name=f"home of {member.name}")
+
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
+        for member in self._members:
+            if member.has(LIPS_PART):
+                member.body.move_lips(shapes)
+
+    # -- measurements -------------------------------------------------------------------------------------------
+
+    def _pose(self) -> BodyPose:
+        return _pose((member, member.body.state()) for member in self._members)
+
+    def state(self) -> BodyState:
+        states = [(member, member.body.state()) for member in self._members]
+        seeing = next((state for member, state in states if member.has(GAZE_PART) and state.gaze is not None), None)
+        return BodyState(
+            pose=_pose(states),
+            moving=any(state.moving for _, state in states),
+            gaze=seeing.gaze if seeing else None,
+            left_arm=_first(state.left_arm for member, state in states if member.has("left_arm")),
+            right_arm=_first(state.right_arm for member, state in states if member.has("right_arm")),
+            looking_at=seeing.looking_at if seeing else "",
+            speaking=next(
+                (state.speaking for member, state in states if member.has(VOICE_PART) and state.speaking), ""
+            ),
+        )
+
+    def see(self, world: World) -> None:
+        self._world = world
+        for member in self._members:
+            member.body.see(world)
+
+
+def _first(rays: Iterable[Ray | None]) -> Ray | None:
+    return next((ray for ray in rays if ray is not None), None)
+
+
+def _joints(pose: BodyPose) -> dict[str, JointAngle]:
+    return {angle.joint: angle for angle in pose.joints}
+
+
+def _own_joints(member: Member) -> frozenset[str] | None:
+    """Joints of the parts that it has here; None: all that it tells of."""
+    if member.is_whole:
+        return None
+    return frozenset(limit.joint for limit in member.body.capabilities.joints if limit.part in member.parts)
+
+
+def _pose(states: Iterable[tuple[Member, BodyState]]) -> BodyPose:
+    angles = []
+    for member, state in states:
+        own = _own_joints(member)
+        angles += [angle for angle in state.pose.joints if own is None or angle.joint in own]
+    return BodyPose(joints=tuple(angles))
+
+
+def _within(member: Member, estimate: Estimate) -> Estimate:
+    """The estimate of a driver, refused if it would use a part that the driver does not have here."""
+    beyond = [part for part in estimate.parts if part not in member.parts]
+    if not estimate.feasible or member.is_whole or not beyond:
+        return estimate
+    reason = f"{member.name} is to have only {', '.join(member.parts)} here, and this takes {', '.join(beyond)}"
+    return _infeasible(estimate.behavior, reason)
+
+
+def unsupported(behavior: BlockBehavior) -> Estimate:
+    """The estimate of a behavior of a type that a body does not perform."""
+    name = type_name(behavior)
+    advice = f"; give it a voice: {VOICE_ADVICE}" if name == "speech" else ""
+    return _infeasible(behavior.id, f"this body has no {name}{advice}")
+
+
+def _infeasible(behavior: str, reason: str) -> Estimate:
+    fault = Fault(reason=reason, where=behavior, service="control")
+    return Estimate(behavior=behavior, feasible=False, fault=fault, warning="BEHAVIOR_TYPE_NOT_SUPPORTED")
+
+
+def _joined(members: Sequence[Member]) -> Capabilities:
+    each = [member.body.capabilities for member in members]
+    limits = []
+    for member in members:
+        own = _own_joints(member)
+        limits += [limit for limit in member.body.capabilities.joints if own is None or limit.joint in own]
+    return Capabilities(
+        body="+".join(one.body for one in each),
+        types=tuple(dict.fromkeys(name for member in members for name in member.types)),
+        parts=tuple(part for member in members for part in member.parts),
+        joints=tuple(limits),
+        reach=max(one.reach for one in each),
+        no_point_zones=tuple(dict.fromkeys(zone for one in each for zone in one.no_point_zones)),
+        gaze_half_angle=max(one.gaze_half_angle for one in each),
+        pointing_radius=max(one.pointing_radius for one in each),
+    )
+
+
+def _refuse_conflicts(members: Sequence[Member]) -> None:
+    owner: dict[tuple[str, str], Member] = {}
+    for member in members:
+        own = _own_joints(member)
+        joints = {limit.joint for limit in member.body.capabilities.joints if own is None or limit.joint in own}
+        for kind, names in (("part", member.parts), ("joint", sorted(joints))):
+            for name in names:
+                other = owner.setdefault((kind, name), member)
+                if other is not member:
+                    reason = f"{other.name} and {member.name} both have the {kind} {name!r}"
+                    advice = f"say whose it is, by the parts that each is to have: {name}={other.name}"
+                    raise InputRefused(Fault(reason=reason, where="control.body", advice=advice, service="control"))

@@ -1,0 +1,257 @@
+"""Drivers by name: the classes that make bodies, of this package, of another one, or of a file.
+
+    body = made(config)             # of `control.body`, `control.voice` and `control.drivers`, inside the event loop
+
+A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodies`, `package.module:Class`, or
+`FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
+"""
+
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from functools import partial
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.composed import Member, composed
+from engage_hri.services.control.config import ControlConfig
+
+GROUP = "engage_hri.bodies"
+"""Group of entry points by which an installed package offers its drivers."""
+BUILT_IN = {
+    "simulated": "engage_hri.services.control.torso.body:SimulatedBody",
+}
+"""Drivers of this package, each imported only when it is asked for."""
+EXTRAS: dict[str, str] = {}
+"""The extra of this package that a driver needs."""
+FORMS = "NAME, FILE.py:CLASS or package.module:CLASS"
+Driver = Callable[..., Body]
+
+
+class Named(Struct, frozen=True):
+    """A driver as it was asked for. spec: its name. parts: the only ones that it is to have; empty: all it has."""
+
+    spec: str
+    parts: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the table with its settings, `control.drivers.NAME`: what stands behind the last colon."""
+        return self.spec.rpartition(":")[2].removesuffix(".py") if ":" in self.spec else Path(self.spec).stem
+
+
+def named(text: str) -> Named:
+    """Read `simulated`, `mine.py:Head` or `head,face=mine.py:Head`. Raises InputRefused."""
+    before, equals, spec = text.rpartition("=")
+    parts = tuple(part.strip() for part in before.split(",")) if equals else ()
+    if not spec.strip() or not all(parts):
+        raise _refusal(f"{text!r} names no body", text, f"{FORMS}; for some of its parts only: head,face=NAME")
+    return Named(spec.strip(), parts)
+
+
+def made(config: ControlConfig) -> Body:
+    """Make the body that the configuration asks for, of one driver or of several. Raises InputRefused."""
+    asked = [named(text) for text in config.bodies]
+    if config.voice:
+        asked.append(Named(config.voice, ("voice",)))
+    own_voice = not config.voice
+    members = []
+    for each in asked:
+        body = make(each, config)
+        members.append(Member(each.spec, body, _parts(each, body, own_voice=own_voice)))
+    return composed(members)
+
+
+def check(config: ControlConfig) -> None:
+    """Refuse drivers that cannot be had, without making a body. Raises InputRefused."""
+    for each in (*map(named, config.bodies), *((Named(config.voice),) if config.voice else ())):
+        if each.spec != "simulated":
+            _settings(each, load(each.spec), config)
+
+
+def make(asked: Named, config: ControlConfig) -> Body:
+    """Make the body of one driver, with its settings. Raises InputRefused if it breaks, or is no body."""
+    driver = load(asked.spec)
+    settings = _settings(asked, driver, config)
+    try:
+        is_class = _is_configured(driver)
+        make_it: Any = partial(driver.configured, config, settings) if is_class else driver  # type: ignore[attr-defined]
+        body = make_it() if is_class or settings is None else make_it(settings)
+    except EngageError:
+        raise
+    except Exception as error:
+        raise _refusal(f"its driver breaks as it is made: {_words(error)}", asked.spec, _place(error)) from error
+    if not isinstance(body, Body):
+        advice = "it is to be a class that inherits from `engage_hri.Body`, or a function that returns one"
+        raise _refusal(f"it makes a {type(body).__name__}, and no body", asked.spec, advice)
+    if not isinstance(getattr(body, "capabilities", None), msgspec.Struct):
+        raise _refusal("its body has no `capabilities`", asked.spec, "set `self.capabilities = Capabilities(...)`")
+    return body
+
+
+def _is_configured(driver: Driver) -> bool:
+    """True for a class of a body whose `configured` knows how it is made: no class below has another `__init__`."""
+    if not (inspect.isclass(driver) and issubclass(driver, Body)):
+        return False
+    owner = {name: next(one for one in driver.__mro__ if name in vars(one)) for name in ("configured", "__init__")}
+    return owner["configured"] is Body or issubclass(owner["configured"], owner["__init__"])
+
+
+def load(spec: str) -> Driver:
+    """Import a driver by its name. Raises InputRefused."""
+    where, colon, name = spec.rpartition(":")
+    if spec in BUILT_IN:
+        where, _, name = BUILT_IN[spec].partition(":")
+        return _attribute(_imported(where, spec, EXTRAS.get(spec, "")), name, spec)
+    if (file := where if colon else spec).endswith(".py"):
+        module = _file(Path(file), spec)
+        return _attribute(module, name, spec) if colon else _only(module, spec)
+    if colon:
+        return _attribute(_imported(where, spec), name, spec)
+    offered = {point.name: point for point in entry_points(group=GROUP)}
+    if spec in offered:
+        try:
+            return offered[spec].load()  # type: ignore[no-any-return]
+        except Exception as error:
+            raise _refusal(f"it cannot be imported: {_words(error)}", spec, _place(error)) from error
+    known = sorted({*BUILT_IN, *offered})
+    close = get_close_matches(spec, known, n=1)
+    advice = f"do you mean {close[0]}? " if close else ""
+    raise _refusal(f"no body {spec!r}", spec, f"{advice}known are {', '.join(known)}; or {FORMS}")
+
+
+# -- parts and settings -------------------------------------------------------------------------------------------
+
+
+def _parts(asked: Named, body: Body, *, own_voice: bool) -> tuple[str, ...]:
+    has = body.capabilities.parts
+    if unknown := [part for part in asked.parts if part not in has]:
+        raise _refusal(f"it has no part {', '.join(unknown)}", asked.spec, f"it has {', '.join(has) or 'none'}")
+    return asked.parts or tuple(part for part in has if own_voice or part != "voice")
+
+
+def _settings(asked: Named, driver: Driver, config: ControlConfig) -> Struct | None:
+    kind = getattr(driver, "Settings", None)
+    given, where = config.drivers.get(asked.name), f"control.drivers.{asked.name}"
+    if kind is None:
+        if given:
+            raise _refusal(f"this driver has no settings, and {', '.join(given)} are given", where, "leave them out")
+        return None
+    try:
+        return msgspec.convert(given or {}, kind)  # type: ignore[no-any-return]
+    except msgspec.ValidationError as error:
+        reason, _, place = str(error).partition(" - at `$")
+        key = f"{where}{place.strip('`')}"
+        raise _refusal(reason, key, f"known are {', '.join(kind.__struct_fields__)}") from error
+
+
+# -- imports ------------------------------------------------------------------------------------------------------
+
+
+def _imported(module: str, spec: str, extra: str = "") -> ModuleType:
+    try:
+        return import_module(module)
+    except Exception as error:
+        advice = _place(error)
+        if isinstance(error, ModuleNotFoundError):
+            missing = error.name or ""
+            if extra:
+                advice = f"install it: pip install 'engage-hri[{extra}]'"
+            elif missing and f"{module}.".startswith(f"{missing}."):
+                advice = f"is the package installed here? Of a file: {FORMS.partition(', ')[2]}"
+        raise _refusal(f"it cannot be imported: {_words(error)}", spec, advice) from error
+
+
+def _file(path: Path, spec: str) -> ModuleType:
+    """Run a file as a module; what lies beside it can be imported, as of a script."""
+    if not path.is_file():
+        raise _refusal(
+            f"no file {path}", spec, f"a relative path counts from the folder of the process, {Path.cwd()}"
+        )
+    name = f"engage_hri_body_{path.stem}"
+    if (loaded := sys.modules.get(name)) is not None and loaded.__file__ == str(path.resolve()):
+        return loaded
+    plan = spec_from_file_location(name, path.resolve())
+    assert plan is not None
+    assert plan.loader is not None
+    module = module_from_spec(plan)
+    if (folder := str(path.resolve().parent)) not in sys.path:
+        sys.path.append(folder)
+    sys.modules[name] = module
+    try:
+        plan.loader.exec_module(module)
+    except BaseException as error:
+        del sys.modules[name]
+        if not isinstance(error, Exception | SystemExit):
+            raise
+        raise _refusal(f"it cannot be imported: {_words(error)}", spec, _place(error)) from error
+    return module
+
+
+def _attribute(module: ModuleType, name: str, spec: str) -> Driver:
+    found: Any = module
+    for step in name.split("."):
+        found = getattr(found, step, None)
+    if not callable(found):
+        offered = _bodies(module)
+        close = get_close_matches(name, offered, n=1)
+        advice = f"do you mean {close[0]}?" if close else f"it has {', '.join(offered) or 'no class of a body'}"
+        reason = f"no class {name!r} in it" if found is None else f"{name!r} in it is no class"
+        raise _refusal(reason, spec, advice)
+    if inspect.isclass(found) and inspect.isabstract(found):
+        missing = ", ".join(sorted(getattr(found, "__abstractmethods__", ())))
+        raise _refusal(f"{name} lacks {missing}", spec, "docs/control.md says what a body has")
+    return found  # type: ignore[no-any-return]
+
+
+def _only(module: ModuleType, spec: str) -> Driver:
+    """The one body of a file that was named without its class."""
+    bodies = _bodies(module)
+    if len(bodies) == 1:
+        return _attribute(module, bodies[0], spec)
+    advice = f"it has {', '.join(bodies)}: {spec}:{bodies[0]}" if bodies else "it has no class of a body"
+    raise _refusal("which class of it?", spec, advice)
+
+
+def _bodies(module: ModuleType) -> Sequence[str]:
+    """Names of the classes of bodies that a module defines."""
+    own = (name for name, each in vars(module).items() if getattr(each, "__module__", "") == module.__name__)
+    return sorted(
+        name for name in own if inspect.isclass(vars(module)[name]) and issubclass(vars(module)[name], Body)
+    )
+
+
+# -- words --------------------------------------------------------------------------------------------------------
+
+
+def _refusal(reason: str, spec: str, advice: str) -> InputRefused:
+    where = spec if spec.startswith("control.") else f"body {spec}"
+    return InputRefused(Fault(reason=reason, where=where, advice=advice, service="control"))
+
+
+def _words(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _place(error: BaseException) -> str:
+    """Say at which line of which file of the driver an error was raised; empty: it is not known."""
+    if isinstance(error, SyntaxError):
+        return f"see {error.filename}, line {error.lineno}"
+    trace = error.__traceback__
+    last = None
+    while trace is not None:
+        name = trace.tb_frame.f_code.co_filename
+        if "importlib" not in name and name != __file__:
+            last = (name, trace.tb_lineno)
+        trace = trace.tb_next
+    return f"see {last[0]}, line {last[1]}" if last else ""

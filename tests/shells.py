@@ -1,0 +1,32 @@
+"""Files of services that may know the loop, the clock and the bus. Held to by `test_architecture.py`."""
+
+SHELLS = {
+    "services/realizer/perform/performance.py",  # awaits bodies
+    "services/realizer/perform/control_link.py",  # asks the body
+    "services/realizer/perform/recognition_link.py",  # asks recognition
+    "services/control/shown.py",  # publishes what the body shows
+    "services/control/estimates.py",  # publishes mistakes of the body
+    "services/realizer/perform/feedback.py",  # publishes feedback
+    "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
+    "services/realizer/perform/behavior_run.py",  # awaits sync points
+    "services/realizer/perform/futures.py",  # resolves them
+    "services/realizer/perform/planning.py",  # asks the body
+    "services/realizer/perform/rehearsing.py",  # asks it again
+    "services/realizer/perform/ends_of_runs.py",  # awaits the ends of behaviors
+    "services/realizer/perform/net_stream.py",  # publishes the marking
+    "services/realizer/perform/steering.py",  # holds, continues and stops
+    "services/realizer/perform/live.py",  # resolved when a block has ended
+    "services/generation/body_link.py",  # asks the body
+    "services/generation/fragment_runner.py",  # awaits the blocks of fragments
+    "services/control/body.py",  # the interface of bodies: coroutines
+    "services/control/ordinary.py",  # a body that moves on the loop's clock
+    "services/control/composed.py",  # takes several bodies home at once
+    "services/control/torso/body.py",  # a body that moves on the loop's clock
+    "services/control/waiting.py",  # waits for a moment or a change of authority
+    "services/simulation/still.py",  # a world, published once
+    "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
+    "services/hostile/visitor.py",  # an honest client
+    "services/console/follow.py",  # subscribes
+    "services/console/live.py",  # draws
+}
+"""Files beside `service.py` that are not pure. Each is a decision: keep the list short."""
