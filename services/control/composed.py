@@ -24,6 +24,7 @@ from engage_hri.services.control.body import (
     MovementAuthority,
     Progress,
 )
+from engage_hri.services.control.refusals import unsupported
 
 GAZE_PART, LIPS_PART, VOICE_PART = "head", "face", "voice"
 """Parts whose owner tells the gaze axis, has the lips, and says what is being said."""
@@ -36,9 +37,6 @@ PARTS_OF_TYPES = {
     "speech": (VOICE_PART,),
 }
 """Parts of which a type of behavior needs one, where a driver has such parts."""
-
-
-VOICE_ADVICE = "--voice espeak to be heard, --voice silent to take the time of words alone"
 
 
 class Member(NamedTuple):
@@ -236,13 +234,6 @@ def _within(member: Member, estimate: Estimate) -> Estimate:
         return estimate
     reason = f"{member.name} is to have only {', '.join(member.parts)} here, and this takes {', '.join(beyond)}"
     return _infeasible(estimate.behavior, reason)
-
-
-def unsupported(behavior: BlockBehavior) -> Estimate:
-    """The estimate of a behavior of a type that a body does not perform."""
-    name = type_name(behavior)
-    advice = f"; give it a voice: {VOICE_ADVICE}" if name == "speech" else ""
-    return _infeasible(behavior.id, f"this body has no {name}{advice}")
 
 
 def _infeasible(behavior: str, reason: str) -> Estimate:

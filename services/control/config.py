@@ -84,7 +84,7 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     state_rate: looks at the body per second while anything moves, and `RobotState` messages for who asks for all.
     dead_man: seconds without a message of the requester after which its behaviors end, unless the request names a
         lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
-    no_point_zones: spheres that are never pointed into.
+    no_point_zones: spheres that no body ever points into.
     variability: deviations of the simulated body.
     repertoire: files with lexemes of the simulated body, one name or a list; see docs/control.md.
     """

@@ -268,7 +268,7 @@ class OrdinaryBody(Body):
         self.world = world
 
     def _measured(self) -> Angles:
-        """Where the joints are; without a connection at rest, as for `engage plan`."""
+        """Measure the joints. Without a connection, as for `engage plan`, they are at rest."""
         return self.angles() if self._is_open else self._home
 
     # -- motion -------------------------------------------------------------------------------------------------

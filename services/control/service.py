@@ -3,6 +3,8 @@
 import asyncio
 from contextlib import aclosing, nullcontext
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.body import (
@@ -20,12 +22,10 @@ from engage_hri.schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
-from engage_hri.schemas.check import check_behavior
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.references import type_name
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -43,11 +43,11 @@ from engage_hri.services.control.body import (
     Reached,
     Spoke,
 )
-from engage_hri.services.control.composed import VOICE_ADVICE, unsupported
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
 from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.live import LiveBehavior
+from engage_hri.services.control.refusals import VOICE_ADVICE, refusal
 from engage_hri.services.control.shown import Shown
 from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.requests.ends import RequestDesk
@@ -126,17 +126,14 @@ class _Control:
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def _refused(self, behavior: BlockBehavior) -> Estimate | None:
-        """The estimate of a behavior that makes no sense or is nothing for this body; None: the body may be asked."""
-        try:
-            check_behavior(behavior)
-        except InputRefused as error:
-            return Estimate(behavior=behavior.id, feasible=False, fault=error.fault, warning="CANNOT_CREATE_BEHAVIOR")
-        return None if type_name(behavior) in self._body.capabilities.types else unsupported(behavior)
+        return refusal(behavior, self._body.capabilities, self._config.no_point_zones, self._world)
 
     def describe(self, question: Message) -> Message:
         if not isinstance(question, DescribeBody):
             raise InputRefused(Fault(reason="expected DescribeBody", where=keys.DESCRIBE, service="control"))
-        return self._body.capabilities
+        able = self._body.capabilities
+        zones = dict.fromkeys((*able.no_point_zones, *self._config.no_point_zones))
+        return replace(able, no_point_zones=tuple(zones))
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -176,12 +173,12 @@ class _Control:
                 self.desk.refuse(id, Fault(reason="given up on the way home", where=id, service="control"))
 
     def _begin(self, request: PerformBehavior) -> None:
-        try:
-            check_behavior(request.behavior)  # before a motor sees it
-            authority = MovementAuthority(request.behavior, request.through, self._pace(request))
-        except InputRefused as error:
-            self.desk.refuse(request.id, error.fault)
+        refused = self._refused(request.behavior)  # before a motor sees it
+        if refused is not None and refused.fault is not None:
+            self.desk.refuse(request.id, refused.fault)
             return
+        try:
+            authority = MovementAuthority(request.behavior, request.through, self._pace(request))
         except ValueError as error:
             self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return

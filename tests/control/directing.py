@@ -12,6 +12,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
 from engage_hri.services.requests.ends import Pending, Requester
@@ -57,14 +58,21 @@ class Client:
 
 @asynccontextmanager
 async def robot(
-    hub: MemoryHub, world: World = WORLD, hears: tuple[str, ...] = (keys.ROBOT_MOTION,), **settings: object
+    hub: MemoryHub,
+    world: World = WORLD,
+    hears: tuple[str, ...] = (keys.ROBOT_MOTION,),
+    body: Body | None = None,
+    **settings: object,
 ) -> AsyncIterator[Client]:
-    """Control, and a client called realizer that hears everything it says; of its state on the keys `hears`."""
+    """Control, and a client called realizer that hears everything it says; of its state on the keys `hears`.
+
+    body: the simulated one unless given.
+    """
     config = ControlConfig(**settings)  # type: ignore[arg-type]
     eyes, bus = hub.join("simulation"), hub.join("realizer")
     bus.declare_alive()
     eyes.publish(keys.WORLD, world)
-    async with running(hub, {"control": partial(embody, config=config)}):
+    async with running(hub, {"control": partial(embody, config=config, body=body)}):
         inbox = bus.subscribe(keys.SYNC_POINT, keys.ROBOT_ACTION, *hears, keys.fault("control"), *Requester.PATTERNS)
         client = Client(bus, Requester(bus))
 
