@@ -1,7 +1,6 @@
 """Command `engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
 
 import asyncio
-import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.options import Connected, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
+from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.played import Played
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique_name
 from engage_hri.services.commandline.prose import Prose, Warnings, strict_refusal
@@ -244,7 +244,7 @@ async def _perform(
         except EngageError as error:
             if isinstance(error, InputRefused):
                 job.warnings.refused(thing.id)
-            print(readable(error.fault, source.path), file=sys.stderr)
+            complain(readable(error.fault, source.path))
             worst = max(worst, REFUSED if isinstance(error, InputRefused) else FAILED)
             if isinstance(thing, TurnFragment):
                 job.outputs.outcome(thing.id, summary_of(error))
@@ -253,13 +253,13 @@ async def _perform(
             job.prose.expect(outcome)
         elif outcome.dropped:
             left_out = ", ".join(outcome.dropped)
-            print(f"{source.path}: {thing.id} was {outcome.status} without {left_out}", file=sys.stderr)
+            complain(f"{source.path}: {thing.id} was {outcome.status} without {left_out}")
         if end := job.played.end_before_turn(outcome):
             say(end)
         code = job.played.exit_code(outcome)
         if code != DONE:
             why = f": {outcome.fault.reason}" if outcome.fault is not None else ""
-            print(f"{source.path}: {thing.id} was {outcome.status}{why}", file=sys.stderr)
+            complain(f"{source.path}: {thing.id} was {outcome.status}{why}")
         worst = max(worst, code)
     return worst
 
