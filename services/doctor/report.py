@@ -7,9 +7,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from engage_hri.schemas.units import A_DAY, Seconds
+from engage_hri.schemas.units import A_DAY, Seconds, span
 from engage_hri.services.doctor.facts import Door, Facts
-from engage_hri.services.doctor.findings import Finding, Severity
+from engage_hri.services.doctor.findings import Finding, Severity, certificates
 from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
@@ -130,9 +130,10 @@ def _things(facts: Facts) -> Iterator[tuple[str, str]]:
         yield "endpoint", f"{door.endpoint}: {door.problem or _open(door, facts)}"
     if facts.own.mode:
         yield "links", f"{facts.own.mode}, {f'keys of {facts.own.holder}' if facts.own.holder else 'without keys'}"
-    for certificate in sorted(facts.certificates, key=lambda each: (each.until, each.name))[:1]:
-        more = f"; {len(facts.certificates)} in all" if len(facts.certificates) > 1 else ""
-        yield "certificates", f"next to expire: {certificate.name}, {_days(certificate.until, facts)}{more}"
+    ends = certificates(facts)
+    for until, name in sorted((until, name) for name, until in ends.items())[:1]:
+        more = f"; {len(ends)} in all" if len(ends) > 1 else ""
+        yield "certificates", f"next to expire: {name}, {_left(until, facts)}{more}"
     if facts.packages:
         yield "packages", ", ".join(f"{each.name} {each.version or 'MISSING'}" for each in facts.packages)
     if facts.body is not None:
@@ -145,13 +146,13 @@ def _things(facts: Facts) -> Iterator[tuple[str, str]]:
 
 
 def _open(door: Door, facts: Facts) -> str:
-    until = "" if door.until is None else f", certificate for {_days(door.until, facts)}"
+    until = "" if door.until is None else f", certificate for {_left(door.until, facts)}"
     return f"somebody listens{', encrypted' if door.is_closed else ''}{until}"
 
 
-def _days(until: int, facts: Facts) -> str:
-    days = (until - facts.at) / A_DAY
-    return f"{days:.0f} days" if days > 0 else "EXPIRED"
+def _left(until: int, facts: Facts) -> str:
+    left = until - facts.at
+    return span(left) if left > 0 else "EXPIRED"
 
 
 def _sight(facts: Facts) -> str:

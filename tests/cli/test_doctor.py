@@ -114,7 +114,13 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
         well(doors=(msgspec.structs.replace(CLOSED, until=int(AT) + 5),)),
         "doubtful",
         CLOSED.endpoint,
-        "expires in 0 days",
+        "expires in a minute",
+    ),
+    "a service's certificate, of whom there is no folder here": (
+        with_one("control", process={"holder": "robot/control/control", "until": int(AT) + 20 * 3600}),
+        "doubtful",
+        "robot/control/control",
+        "expires in 20 hours",
     ),
     "bugs": (with_one("control", bus={"failures": 2}), "wrong", "control", "errors that are bugs: 2 since it came"),
     "losses": (
