@@ -24,10 +24,14 @@ FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
-    """Rich's console, without its end of the process on a broken pipe, and without emoji in ids like `b:x:start`."""
+    """Rich's console, without its end of the process on a broken pipe.
+
+    Text is printed as it is: ids like `b:x:start` are no emoji, and what stands in brackets, as in `tcp/[fd00::1]:7447`,
+    is no style.
+    """
 
     def __init__(self, **settings: Any) -> None:
-        super().__init__(emoji=False, **settings)
+        super().__init__(emoji=False, markup=False, **settings)
 
     def on_broken_pipe(self) -> None:
         raise  # the BrokenPipeError, for services/commandline/ends.py

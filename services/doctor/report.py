@@ -44,8 +44,13 @@ def _head(facts: Facts) -> Text:
 def _table(*columns: str) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for column in columns:
-        table.add_column(column, header_style="dim", overflow="fold")
+        table.add_column(Text(column), header_style="dim", overflow="fold")
     return table
+
+
+def _add(table: Table, *cells: str | Text) -> None:
+    """Add a row. Text is shown as it is: brackets, as of IPv6, are no markup."""
+    table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells))
 
 
 def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
@@ -63,7 +68,7 @@ def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
     title = Text("Who sees whom" + (", with round trips in ms" if with_trips else ""), style="bold")
     for viewer, cells in rows.items():
         number = "" if is_wide or viewer == HERE else f"{names.index(viewer) + 1} "
-        table.add_row(number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
+        _add(table, number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
     columns = names if is_wide else ()
     unlisted = [
         f"{names.index(name) + 1} {name}" if name in names else name
@@ -96,14 +101,14 @@ def _participants(facts: Facts, width: int) -> RenderableType:
     for one in facts.known:
         if one.status is None:
             if one.answers:
-                table.add_row(one.name, "does not answer" if one.seen else "not seen from here")
+                _add(table, one.name, "does not answer" if one.seen else "not seen from here")
             continue
         status, process, bus = one.status, one.status.process, (one.later or one.status).bus
         clock = clocks.get(status.at.clock)
         apart = "same" if clock is None else f"{-clock.offset:+.3f} s ± {1000 * clock.error:.1f} ms"
         up = _time(status.at.seconds - status.joined.seconds)
         cells = (one.name, process.host or "?", apart, up, str(bus.gaps), str(bus.lost), status.version)
-        table.add_row(*cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
+        _add(table, *cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
     return Group(Text("Participants", style="bold"), table)
 
 
@@ -121,7 +126,7 @@ def _around(facts: Facts) -> Table:
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     for what, text in _things(facts):
-        table.add_row(what, text)
+        _add(table, what, text)
     return table
 
 
@@ -173,8 +178,8 @@ def _findings(found: Sequence[Finding]) -> RenderableType:
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for finding in found:
-        table.add_row(Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
-        table.add_row("", Text(f"→ {finding.do}", style="dim"))
+        _add(table, Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
+        _add(table, "", Text(f"→ {finding.do}", style="dim"))
     wrong = sum(finding.severity == "wrong" for finding in found)
     if not wrong:
         return Group(table, Text(), Text("Nothing is wrong.", style="bold green"))
