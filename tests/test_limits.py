@@ -103,6 +103,6 @@ async def test_a_fragment_waits_for_the_first_person(hub: MemoryHub, comes: bool
             async with running(hub, {"camera": partial(show_world, world=World(entities=(cup, ann)))}):
                 assert (await asking).status == "done"
         else:
-            with pytest.raises(InputRefused, match="the world knows no(body| people)"):
+            with pytest.raises(InputRefused, match=r"the world knows no(body| people)"):
                 await asking
             assert robot.now() == pytest.approx(GenerationConfig().world_patience, abs=0.1)

@@ -26,8 +26,8 @@ FeedbackFormat = Literal["json", "xml"]
 class Terminal(Console):
     """Rich's console, without its end of the process on a broken pipe.
 
-    Text is printed as it is: ids like `b:x:start` are no emoji, and what stands in brackets, as in `tcp/[fd00::1]:7447`,
-    is no style.
+    Text is printed as it is: ids like `b:x:start` are no emoji, and what stands in brackets is no style, as in
+    `tcp/[fd00::1]:7447`.
     """
 
     def __init__(self, **settings: Any) -> None:
