@@ -20,6 +20,7 @@ from engage_hri.services.commandline.certificates import initialize
 from tests.bus.places import free_endpoint
 from tests.lab.lab import laboratory, missing
 from tests.lab.test_reach import BML, LONG, engage, until
+from tests.test_wheel import HOLDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = DOCS / "deploy"
@@ -52,6 +53,15 @@ async def test_three_machines_by_hand(tmp_path: Path) -> None:
             elif READY[words[0]]:
                 await until(process, READY[words[0]])
         assert played == 1
+
+
+def test_the_image_gets_what_the_package_is_made_of_and_nothing_else() -> None:
+    lines = [line for line in (DOCS.parent / ".dockerignore").read_text().splitlines() if not line.startswith("#")]
+
+    assert lines[0] == "*"
+    assert {line.removeprefix("!") for line in lines if line.startswith("!")} == set(HOLDS)
+    assert [line for line in lines[1:] if not line.startswith("!")] == ["**/__pycache__"]
+    assert yaml.safe_load((FILES / "compose.yaml").read_text())["x-service"]["build"]["context"] == "../.."
 
 
 def test_every_service_has_its_place_in_every_recipe() -> None:
