@@ -39,3 +39,13 @@ class Stamp(Struct, frozen=True, array_like=True):
 
     clock: str
     seconds: Annotated[float, Meta(ge=-LATEST, le=LATEST, description="seconds")]
+
+
+def span(seconds: Seconds) -> str:
+    """Write a time in days, in hours if it is below two days, or in minutes if it is below two hours."""
+    minutes = round(seconds / 60)
+    if minutes >= 2880:
+        return f"{round(minutes / 60) // 24} days"
+    if minutes >= 120:
+        return f"{round(minutes / 60)} hours"
+    return f"{minutes} minutes" if minutes > 1 else "a minute"

@@ -33,11 +33,12 @@ HERE = ("localhost", "127.0.0.1", "::1")
 
 
 class Shown(NamedTuple):
-    """A certificate that is in a folder."""
+    """A certificate that is in a folder. is_revoked: routers that have the list of this folder do not let it in."""
 
     name: str
     common_name: str
     until: datetime
+    is_revoked: bool = False
 
 
 def initialize(folder: Path, robot: str, holders: Sequence[tuple[str, str]], hosts: Iterable[str], days: int) -> None:
@@ -115,13 +116,23 @@ def revoke(folder: Path, names: Sequence[str]) -> None:
 
 
 def shown(folder: Path) -> list[Shown]:
-    """Read all certificates in a folder, the next to expire first. Raises InputRefused."""
+    """Read all certificates in a folder, the next to expire first, those that were revoked last. Raises InputRefused.
+
+    On a machine without the router's folder nobody knows who was revoked, and none is told to be.
+    """
     places = [folder] if (folder / CERTIFICATE).exists() else [folder / name for name in _there(folder)]
-    found = [(place.name, _load(place / CERTIFICATE)) for place in places]
+    above = folder.parent if places == [folder] else folder
+    is_known = (above / ROUTER / HOLDERS).exists()
+    let_in = {holder.common_name for holder in _let_in_before(above)} if is_known else set()
+    listed = []
+    for place in places:
+        certificate = _load(place / CERTIFICATE)
+        name = _common_name(certificate)
+        listed.append(Shown(place.name, name, certificate.not_valid_after_utc, is_known and name not in let_in))
     if (folder / AUTHORITY).exists() and places != [folder]:
-        found.append(("(authority)", _load(folder / AUTHORITY)))
-    listed = [Shown(name, _common_name(each), each.not_valid_after_utc) for name, each in found]
-    return sorted(listed, key=lambda each: (each.until, each.name))
+        authority = _load(folder / AUTHORITY)
+        listed.append(Shown("(authority)", _common_name(authority), authority.not_valid_after_utc))
+    return sorted(listed, key=lambda each: (each.is_revoked, each.until, each.name))
 
 
 def let_in(folder: Path) -> tuple[Holder, ...]:

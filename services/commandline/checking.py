@@ -6,12 +6,13 @@ from pathlib import Path
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import WarningFeedback, WarningKind
+from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import sites
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.outputs import Outputs
-from engage_hri.services.commandline.sources import InputFile, read_source
+from engage_hri.services.commandline.sources import InputFile, Thing, read_source
 
 
 def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
@@ -47,6 +48,21 @@ def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs
                 kind = refusal.kind if isinstance(refusal, BlockRefused) else "PARSING_FAILURE"
                 _warn(outputs, thing.id, error.fault, kind)
                 raise
+
+
+def lacks_people(thing: Thing, world: World, robot: str) -> bool:
+    """True if a fragment or block speaks to somebody, or has a target that is not known, and the world has no people.
+
+    robot: its actor id, which may be a target.
+    """
+    from engage_hri.services.generation import fragment_check
+
+    if world.people:
+        return False
+    known = {robot, "", *(entity.id for entity in world.entities)}
+    if any(getattr(behavior, "target", "") not in known for behavior in thing.behaviors):
+        return True
+    return isinstance(thing, TurnFragment) and fragment_check.lacks_people(thing, world)
 
 
 def _others(block: Block) -> set[str]:

@@ -42,7 +42,7 @@ def main(options: Options) -> int:
         console = outputs.console(quiet=options.quiet)
         live = console.is_terminal and not options.virtual_time and not options.quiet
         result = run(demonstrate(config, outputs, console, live), virtual_time=options.virtual_time)
-    console.print(tally.render(result, config.robot, console.width))
+        console.print(tally.render(result, config.robot, console.width))
     return DONE
 
 

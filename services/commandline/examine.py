@@ -19,7 +19,7 @@ from typing import Any, Literal
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.access import PARTICIPANTS
+from engage_hri.schemas.access import PARTICIPANTS, ROUTER, Holder
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.status import AskStatus, ProcessFacts, Status
@@ -27,7 +27,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.config import ENDPOINT, BusConfig, is_encrypted, is_on_this_machine
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.bus.keyring import WHO, Keys, Who, read_keys
+from engage_hri.services.bus.keyring import HOLDERS, WHO, Keys, Who, read_keys
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.neighbors import protocols, robots
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, ROUTER_WITH_KEYS
@@ -220,12 +220,20 @@ def _keys(bus: BusConfig) -> tuple[Keys | None, Fault | None]:
 
 
 def _certificates(bus: BusConfig) -> Iterator[Certificate]:
-    """Certificates of all holders in the folder of keys. What cannot be read is a problem that `_keys` tells."""
+    """Certificates of all holders in the folder of keys who were not revoked, as far as the folder tells.
+
+    What cannot be read is a problem that `_keys` tells.
+    """
     folder = Path(bus.keys)
+    let_in: set[str] | None = None
+    with suppress(OSError, msgspec.DecodeError, UnicodeDecodeError):
+        listed = msgspec.json.decode((folder / ROUTER / HOLDERS).read_bytes(), type=list[Holder])
+        let_in = {holder.common_name for holder in listed}
     for file in sorted([*folder.glob(WHO), *folder.glob(f"*/{WHO}")]) if bus.keys else ():
         with suppress(OSError, msgspec.DecodeError, UnicodeDecodeError):
             who = msgspec.json.decode(file.read_bytes(), type=Who)
-            yield Certificate(name=who.common_name, until=who.until)
+            if let_in is None or who.common_name in let_in:
+                yield Certificate(name=who.common_name, until=who.until)
 
 
 async def _knock(endpoint: str, own: Keys | None) -> Door:

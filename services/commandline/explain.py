@@ -60,7 +60,7 @@ def main(options: Options) -> int:
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)
     else:
-        console = Terminal(highlight=False, markup=False)
+        console = Terminal(highlight=False)
         show(plans, console)
         show_tables(impossible, console)
     if failure:

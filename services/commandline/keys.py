@@ -36,7 +36,7 @@ class Options:
 
 
 def main(options: Options) -> int:
-    """Make or show keys. Exit 3 if `show` finds a certificate that has expired."""
+    """Make or show keys. Exit 3 if `show` finds a certificate that has expired, and was not revoked."""
     if find_spec("cryptography") is None:
         advice = "pip install 'engage-hri[keys]', on the machine where keys are made; no other needs it"
         raise InputRefused(Fault(reason="the package `cryptography` is missing", where="engage keys", advice=advice))
@@ -71,11 +71,11 @@ def _show(folder: Path) -> int:
 
     now, code = datetime.now(UTC), DONE
     for each in shown(folder):
-        days = (each.until - now).days
-        if each.until <= now:
+        is_over = each.until <= now
+        if is_over and not each.is_revoked:
             code = FAILED
-        left = "EXPIRED" if each.until <= now else f"{days} days"
-        print(f"{each.name:<16} {each.common_name:<40} {each.until:%Y-%m-%d %H:%M}Z  {left}")
+        state = f"{'EXPIRED' if is_over else f'{(each.until - now).days} days'}{', REVOKED' * each.is_revoked}"
+        print(f"{each.name:<16} {each.common_name:<40} {each.until:%Y-%m-%d %H:%M}Z  {state}")
     return code
 
 

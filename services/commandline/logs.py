@@ -8,12 +8,14 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime
+from io import FileIO
 from pathlib import Path
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus import journal
+from engage_hri.services.commandline.patient import Patient
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
 SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "peers", "up")))
@@ -44,21 +46,40 @@ class LogLine(Escaped):
 
 
 class StandardError(logging.Handler):
-    """Handler that prints bugs, and warnings without a service's name, on the present standard error."""
+    """Handler that prints bugs, and warnings without a service's name, on the present standard error.
+
+    What cannot be printed there ends nobody.
+    """
 
     def emit(self, record: logging.LogRecord) -> None:
         if record.levelno >= (logging.WARNING if record.name == "engage" else logging.ERROR):
-            print(self.format(record), file=sys.stderr)
+            with suppress(OSError):
+                print(self.format(record), file=sys.stderr)
 
 
-class LogFile(logging.FileHandler):
-    """Handler that appends to a file. What cannot be written is told once, and ends the log, not the robot."""
+class LogFile(logging.Handler):
+    """Handler that appends to a file. What cannot be written is lost, and told on standard error."""
 
-    def handleError(self, record: logging.LogRecord) -> None:
-        logging.getLogger().removeHandler(self)
-        with suppress(OSError):  # what is left unwritten
-            self.close()
-        print(f"--log {self.baseFilename}: {sys.exception()}; no more is logged", file=sys.stderr)
+    def __init__(self, path: Path) -> None:
+        """Raises OSError if the file cannot be opened."""
+        super().__init__()
+        self._file = FileIO(path, "a")
+        self._lines = Patient(f"--log {path}", self._file.write, self._tell)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            self._lines.write(f"{self.format(record)}\n")
+        except Exception:  # a record that is a bug of its writer
+            self.handleError(record)
+
+    def close(self) -> None:
+        with suppress(OSError):
+            self._file.close()
+        super().close()
+
+    def _tell(self, line: str) -> None:
+        with suppress(OSError):
+            print(line, file=sys.stderr)
 
 
 def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
@@ -84,7 +105,7 @@ def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
         try:
             if path.is_fifo() or str(path) == "-":
                 raise OSError(0, "it is no file")
-            handlers.append(LogFile(path, encoding="utf-8", errors="backslashreplace"))
+            handlers.append(LogFile(path))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot be written: {error.strerror}", where=f"--log {path}")) from error
         handlers[-1].setFormatter(LogLine())

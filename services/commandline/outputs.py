@@ -1,10 +1,10 @@
 """Files of `--events`, `--feedback` and `--outcomes`: JSON lines, or feedback as XML. `-` is standard output."""
 
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from io import FileIO
 from pathlib import Path
-from typing import Any, Literal, Self, TextIO
+from typing import Any, Literal, Self
 
 import msgspec
 from rich.console import Console
@@ -17,16 +17,21 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.patient import LOG, Patient, as_file, settle, standard_error, standard_output
 
 STDOUT = Path("-")
 FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
-    """Rich's console, without its end of the process on a broken pipe, and without emoji in ids like `b:x:start`."""
+    """Rich's console, without its end of the process on a broken pipe.
+
+    Text is printed as it is: ids like `b:x:start` are no emoji, and what stands in brackets is no style, as in
+    `tcp/[fd00::1]:7447`.
+    """
 
     def __init__(self, **settings: Any) -> None:
-        super().__init__(emoji=False, **settings)
+        super().__init__(emoji=False, markup=False, **settings)
 
     def on_broken_pipe(self) -> None:
         raise  # the BrokenPipeError, for services/commandline/ends.py
@@ -35,6 +40,7 @@ class Terminal(Console):
 class Outputs:
     """Sink that writes the public messages. A bad path is refused before anything starts.
 
+    A disk that is full ends nothing: the end of `with` raises RunFailed with the number of lines that are lost.
     format: of the feedback; None: that of its file's ending.
     """
 
@@ -51,13 +57,16 @@ class Outputs:
         named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
         self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()
-        self._events: TextIO | None = None
-        self._feedback: TextIO | None = None
-        self._outcomes: TextIO | None = None
+        self._events: Patient | None = None
+        self._feedback: Patient | None = None
+        self._outcomes: Patient | None = None
+        self._patients: list[Patient] = []
 
     def console(self, *, quiet: bool) -> Console:
         """Console for all other output: standard error if lines go to standard output."""
-        return Terminal(stderr=STDOUT in self._paths, quiet=quiet)
+        stream = standard_error() if STDOUT in self._paths else standard_output()
+        self._patients.append(stream)
+        return Terminal(file=as_file(stream), quiet=quiet)
 
     def __enter__(self) -> Self:
         events, feedback, outcomes = self._paths
@@ -65,30 +74,33 @@ class Outputs:
             raise InputRefused(Fault(reason="JSON lines and XML cannot share a file", where=str(feedback)))
         files = {path: self._open(path) for path in dict.fromkeys(self._paths)}
         self._events, self._feedback, self._outcomes = files[events], files[feedback], files[outcomes]
+        self._patients += [file for file in files.values() if file is not None]
         if self._is_xml and self._feedback is not None:
-            self._feedback.write(HEAD)
+            self._feedback.write("")  # what it begins with
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         try:
-            if self._is_xml and self._feedback is not None:
-                self._feedback.write(TAIL)
-                self._feedback.flush()
-            self._files.close()
-        except OSError:
+            with self._files:
+                if self._is_xml and self._feedback is not None:
+                    self._feedback.write(TAIL)
+                settle(*self._patients)
+        except (OSError, RunFailed, ExceptionGroup):
             if error is None:  # otherwise it is the same trouble once more
                 raise
 
-    def _open(self, path: Path | None) -> TextIO | None:
+    def _open(self, path: Path | None) -> Patient | None:
         if path is None:
             return None
+        begin = HEAD if self._is_xml and path == self._paths[1] else ""
         if path == STDOUT:
-            return sys.stdout
+            return standard_output(begin)
         try:
-            # Line by line, so that a reader that follows the file sees each line at once.
-            return self._files.enter_context(path.open("w", buffering=1, encoding="utf-8"))
+            # Unbuffered, so that a reader that follows the file sees each line at once.
+            file = self._files.enter_context(FileIO(path, "w"))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
+        return Patient(str(path), file.write, LOG.warning, begin=begin)
 
     def __call__(self, message: Message, at: Seconds) -> None:
         match message:
@@ -103,16 +115,8 @@ class Outputs:
     def outcome(self, fragment: str, outcome: Summary) -> None:
         if self._outcomes is not None:
             line = {"fragment": fragment, **msgspec.to_builtins(outcome)}
-            self._print(self._outcomes, msgspec.json.encode(line).decode())
+            self._outcomes.write(msgspec.json.encode(line).decode() + "\n")
 
-    def _write(self, file: TextIO | None, message: Message, text: str) -> None:
+    def _write(self, file: Patient | None, message: Message, text: str) -> None:
         if file is not None and self.wanted(message):
-            self._print(file, text)
-
-    def _print(self, file: TextIO, text: str) -> None:
-        try:
-            print(text, file=file, flush=True)
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise RunFailed(Fault(reason=f"cannot write: {error.strerror}", where=file.name)) from error
+            file.write(text + "\n")

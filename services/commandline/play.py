@@ -1,9 +1,8 @@
 """Command `engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
 
 import asyncio
-import sys
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -28,6 +27,7 @@ from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
+from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.played import Played
 from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, run, unique_name
 from engage_hri.services.commandline.prose import Prose, Warnings, strict_refusal
@@ -37,6 +37,7 @@ from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
 from engage_hri.services.runtime.service import running
 
+NOTHING = World(entities=())
 PATIENCE: Seconds = 5.0
 """Time in which a running system must answer at all."""
 
@@ -92,8 +93,11 @@ class Job(NamedTuple):
     @property
     def servers(self) -> frozenset[str]:
         """Services that perform the sources."""
-        things = [thing for source in self.sources for thing in source.things]
-        return frozenset("generation" if isinstance(thing, TurnFragment) else "realizer" for thing in things)
+        return frozenset("generation" if isinstance(thing, TurnFragment) else "realizer" for thing in self.things)
+
+    @property
+    def things(self) -> list[Thing]:
+        return [thing for source in self.sources for thing in source.things]
 
     @property
     def has_fragments(self) -> bool:
@@ -174,11 +178,11 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
 async def _remote(job: Job, config: Config) -> int:
     async with await job.options.open(config.bus, "manager") as hub:
         await _somebody_there(hub, job.servers, config)
+        async with connect(hub=hub) as robot:
+            world = await world_with_people(robot, job.things, config.robot, config.generation.world_patience)
         if job.has_fragments:
-            async with connect(hub=hub) as robot:
-                # Without perception generation itself waits or refuses.
-                with suppress(NoReply):
-                    checking.check(job.sources, await robot.world(PATIENCE), config.robot, job.outputs)
+            # Without perception generation itself waits or refuses.
+            checking.check(job.sources, world, config.robot, job.outputs)
         return await _perform_all(job, hub, PATIENCE)
 
 
@@ -196,6 +200,21 @@ async def _somebody_there(hub: Hub, servers: frozenset[str], config: Config) -> 
                 reason = f"no answer within {PATIENCE:g} s"
                 advice = f"is {server} running? `engage up` starts everything"
                 raise RunFailed(Fault(reason=reason, where=server, advice=advice)) from error
+
+
+async def world_with_people(robot: Robot, things: Sequence[Thing], name: str, patience: Seconds) -> World | None:
+    """Return what is perceived; while it lacks people whom these things need, wait for them, as fragments do.
+
+    name: the robot's actor id. patience: time to wait; then it is what there is. None: nothing is known, or needed.
+    """
+    deadline, world = robot.now() + patience, None
+    with robot.worlds() as worlds:
+        while any(checking.lacks_people(thing, world or NOTHING, name) for thing in things):
+            newer = await worlds.next(max(0.0, deadline - robot.now()))
+            if newer is None:
+                break
+            world = newer
+    return world
 
 
 async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
@@ -251,7 +270,7 @@ async def _perform(
         except EngageError as error:
             if isinstance(error, InputRefused):
                 job.warnings.refused(thing.id)
-            print(readable(error.fault, source.path), file=sys.stderr)
+            complain(readable(error.fault, source.path))
             worst = max(worst, REFUSED if isinstance(error, InputRefused) else FAILED)
             if isinstance(thing, TurnFragment):
                 job.outputs.outcome(thing.id, summary_of(error))
@@ -260,13 +279,13 @@ async def _perform(
             job.prose.expect(outcome)
         elif outcome.dropped:
             left_out = ", ".join(outcome.dropped)
-            print(f"{source.path}: {thing.id} was {outcome.status} without {left_out}", file=sys.stderr)
+            complain(f"{source.path}: {thing.id} was {outcome.status} without {left_out}")
         if end := job.played.end_before_turn(outcome):
             say(end)
         code = job.played.exit_code(outcome)
         if code != DONE:
             why = f": {outcome.fault.reason}" if outcome.fault is not None else ""
-            print(f"{source.path}: {thing.id} was {outcome.status}{why}", file=sys.stderr)
+            complain(f"{source.path}: {thing.id} was {outcome.status}{why}")
         worst = max(worst, code)
     return worst
 

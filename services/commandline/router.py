@@ -10,6 +10,7 @@ import typer
 
 from engage_hri.schemas.access import ROUTER
 from engage_hri.services.bus.keyring import Keys, read_keys
+from engage_hri.services.commandline.patient import LOG, Patient, beneath, complain
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal
 from engage_hri.services.runtime.configuration import bus_config
 
@@ -49,9 +50,12 @@ def main(options: Options) -> int:
 async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
 
+    # Python's standard output of each moment: with keys it is Zenoh's log that goes where it went at first.
+    told = Patient("standard output", lambda data: beneath(sys.stdout).write(data), LOG.warning)
+
     def tell(line: str) -> None:
-        print(line, flush=True)
+        told.write(f"{line}\n")
 
     async with routing(options.listen, options.connect or (), tell, keys):
-        print(f"router is ready at {', '.join(options.listen)}", file=sys.stderr, flush=True)
+        complain(f"router is ready at {', '.join(options.listen)}")
         await forever()

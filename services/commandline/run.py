@@ -11,6 +11,7 @@ import typer
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.options import Embodied, Listening
+from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
@@ -47,7 +48,7 @@ async def _serve(options: Options, config: RobotConfig) -> None:
     service = roster.service(name, config)
 
     def announce() -> None:
-        print(ready_line(name), file=sys.stderr, flush=True)
+        complain(ready_line(name))
 
     async with AsyncExitStack() as stack:
         hub = await stack.enter_async_context(await options.open(config.bus, name, options.listen or ()))

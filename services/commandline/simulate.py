@@ -14,7 +14,6 @@ import typer
 from msgspec import Struct
 from rich import box
 from rich.console import Group, RenderableType
-from rich.markup import escape
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -245,5 +244,5 @@ def grid(table: Table) -> RichTable:
     for index, column in enumerate(table.columns):
         made.add_column(column, justify="right" if index else "left", overflow="fold")
     for row in table.rows:
-        made.add_row(*map(escape, row))
+        made.add_row(*map(Text, row))
     return made

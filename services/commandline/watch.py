@@ -19,6 +19,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import Patient, as_file, settle, standard_output
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import LiveNets, Log, NetLog
@@ -98,11 +99,13 @@ def main(options: Options) -> int:
     if options.net and not wanted.is_everything:
         reason, advice = "shows nets and nothing else", "leave out --only, --actor and --kind"
         raise InputRefused(Fault(reason=reason, where="--net", advice=advice))
-    run_until_signal(_watch_nets(options, config) if options.net else _watch(options, config, wanted))
+    out = standard_output()
+    run_until_signal(_watch_nets(options, config, out) if options.net else _watch(options, config, wanted, out))
+    settle(out)
     return DONE
 
 
-async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
+async def _watch(options: Options, config: Config, wanted: Wanted, out: Patient) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
     async with await options.open(config.bus, "viewer") as hub:
@@ -110,7 +113,9 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
         # Text without a selection includes what people do and say, but no statistics, which would drown the rest.
         everything = wanted.is_everything and not options.json
         telling = Telling(statistics=not everything)
-        show: Sink = as_json if options.json else Log(Terminal(), config.robot, bus.now(), telling)
+        show: Sink = Log(Terminal(file=as_file(out)), config.robot, bus.now(), telling)
+        if options.json:
+            show = _as_json(out)
 
         def tell(message: Message, at: Seconds) -> None:
             if everything or wanted.includes(message):
@@ -122,15 +127,15 @@ async def _watch(options: Options, config: Config, wanted: Wanted) -> None:
                 await forever()
 
 
-async def _watch_nets(options: Options, config: Config) -> None:
+async def _watch_nets(options: Options, config: Config, out: Patient) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
     async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("watch"))
-        console = Terminal()
+        console = Terminal(file=as_file(out))
         with ExitStack() as shown:
             if options.json:
-                show: Sink = as_json
+                show: Sink = _as_json(out)
             elif console.is_terminal:
                 show = shown.enter_context(LiveNets(console))
             else:
@@ -141,5 +146,8 @@ async def _watch_nets(options: Options, config: Config) -> None:
                     await forever()
 
 
-def as_json(message: Message, at: Seconds) -> None:
-    print(lines.line(message), flush=True)
+def _as_json(out: Patient) -> Sink:
+    def show(message: Message, at: Seconds) -> None:
+        out.write(f"{lines.line(message)}\n")
+
+    return show

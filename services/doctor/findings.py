@@ -5,7 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.units import A_DAY, Seconds
+from engage_hri.schemas.units import A_DAY, Seconds, span
 from engage_hri.services.doctor.facts import Facts, Known, Package
 from engage_hri.services.doctor.matrix import clock_of, matrix
 
@@ -297,18 +297,22 @@ def _clocks(facts: Facts) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _certificates(facts: Facts) -> Iterator[Finding]:
+def certificates(facts: Facts) -> dict[str, int]:
+    """Ends of all certificates of holders, by their names: as their processes tell, else as the folder has them."""
     ends = {each.name: each.until for each in facts.certificates}
-    ends |= {door.endpoint: door.until for door in facts.doors if door.until is not None}
-    if facts.own.until is not None:
-        ends.setdefault(facts.own.holder, facts.own.until)
-    for one in facts.known:
-        if one.status is not None and (until := one.status.process.until) is not None:
-            ends[one.status.process.holder] = until
+    for process in (facts.own, *(one.status.process for one in facts.known if one.status is not None)):
+        if process.until is not None:
+            ends[process.holder] = process.until
+    return ends
+
+
+def _certificates(facts: Facts) -> Iterator[Finding]:
+    ends = certificates(facts) | {door.endpoint: door.until for door in facts.doors if door.until is not None}
     for where, until in ends.items():
         days = (until - facts.at) / A_DAY
         if days < SOON:
-            what = "the certificate has expired" if days <= 0 else f"the certificate expires in {int(days)} days"
+            left = span(until - facts.at)
+            what = "the certificate has expired" if days <= 0 else f"the certificate expires in {left}"
             yield Finding(
                 severity="wrong" if days <= 0 else "doubtful", where=where, what=what,
                 do="`engage keys renew` where the authority is; copy the folder anew, and start its holder again",

@@ -7,9 +7,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from engage_hri.schemas.units import A_DAY, Seconds
+from engage_hri.schemas.units import A_DAY, Seconds, span
 from engage_hri.services.doctor.facts import Door, Facts
-from engage_hri.services.doctor.findings import Finding, Severity
+from engage_hri.services.doctor.findings import Finding, Severity, certificates
 from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
@@ -44,8 +44,13 @@ def _head(facts: Facts) -> Text:
 def _table(*columns: str) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for column in columns:
-        table.add_column(column, header_style="dim", overflow="fold")
+        table.add_column(Text(column), header_style="dim", overflow="fold")
     return table
+
+
+def _add(table: Table, *cells: str | Text) -> None:
+    """Add a row. Text is shown as it is: brackets, as of IPv6, are no markup."""
+    table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells))
 
 
 def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
@@ -63,7 +68,7 @@ def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
     title = Text("Who sees whom" + (", with round trips in ms" if with_trips else ""), style="bold")
     for viewer, cells in rows.items():
         number = "" if is_wide or viewer == HERE else f"{names.index(viewer) + 1} "
-        table.add_row(number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
+        _add(table, number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
     columns = names if is_wide else ()
     unlisted = [
         f"{names.index(name) + 1} {name}" if name in names else name
@@ -96,14 +101,14 @@ def _participants(facts: Facts, width: int) -> RenderableType:
     for one in facts.known:
         if one.status is None:
             if one.answers:
-                table.add_row(one.name, "does not answer" if one.seen else "not seen from here")
+                _add(table, one.name, "does not answer" if one.seen else "not seen from here")
             continue
         status, process, bus = one.status, one.status.process, (one.later or one.status).bus
         clock = clocks.get(status.at.clock)
         apart = "same" if clock is None else f"{-clock.offset:+.3f} s ± {1000 * clock.error:.1f} ms"
         up = _time(status.at.seconds - status.joined.seconds)
         cells = (one.name, process.host or "?", apart, up, str(bus.gaps), str(bus.lost), status.version)
-        table.add_row(*cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
+        _add(table, *cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
     return Group(Text("Participants", style="bold"), table)
 
 
@@ -121,7 +126,7 @@ def _around(facts: Facts) -> Table:
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     for what, text in _things(facts):
-        table.add_row(what, text)
+        _add(table, what, text)
     return table
 
 
@@ -130,9 +135,10 @@ def _things(facts: Facts) -> Iterator[tuple[str, str]]:
         yield "endpoint", f"{door.endpoint}: {door.problem or _open(door, facts)}"
     if facts.own.mode:
         yield "links", f"{facts.own.mode}, {f'keys of {facts.own.holder}' if facts.own.holder else 'without keys'}"
-    for certificate in sorted(facts.certificates, key=lambda each: (each.until, each.name))[:1]:
-        more = f"; {len(facts.certificates)} in all" if len(facts.certificates) > 1 else ""
-        yield "certificates", f"next to expire: {certificate.name}, {_days(certificate.until, facts)}{more}"
+    ends = certificates(facts)
+    for until, name in sorted((until, name) for name, until in ends.items())[:1]:
+        more = f"; {len(ends)} in all" if len(ends) > 1 else ""
+        yield "certificates", f"next to expire: {name}, {_left(until, facts)}{more}"
     if facts.packages:
         yield "packages", ", ".join(f"{each.name} {each.version or 'MISSING'}" for each in facts.packages)
     if facts.body is not None:
@@ -145,13 +151,13 @@ def _things(facts: Facts) -> Iterator[tuple[str, str]]:
 
 
 def _open(door: Door, facts: Facts) -> str:
-    until = "" if door.until is None else f", certificate for {_days(door.until, facts)}"
+    until = "" if door.until is None else f", certificate for {_left(door.until, facts)}"
     return f"somebody listens{', encrypted' if door.is_closed else ''}{until}"
 
 
-def _days(until: int, facts: Facts) -> str:
-    days = (until - facts.at) / A_DAY
-    return f"{days:.0f} days" if days > 0 else "EXPIRED"
+def _left(until: int, facts: Facts) -> str:
+    left = until - facts.at
+    return span(left) if left > 0 else "EXPIRED"
 
 
 def _sight(facts: Facts) -> str:
@@ -172,8 +178,8 @@ def _findings(found: Sequence[Finding]) -> RenderableType:
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for finding in found:
-        table.add_row(Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
-        table.add_row("", Text(f"→ {finding.do}", style="dim"))
+        _add(table, Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
+        _add(table, "", Text(f"→ {finding.do}", style="dim"))
     wrong = sum(finding.severity == "wrong" for finding in found)
     if not wrong:
         return Group(table, Text(), Text("Nothing is wrong.", style="bold green"))

@@ -74,8 +74,9 @@ def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
 
 
 def lacks_people(fragment: TurnFragment, world: World) -> bool:
-    """True if the fragment begins a turn without naming its addressee, and the world has no people."""
-    return not (fragment.addressee or world.people) and fragment.turn_status not in ("middle", "end")
+    """True if the fragment begins a turn, or names somebody to speak to, and the world has no people."""
+    begins = fragment.turn_status not in ("middle", "end")
+    return not world.people and (begins or bool(fragment.addressee))
 
 
 def addressee(fragment: TurnFragment, world: World) -> str:

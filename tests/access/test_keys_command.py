@@ -1,6 +1,7 @@
 """`engage keys`, as people type it."""
 
 import json
+from datetime import datetime, tzinfo
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.bus.keyring import read_keys
 from engage_hri.services.commandline.certificates import STANDARD
+from engage_hri.services.commandline.examine import _certificates
 from tests.cli.command import Engage
 from tests.cli.command import engage as made
 
@@ -86,6 +88,41 @@ def test_show_tells_when_each_expires_and_fails_once_one_has(engage: Engage, rin
     assert "6 days" in shown.out.splitlines()[0]
     assert "melvin/authority" in shown.out.splitlines()[-1]
     assert engage("keys", "show", ring / "alice").out.count("\n") == 1
+
+
+def test_show_marks_who_was_revoked_and_does_not_mind_that_it_expires(
+    engage: Engage, ring: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert engage("keys", "add", ring, "observer=lobby", "--days", 7).code == 0
+    assert "REVOKED" not in engage("keys", "show", ring).out
+    assert engage("keys", "revoke", ring, "lobby").code == 0
+    *rest, last = engage("keys", "show", ring).out.splitlines()
+    assert last.split()[0] == "lobby"
+    assert last.endswith("6 days, REVOKED")
+    assert not any("REVOKED" in line for line in rest)
+    assert engage("keys", "show", ring / "lobby").out.endswith("6 days, REVOKED\n")
+    alone = ring.parent / "elsewhere"
+    (ring / "lobby").rename(alone)
+    assert engage("keys", "show", alone).out.endswith("6 days\n")
+    alone.rename(ring / "lobby")
+
+    class Later(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> "Later":
+            return cls.fromtimestamp(datetime.now(tz).timestamp() + 8 * 86400, tz)
+
+    monkeypatch.setattr("engage_hri.services.commandline.keys.datetime", Later)
+    result = engage("keys", "show", ring)
+    assert (result.code, result.out.splitlines()[-1][-16:]) == (0, "EXPIRED, REVOKED")
+
+
+def test_doctor_does_not_mind_the_certificates_of_who_was_revoked(engage: Engage, ring: Path) -> None:
+    assert engage("keys", "revoke", ring, "alice").code == 0
+    names = {each.name for each in _certificates(BusConfig(keys=str(ring)))}
+    assert "melvin/observer/viewer" in names
+    assert "melvin/manager/alice" not in names
+    alone = {each.name for each in _certificates(BusConfig(keys=str(ring / "alice")))}
+    assert alone == {"melvin/manager/alice"}
 
 
 def test_renew_keeps_the_private_key_and_the_hosts(engage: Engage, ring: Path) -> None:

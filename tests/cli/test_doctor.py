@@ -54,6 +54,12 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
         "expired",
     ),
     "nobody opens": (well(bus=False, known=(), doors=(SHUT,)), "wrong", SHUT.endpoint, "no process listens there"),
+    "nobody opens at an address of IPv6": (
+        well(bus=False, known=(), doors=(msgspec.structs.replace(SHUT, endpoint="tcp/[fd00::1]:7466"),)),
+        "wrong",
+        "tcp/[fd00::1]:7466",
+        "no process listens there",
+    ),
     "one of two opens": (well(doors=(SHUT, CLOSED)), "doubtful", SHUT.endpoint, "no process listens there"),
     "the network is open": (
         well(doors=(Door(endpoint="tcp/10.0.0.1:7447", is_local=False),)),
@@ -114,7 +120,13 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
         well(doors=(msgspec.structs.replace(CLOSED, until=int(AT) + 5),)),
         "doubtful",
         CLOSED.endpoint,
-        "expires in 0 days",
+        "expires in a minute",
+    ),
+    "a service's certificate, of whom there is no folder here": (
+        with_one("control", process={"holder": "robot/control/control", "until": int(AT) + 20 * 3600}),
+        "doubtful",
+        "robot/control/control",
+        "expires in 20 hours",
     ),
     "bugs": (with_one("control", bus={"failures": 2}), "wrong", "control", "errors that are bugs: 2 since it came"),
     "losses": (
@@ -227,6 +239,8 @@ def test_the_report_fits_and_has_all_that_was_found(what: str, width: int) -> No
     for finding in findings(facts):
         assert finding.where in text
         assert finding.severity in text
+    for door in facts.doors:
+        assert f"{door.endpoint}: " in text
     assert ("Nothing is wrong." in text) == all(each.severity != "wrong" for each in findings(facts))
 
 

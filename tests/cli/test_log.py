@@ -92,17 +92,6 @@ def test_what_cannot_be_done_is_refused(engage: Engage, tmp_path: Path, options:
     assert result.err.startswith(told)
 
 
-def test_a_full_disk_is_told_once_and_ends_only_the_log(engage: Engage, tmp_path: Path) -> None:
-    file = tmp_path / "ask.xml"
-    file.write_text(FRAGMENT)
-    result = engage("play", file, "--embedded", "--virtual-time", "--quiet", "--log", "/dev/full")
-
-    assert (result.code, result.err) == (
-        0,
-        "--log /dev/full: [Errno 28] No space left on device; no more is logged\n",
-    )
-
-
 @pytest.mark.contained
 def test_a_traceback_can_forge_no_line_and_no_colour(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, evil = tmp_path / "robot.log", "x\n2026 INFO forged\x1b[2J\r\u2028\x85"

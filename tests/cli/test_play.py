@@ -316,11 +316,15 @@ def test_both_kinds_of_lines_may_share_a_file(engage: Engage, files: dict[str, P
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has a file that is always full")
-def test_a_full_disk_ends_it_in_one_line(engage: Engage, files: dict[str, Path]) -> None:
-    result = engage(*PLAY, "--quiet", "--feedback", "/dev/full", files["hello"])
+def test_a_full_disk_stops_nothing_and_fails_the_command_at_the_end(engage: Engage, files: dict[str, Path]) -> None:
+    result = engage(*PLAY, "--feedback", "/dev/full", files["hello"])
 
     assert result.code == 3
-    assert result.err == "/dev/full: cannot write: No space left on device\n"
+    assert result.err == (
+        "/dev/full: cannot write: No space left on device; lines are lost until there is room\n"
+        "/dev/full: 11 lines are lost: cannot write: No space left on device\n"
+    )
+    assert "block hello: done" in result.out
 
 
 def test_the_person_minds_the_robot_and_a_line_of_prose_says_so(engage: Engage, tmp_path: Path) -> None:

@@ -18,8 +18,10 @@ import yaml  # type: ignore[import-untyped]
 
 from engage_hri.services.commandline.certificates import initialize
 from tests.bus.places import free_endpoint
+from tests.cli.command import FRAGMENT
 from tests.lab.lab import laboratory, missing
-from tests.lab.test_reach import BML, LONG, engage, until
+from tests.lab.test_reach import LONG, engage, until
+from tests.test_wheel import HOLDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = DOCS / "deploy"
@@ -39,7 +41,7 @@ def by_hand() -> list[tuple[int, list[str]]]:
 @pytest.mark.real_time
 @pytest.mark.skipif(bool(missing()), reason=missing())
 async def test_three_machines_by_hand(tmp_path: Path) -> None:
-    (tmp_path / "greeting.xml").write_text(BML)
+    (tmp_path / "greeting.xml").write_text(FRAGMENT)
     async with laboratory(tmp_path, seed=1) as lab:
         played = 0
         for number, words in by_hand():
@@ -48,10 +50,20 @@ async def test_three_machines_by_hand(tmp_path: Path) -> None:
             if words[0] == "play":
                 told, _ = await asyncio.wait_for(process.communicate(), LONG)
                 assert process.returncode == 0, told.decode()
+                assert "Answered by: " in told.decode().splitlines()[-1]
                 played += 1
             elif READY[words[0]]:
                 await until(process, READY[words[0]])
         assert played == 1
+
+
+def test_the_image_gets_what_the_package_is_made_of_and_nothing_else() -> None:
+    lines = [line for line in (DOCS.parent / ".dockerignore").read_text().splitlines() if not line.startswith("#")]
+
+    assert lines[0] == "*"
+    assert {line.removeprefix("!") for line in lines if line.startswith("!")} == set(HOLDS)
+    assert [line for line in lines[1:] if not line.startswith("!")] == ["**/__pycache__"]
+    assert yaml.safe_load((FILES / "compose.yaml").read_text())["x-service"]["build"]["context"] == "../.."
 
 
 def test_every_service_has_its_place_in_every_recipe() -> None:
@@ -59,7 +71,7 @@ def test_every_service_has_its_place_in_every_recipe() -> None:
     compose = yaml.safe_load((FILES / "compose.yaml").read_text())["services"]
 
     assert hand == {name for name in compose if name != "router"}
-    assert all(each["command"] == ["run", name] for name, each in compose.items() if name != "router")
+    assert all(each["command"][:2] == ["run", name] for name, each in compose.items() if name != "router")
 
 
 @pytest.mark.parametrize("file", ["compose.yaml", "compose.keys.yaml"])
@@ -150,7 +162,7 @@ async def test_what_the_containers_of_a_robot_with_keys_run_is_a_robot_with_keys
     host, port = endpoint.removeprefix("tcp/").split(":")
     ring, block = tmp_path / "keys", tmp_path / "greeting.xml"
     initialize(ring, "robot", [("manager", "alice")], [host], 2)
-    block.write_text(BML)
+    block.write_text(FRAGMENT)
     variables = {"ENGAGE_KEYS": str(ring), "ENGAGE_ROUTER": host}
     async with AsyncExitStack() as stack:
         for name, container in containers(variables, "compose.yaml", "compose.keys.yaml").items():
@@ -163,6 +175,7 @@ async def test_what_the_containers_of_a_robot_with_keys_run_is_a_robot_with_keys
         told, _ = await asyncio.wait_for(player.communicate(), LONG)
 
     assert player.returncode == 0, told.decode()
+    assert "Answered by: " in told.decode().splitlines()[-1]
 
 
 @asynccontextmanager

@@ -126,7 +126,7 @@ async def test_with_keys_it_tells_of_certificates_and_why_no_link_comes(tmp_path
             (door,) = report["facts"]["doors"]
             assert 9 * 86400 < door["until"] - report["facts"]["at"] < 10 * 86400
             soon = {
-                each["where"] for each in report["findings"] if each["what"] == "the certificate expires in 9 days"
+                each["where"] for each in report["findings"] if each["what"] == "the certificate expires in 10 days"
             }
             assert {address, "robot/control/control", f"{holder_of(holder)}"} <= soon
         code, report = await doctor(two, "--connect", address, "--keys", f"{strange}/viewer")

@@ -18,17 +18,19 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.config import Mode, is_encrypted, is_on_this_machine, mode_of
+from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.clocks import Clocks
+from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.history import History, finish, form_asked, in_form, pack, refuse
+from engage_hri.services.bus.zenoh.links import Links
 from engage_hri.services.bus.zenoh.order import Envelope, SentLog
 from engage_hri.services.bus.zenoh.own_clock import own_clock
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.publishers import Publishers
 from engage_hri.services.bus.zenoh.readers import Readers
-from engage_hri.services.bus.zenoh.rights import Rights
+from engage_hri.services.bus.zenoh.rights import Rights, check_keys
 from engage_hri.services.bus.zenoh.session import (
     LOOPBACK,
     PEER_AFAR,
@@ -71,7 +73,7 @@ async def open_hub(
     """
     if keys is not None:
         connect = connect or (ROUTER_WITH_KEYS,)
-        _check_keys(keys, robot, connect, listen, mode)
+        check_keys(keys, robot, connect, listen, mode)
     # Both block the loop for a moment, before its work has started: Zenoh has no async API, and we start no thread.
     places: tuple[str, ...] = ()
     if keys is not None or mode_of(mode, connect, listen) == "client":
@@ -128,6 +130,9 @@ class ZenohHub(Hub):
         trusts = rights.trusts if rights else None
         self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, trusts)
         self.peers.stand(self.readers.publisher_came, self.readers.participant_changed)
+        self._links = Links(session, self.bridge, self._link.connect, LOG.warning)
+        until = self._link.until
+        self._expiry = Expiry(self._link.holder, until, LOG.warning) if until is not None else None
 
     @property
     def health(self) -> BusHealth:
@@ -185,6 +190,9 @@ class ZenohHub(Hub):
         self.bridge.close()
         if self._pulse is not None:
             self._pulse.cancel()
+        if self._expiry is not None:
+            self._expiry.close()
+        self._links.close()
         self.readers.close()
         self._history.close()
         self.peers.close()
@@ -372,19 +380,6 @@ class ZenohBus(Bus):
             self._token.undeclare()
             self._hub.peers.note(self.name, self._hub.run, False)
         self._hub.forget(self.name)
-
-
-def _check_keys(keys: Keys, robot: str, connect: Sequence[str], listen: Sequence[str], mode: Mode) -> None:
-    where = str(keys.folder)
-    if keys.holder.robot != robot:
-        raise InputRefused(
-            Fault(reason=f"these keys are for robot {keys.holder.robot!r}, not {robot!r}", where=where)
-        )
-    if listen or mode == "peer":
-        reason = "with keys a process does not listen: the rules are the router's, so all are its clients"
-        raise InputRefused(Fault(reason=reason, where=where, advice="leave --listen and --mode out"))
-    if plain := [each for each in connect if not is_encrypted(each)]:
-        raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=where, advice="tls/HOST:PORT"))
 
 
 def _is_ours(encoding: str) -> bool:

@@ -1,5 +1,6 @@
 """Rights of a process with keys. What it may not do is refused here, by name: the router drops it without a word."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import zenoh
@@ -7,7 +8,9 @@ import zenoh
 from engage_hri.schemas import access
 from engage_hri.schemas.access import Does, Holder, owned
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.config import Mode, is_encrypted
 from engage_hri.services.bus.interface import LOG
+from engage_hri.services.bus.keyring import Keys
 
 TOLD = 1000
 """Number of forged messages that are told one by one, so that a flood of them does not fill the log."""
@@ -43,6 +46,20 @@ class Rights:
                 key, run, source or "no name",
             )  # fmt: skip
         return False
+
+
+def check_keys(keys: Keys, robot: str, connect: Sequence[str], listen: Sequence[str], mode: Mode) -> None:
+    """Raise InputRefused for what does not go with the keys of a process."""
+    where = str(keys.folder)
+    if keys.holder.robot != robot:
+        raise InputRefused(
+            Fault(reason=f"these keys are for robot {keys.holder.robot!r}, not {robot!r}", where=where)
+        )
+    if listen or mode == "peer":
+        reason = "with keys a process does not listen: the rules are the router's, so all are its clients"
+        raise InputRefused(Fault(reason=reason, where=where, advice="leave --listen and --mode out"))
+    if plain := [each for each in connect if not is_encrypted(each)]:
+        raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=where, advice="tls/HOST:PORT"))
 
 
 @lru_cache(4096)  # asked for every message

@@ -1,7 +1,7 @@
 """A router: a process that belongs to no robot, and passes on what the processes of all machines send one another."""
 
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import ExitStack, asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager, closing
 
 import zenoh
 
@@ -12,6 +12,7 @@ from engage_hri.services.bus.config import is_encrypted
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.denials import telling_denials
+from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
 
@@ -32,6 +33,8 @@ async def routing(
         if keys_of_router is not None:
             more = _closed(keys_of_router, (*listen, *connect))
             tell = stack.enter_context(telling_denials(tell))
+            own = keys_of_router.holder
+            stack.enter_context(closing(Expiry(own.common_name, own.until, LOG.warning)))
         async with _passing_on(open_router(connect, listen, more), tell):
             yield
 

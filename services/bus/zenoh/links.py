@@ -1,0 +1,132 @@
+"""News of the router: one line when it is gone, and one when it is back."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import zenoh
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.session import LoopBridge
+
+SETTLE: Seconds = 1.0
+"""Time without a router after which that is told: a link that breaks is called again within half a second."""
+
+
+class Router(NamedTuple):
+    """A router that this process has a link to. zid: Zenoh's id of its process."""
+
+    zid: str
+    endpoint: str
+
+
+class RouterNews:
+    """Lines about the routers of this process, each told once. Pure: time is an argument.
+
+    A link that breaks and is there again within `SETTLE`, to the same process, is no news.
+    """
+
+    def __init__(self) -> None:
+        self._here: dict[str, Router] = {}
+        self._known: Router | None = None
+        """The router that was told last, or that was there first."""
+        self._is_told_gone = False
+        self._gone_at: Seconds = 0.0
+        self.deadline: Seconds | None = None
+        """Time at which `due` has something to tell, should no router come before."""
+
+    def came(self, router: Router, now: Seconds) -> str | None:
+        """Take a link that is there now; returns the line to tell."""
+        self._here[router.zid] = router
+        self.deadline = None
+        known, was_told = self._known, self._is_told_gone
+        if known is not None and known.zid in self._here and not was_told:
+            return None
+        self._known, self._is_told_gone = router, False
+        if was_told:
+            return f"a router is there again, at {router.endpoint}, after {now - self._gone_at:.1f} s"
+        if known is None:
+            return None
+        return _replaced(known, router)
+
+    def went(self, zid: str, now: Seconds) -> str | None:
+        """Take a link that is no more; returns the line to tell."""
+        if self._here.pop(zid, None) is None:
+            return None
+        if not self._here:
+            self._gone_at, self.deadline = now, now + SETTLE
+        elif self._known is not None and self._known.zid == zid:
+            known, self._known = self._known, next(iter(self._here.values()))
+            return _replaced(known, self._known)
+        return None
+
+    def due(self, now: Seconds, direct: int) -> str | None:
+        """Tell at the deadline that there is no router. direct: number of processes that are linked without one."""
+        if self.deadline is None or now < self.deadline or self._known is None:
+            return None
+        self.deadline, self._is_told_gone = None, True
+        if direct:
+            left = f"only the {direct} with a direct link are" if direct > 1 else "only the one with a direct link is"
+            left = f"of other processes {left} heard"
+        else:
+            left = "no other process is heard, nor hears this one"
+        return f"the router at {self._known.endpoint} is gone: {left}. This process goes on, and keeps calling it"
+
+
+def _replaced(before: Router, now: Router) -> str:
+    if before.endpoint == now.endpoint:
+        return f"the router at {now.endpoint} was started anew; all links are back"
+    return f"the router at {before.endpoint} is gone; the one at {now.endpoint} has taken over"
+
+
+class Links:
+    """Listener to Zenoh's links, who tells the news. Nothing is told of processes that are linked directly."""
+
+    def __init__(
+        self, session: zenoh.Session, bridge: LoopBridge, called: Sequence[str], tell: Callable[[str], None]
+    ) -> None:
+        """called: endpoints that this process calls, as the user has written them."""
+        self._session = session
+        self._called = called
+        self._tell = tell
+        self._news = RouterNews()
+        self._direct: set[str] = set()
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        info: Any = session.info
+        self._listener = info.declare_transport_events_listener(bridge.on_loop(self._changed), history=True)
+
+    def close(self) -> None:
+        self._listener.undeclare()
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _changed(self, event: zenoh.TransportEvent) -> None:
+        zid, there = str(event.transport.zid), event.kind == zenoh.SampleKind.PUT
+        if event.transport.whatami != zenoh.WhatAmI.ROUTER:
+            (self._direct.add if there else self._direct.discard)(zid)
+            return
+        now = self._loop.time()
+        if there:
+            self._say(self._news.came(Router(zid, self._endpoint(zid)), now))
+        else:
+            self._say(self._news.went(zid, now))
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._news.deadline is not None:
+            self._timer = self._loop.call_at(self._news.deadline, self._due)
+
+    def _due(self) -> None:
+        self._timer = None
+        self._say(self._news.due(self._loop.time(), len(self._direct)))
+
+    def _say(self, line: str | None) -> None:
+        if line is not None:
+            self._tell(line)
+
+    def _endpoint(self, zid: str) -> str:
+        if len(self._called) == 1:
+            return self._called[0]
+        info: Any = self._session.info
+        return next((str(link.dst) for link in info.links() if str(link.zid) == zid), "another machine")
