@@ -40,6 +40,7 @@ SHELLS = {
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/shown.py",  # publishes what the body shows
     "services/control/estimates.py",  # publishes mistakes of the body
+    "services/control/switching.py",  # publishes the faults that are on
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
@@ -73,7 +74,7 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
+    "services/control": "service > torso > voice > shown > actions estimates switching unheard waiting > live > body"
     " > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
