@@ -106,7 +106,7 @@ KINDS: Mapping[str, FaultKind] = {
     ),
     "miscalibrated": FaultKind(
         does="The joint is beside the angle that it measures: looks and points are beside their targets, which "
-        "people see and the body does not know. `engage calibrate body` measures it.",
+        "people see and the body does not know.",
         on="part or joint", amount="degrees by which its true angle is greater; of a part: of each of its joints",
         usual=4.0, low=-45.0, high=45.0,
     ),
@@ -117,8 +117,8 @@ KINDS: Mapping[str, FaultKind] = {
         does="The voice cannot speak and knows it: it refuses what it is to say, and what it is saying fails.",
     ),
     "lost": FaultKind(
-        does="Messages about sync points never come on the bus: who waits for one goes on when it is overdue, or at "
-        "the outcome of its behavior.",
+        does="Messages about sync points never come on the bus: what is tied to one waits, and goes on when it is "
+        "overdue, or is given up; outcomes always come.",
         amount="share of these messages, 0 to 1", usual=0.1, high=1.0,
     ),
 }  # fmt: skip

@@ -27,7 +27,7 @@ class Faulting(Steering):
     async def switch_faults(
         self, faults: Iterable[BodyFault] = (), *, timeout: Seconds | None = None
     ) -> tuple[BodyFault, ...]:
-        """Have the body play exactly these faults from now on, in what is under way, too; returns what is on.
+        """Switch on exactly these faults of the body, in what is under way, too; returns what is on.
 
         faults: none: it is healthy again. `schemas/body_faults.py` says what each does. Rules for access keep this to
             operators and wizards.

@@ -16,8 +16,8 @@ Angles = Mapping[str, float]
 
 def objection(torso: Torso, on: Angles, angles: Angles) -> str:
     """Say why these joints cannot be displaced now; empty: they can. on: those that are already."""
-    now = torso.clock.time()
-    for joint, angle in _new(on, angles).items():
+    now, new = torso.clock.time(), _new(on, angles)
+    for joint, angle in new.items():
         limit = kinematics.LIMIT[joint]
         if joint not in torso.tracks[limit.part].joints:
             return f"{joint} cannot be displaced: it is at rest where it adds nothing"
@@ -26,7 +26,7 @@ def objection(torso: Torso, on: Angles, angles: Angles) -> str:
             return f"{joint} cannot be displaced to {degrees(angle):.0f} degrees: expected {low:.0f}..{high:.0f}"
         if limit.part in torso.runs or torso.tracks[limit.part].is_moving(now):
             return f"{joint} cannot be displaced: the {limit.part.replace('_', ' ')} moves; it can be while it rests"
-    if kinematics.touches_table({**pose_at(torso.tracks, now), **_new(on, angles)}):
+    if new and kinematics.touches_table({**pose_at(torso.tracks, now), **new}):
         return "joints cannot be displaced so: an arm would touch the table"
     return ""
 
