@@ -53,14 +53,13 @@ class Row(NamedTuple):
 
 SERVED = {
     "fragment": keys.FRAGMENT, "inhibit": keys.INHIBIT, "block": keys.BLOCK, "event": keys.EVENT, "turn": keys.TURN,
-    "behavior": keys.BEHAVIOR,
-    "robot": keys.ROBOT,
+    "behavior": keys.BEHAVIOR, "robot": keys.ROBOT, "faults": keys.FAULTS,
 }  # fmt: skip
 """Commands by their subject."""
 WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_CONNECTION_EVENT,
-    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
-    keys.ANY_ALIVE,
+    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS, keys.ANY_OPEN_EVENTS,
+    keys.ANY_STATISTICS, keys.ANY_ALIVE,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
@@ -126,7 +125,7 @@ TABLE: tuple[Row, ...] = (
     ),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.BODY_HELD,
-        heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
+        keys.BODY_FAULTS, heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
     *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, *_RAW)),
     Row("perception", "publishes", _OWN_FAULT, _RARELY),
@@ -147,9 +146,9 @@ TABLE: tuple[Row, ...] = (
     Row("observer", "subscribes", keys.WORLD, "looked at by `engage doctor`"),
     *_watches("operator", "what an operator sees"),
     Row("operator", "subscribes", keys.NET, "what an operator sees"),
-    *_commands("operator", "robot"),
+    *_commands("operator", "robot", "faults"),
     Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
-    *_manages("wizard", "robot", why=f"drives the robot by hand; {_NO_PROGRAM}"),
+    *_manages("wizard", "robot", "faults", why=f"drives the robot by hand; {_NO_PROGRAM}"),
     Row("wizard", "publishes", keys.PERCEIVED_ACTION, f"says what perception does not see; {_NO_PROGRAM}"),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""

@@ -306,6 +306,8 @@ class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_d
     """Half-angle of the gaze cone as a person perceives it."""
     pointing_radius: Meters = 0.05
     """Radius of the pointing cylinder."""
+    faults: tuple[str, ...] = ()
+    """Kinds of faults that it can play when it is told to (`SwitchFaults`); none: a real body."""
 
 
 class RobotState(Struct, frozen=True, kw_only=True, tag="robot_state", omit_defaults=True):

@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body_faults import BodyFaults
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import Feedback
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -26,6 +27,7 @@ LineMessage = (
     | HeadOwner
     | Held
     | BodyHeld
+    | BodyFaults
     | Fault
     | NetPlanned
     | NetMarked

@@ -34,6 +34,7 @@ from engage_hri.schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
+from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched, SwitchFaults
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
@@ -65,7 +66,7 @@ Message = (
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
-    | DescribeBody | Capabilities | EstimateBehaviors | Estimates
+    | SwitchFaults | FaultsSwitched | BodyFaults | DescribeBody | Capabilities | EstimateBehaviors | Estimates
     | ActionBegan | ActionEnded | ActorFound | ActorLost | World | HeadPose | VoiceActivity
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics
     | AskStatus | Status | PeerAlive | PeerGone
@@ -80,6 +81,7 @@ COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.EVENT: (RequestEvent,),
     keys.TURN: (SignalTurn,),
     keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),
+    keys.FAULTS: (SwitchFaults,),
 }
 """Commands on each key; besides, `keys.cancel` takes `Cancel`, and `keys.keep_alive` takes `KeepAlive`."""
 

@@ -6,6 +6,7 @@ SHELLS = {
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/shown.py",  # publishes what the body shows
     "services/control/estimates.py",  # publishes mistakes of the body
+    "services/control/switching.py",  # publishes the faults that are on
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points

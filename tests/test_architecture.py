@@ -48,7 +48,7 @@ LAYERS = {
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
     "services/control": "service > drivers > torso > composed ordinary voice > shown"
-    " > actions estimates refusals unheard waiting > live > body > variability > config",
+    " > actions estimates refusals switching unheard waiting > live > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",

@@ -14,6 +14,7 @@ from engage_hri.schemas import (
     behaviors,
     blocks,
     body,
+    body_faults,
     faults,
     feedback,
     fragments,
@@ -30,7 +31,7 @@ from engage_hri.schemas import (
 
 MODULES: tuple[ModuleType, ...] = (
     fragments, blocks, behaviors, feedback, holds, nets, recognition, attention, actions, perception, world, body,
-    requests, faults, presence, status, units,
+    body_faults, requests, faults, presence, status, units,
 )  # fmt: skip
 
 HEAD = """\

@@ -12,6 +12,7 @@ from typing import Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
@@ -96,6 +97,13 @@ def _body_held(message: BodyHeld) -> Entry:
     return WARNING if message.holds else DEBUG, f"held, since nobody renews it: {_names(message.holds)}"
 
 
+def _body_faults(message: BodyFaults) -> Entry:
+    return (
+        WARNING if message.faults else DEBUG,
+        f"faults switched on: {', '.join(map(words, message.faults)) or 'none'}",
+    )
+
+
 def _names(holds: Iterable[Hold]) -> str:
     names = [": ".join(filter(None, (each.block, each.behavior))) or "everything" for each in holds]
     return ", ".join(names) or "nothing"
@@ -125,6 +133,7 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
     ConnectionEvent: _event,
     Held: _held,
     BodyHeld: _body_held,
+    BodyFaults: _body_faults,
     Refused: _refused,
     Fault: _fault,
     ActorFound: _actor,

@@ -33,10 +33,10 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
+from engage_hri.services.client.faulting import Faulting
 from engage_hri.services.client.feeds import EventFeed, Feed, NewFeed
 from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in
 from engage_hri.services.client.results import in_time, successful
-from engage_hri.services.client.steering import Steering
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.configuration import bus_config
 
@@ -44,7 +44,7 @@ ANSWER_PATIENCE = 20.0
 """Seconds after a fragment's end for which `await_answer` waits: longer than recognition waits for an answer."""
 
 
-class Robot(Steering):
+class Robot(Faulting):
     """An engaged robot, as its collaboration manager sees it. Made by `connect` or, in a service, `Robot.on(bus)`.
 
     Errors carry a `fault` that says where and why. Once the client has ended (its `async with` has, or it broke), all

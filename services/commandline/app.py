@@ -30,6 +30,8 @@ COMMANDS = {
     "as they come.",
     "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or everything. "
     "Exit 2 if it is not being performed.",
+    "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. "
+    "Exit 2 if it cannot play them.",
     "hostile": "Attack the whole robot, in memory and virtual time only. "
     "Exit 1 if anything came of it that should not have.",
     "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",

@@ -10,6 +10,7 @@ import typer
 from engage_hri.schemas import keys, lines
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.body_faults import BodyFaults
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -25,14 +26,14 @@ from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import LiveNets, Log, NetLog
 from engage_hri.services.console.log import Telling
 
-OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.ANY_FAULT)
+OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS, keys.ANY_FAULT)
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "events": (ConnectionEvent,),
     "statistics": (Statistics,),
     "feedback": (BlockProgress, SyncPointProgress, WarningFeedback),
     "head": (HeadOwner,),
     "holds": (Held, BodyHeld),
-    "faults": (Fault,),
+    "faults": (Fault, BodyFaults),
 }
 
 

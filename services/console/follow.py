@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body_faults import BodyFaults
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetWaiting
@@ -25,6 +26,7 @@ FOLLOWED = (
     keys.HEAD_OWNER,
     keys.HELD,
     keys.BODY_HELD,
+    keys.BODY_FAULTS,
     keys.ANY_REQUEST_STATE,
     keys.ANY_FAULT,
     keys.ANY_ALIVE,
@@ -59,7 +61,7 @@ async def following(
         message, at = received.message, instant(bus, received.message, received.at)
         for event in events.feed(message, at, bus.now(), past=received.past):
             tell(event, instant(bus, event, at))
-        is_now = past or not received.past or isinstance(message, Held | BodyHeld)
+        is_now = past or not received.past or isinstance(message, Held | BodyHeld | BodyFaults)
         if is_now and not isinstance(message, ConnectionEvent | OpenEvents):
             tell(message, at)
 

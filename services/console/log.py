@@ -6,6 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -65,6 +66,10 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
         case BodyHeld(holds=waiting) if waiting:
             named = ", ".join(wording.held(each) for each in waiting)
             return f"! the body holds {named}: nobody renews it"
+        case BodyFaults(faults=faults) if faults:
+            return f"! faults of the body that are switched on: {', '.join(map(words, faults))}"
+        case BodyFaults() if before.faults:
+            return "no fault of the body is switched on any more"
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:

@@ -10,6 +10,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from engage_hri.schemas.body_faults import words
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import wording
@@ -94,7 +95,8 @@ def _style(scene: Scene, actor: str) -> str:
 
 
 def _people(scene: Scene) -> list[Text]:
-    """Lines for all actors, the robot first, then one for the owner of its head, and one for what is held."""
+    """Lines for all actors, the robot first, then one for the owner of its head, and one for the faults that are on
+    and for what is held."""
     actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
     wide = max((len(printable(actor.id)) for actor in actors), default=0)
     lines = [
@@ -106,6 +108,9 @@ def _people(scene: Scene) -> list[Text]:
         if scene.waiting:
             line += Text(f"; waiting: {', '.join(claim.kind for claim in scene.waiting)}", style="dim")
         lines.append(line)
+    if scene.faults:
+        texts = [words(fault) for fault in scene.faults]
+        lines.append(Text(f"{'faults'.ljust(wide)} {printable(', '.join(texts))}", style="bold red"))
     if scene.held:
         now = scene.now
         texts = [f"{wording.held(each.hold)} for {wording.seconds(now - each.since)}" for each in scene.held]

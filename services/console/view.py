@@ -10,6 +10,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.body_faults import BodyFault, BodyFaults
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import Held, Hold
@@ -111,6 +112,7 @@ class Scene(Struct, frozen=True, kw_only=True):
     session: WindowStatistics | None = None
     notes: tuple[str, ...] = ()
     held: tuple[HoldInView, ...] = ()
+    faults: tuple[BodyFault, ...] = ()
 
     def actor(self, id: str) -> Actor:
         return self.actors.get(id) or Actor(id=id)
@@ -153,6 +155,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             lasts = [each.until.seconds - each.since.seconds for each in holds]
             held = zip(holds, since, lasts, strict=True)
             return replace(scene, held=tuple(HoldInView(hold, began, began + last) for hold, began, last in held))
+        case BodyFaults(faults=faults):
+            return replace(scene, faults=faults)
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
         case WarningFeedback(kind=kind, message=text):

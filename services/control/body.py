@@ -15,7 +15,8 @@ from msgspec import Struct
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Ray
-from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 
@@ -331,6 +332,23 @@ class Body(ABC):
 
         parts: names of parts, as in `capabilities`; empty: all.
         """
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        """Faults that it plays now; a real body plays none."""
+        return ()
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        """Play exactly these faults from now on, in what is under way, too. By default it can play none.
+
+        faults: each of a kind in `capabilities.faults`, with what `schemas.body_faults.KINDS` lets it have.
+
+        Raises:
+            InputRefused: it cannot play one of them, or not now. Nothing has changed.
+        """
+        if faults:
+            reason, advice = f"this body cannot play {faults[0].kind!r}", "only simulated bodies play faults"
+            raise InputRefused(Fault(reason=reason, where=faults[0].kind, advice=advice, service="control"))
 
     @abstractmethod
     def state(self) -> BodyState:

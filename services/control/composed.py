@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, Ray
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
@@ -58,6 +59,12 @@ class Member(NamedTuple):
     def _can(self, name: str) -> bool:
         needed = [part for part in PARTS_OF_TYPES.get(name, ()) if part in self.body.capabilities.parts]
         return not needed or any(part in self.parts for part in needed)
+
+    def plays(self, fault: BodyFault) -> bool:
+        """True if it can play this fault, at a part or a joint that it has here."""
+        own = {limit.joint for limit in self.body.capabilities.joints if limit.part in self.parts}
+        is_here = not fault.part or fault.part in self.parts or fault.part in own
+        return is_here and fault.kind in self.body.capabilities.faults
 
     def has(self, part: str) -> bool:
         """True if it has this part here. A driver with all its parts may have given the part another name."""
@@ -178,6 +185,35 @@ class ComposedBody(Body):
             if member.has(LIPS_PART):
                 member.body.move_lips(shapes)
 
+    # -- faults -------------------------------------------------------------------------------------------------
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        return tuple(dict.fromkeys(fault for member in self._members for fault in member.body.faults))
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        whose: dict[str, list[BodyFault]] = {member.name: [] for member in self._members}
+        for fault in faults:
+            players = [member for member in self._members if member.plays(fault)]
+            if not players:
+                reason, where = (
+                    f"no driver of this body can play {fault.kind!r}",
+                    f"{fault.kind} {fault.part}".strip(),
+                )
+                raise InputRefused(Fault(reason=reason, where=where, service="control"))
+            for member in players if not fault.part else players[:1]:
+                whose[member.name].append(fault)
+        before = [(member, member.body.faults) for member in self._members]
+        try:
+            for member in self._members:
+                if member.body.capabilities.faults:
+                    member.body.switch_faults(whose[member.name])
+        except InputRefused:
+            for member, played in before:
+                if member.body.capabilities.faults:
+                    member.body.switch_faults(played)
+            raise
+
     # -- measurements -------------------------------------------------------------------------------------------
 
     def _pose(self) -> BodyPose:
@@ -256,6 +292,7 @@ def _joined(members: Sequence[Member]) -> Capabilities:
         no_point_zones=tuple(dict.fromkeys(zone for one in each for zone in one.no_point_zones)),
         gaze_half_angle=max(one.gaze_half_angle for one in each),
         pointing_radius=max(one.pointing_radius for one in each),
+        faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
     )
 
 

@@ -22,6 +22,7 @@ from engage_hri.schemas.body import (
     SyncPointReached,
     WordSpoken,
 )
+from engage_hri.schemas.body_faults import SwitchFaults
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.holds import BodyHeld
@@ -30,7 +31,6 @@ from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
-from engage_hri.services.control import variability
 from engage_hri.services.control.actions import ActionReporter
 from engage_hri.services.control.body import (
     AbortMode,
@@ -49,7 +49,9 @@ from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.live import LiveBehavior
 from engage_hri.services.control.refusals import VOICE_ADVICE, refusal
 from engage_hri.services.control.shown import Shown
+from engage_hri.services.control.switching import FaultSwitch
 from engage_hri.services.control.unheard import Unheard
+from engage_hri.services.control.variability import Deviations, is_lost
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
 
@@ -81,6 +83,7 @@ async def embody(
             ready()
             try:
                 control.tell_held()
+                control.switch.tell()
                 control.shown.look()
                 async for received in inbox:
                     with bus.containing(received):
@@ -113,6 +116,7 @@ class _Control:
         self._sent = 0
         body.on_fault = self._tell_fault
         self.shown = Shown(bus, body, self._actions, config.state_rate)
+        self.switch = FaultSwitch(bus, body, self.desk)
 
     # -- reads --------------------------------------------------------------------------------------------------
 
@@ -161,6 +165,9 @@ class _Control:
                 self._begin(request)
             case AbortBehavior():
                 self._abort(request)
+            case SwitchFaults():
+                self.switch.serve(request)
+                self.shown.look_soon()
             case Cancel() if live is not None:
                 self._revoke(live)
             case GoHome():
@@ -317,7 +324,8 @@ class _Control:
 
     def _tell(self, message: SyncPointArrived | SyncPointReached | WordSpoken) -> None:
         self._sent += 1
-        if not variability.is_lost(self._config.variability, self._sent, message.at.seconds):
+        on = Deviations(self._config.variability.seed, self._body.faults)
+        if not is_lost(on, self._sent, message.at.seconds):
             self._bus.publish(keys.SYNC_POINT, message)
 
     def note_look(self, live: LiveBehavior | None = None, at: Seconds | None = None) -> None:

@@ -3,9 +3,50 @@
 import math
 from hashlib import blake2b
 
+from msgspec import Struct
+
 from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body_faults import BodyFault, amount_of
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.config import Stall, Variability
+from engage_hri.services.control.config import Variability
+
+
+class Deviations(Struct, frozen=True):
+    """The faults that are on, by the configuration or since, and the seed of their chance."""
+
+    seed: int = 0
+    faults: tuple[BodyFault, ...] = ()
+
+    def of(self, kind: str, behavior: str = "", parts: tuple[str, ...] = ()) -> list[tuple[BodyFault, float]]:
+        """Faults of a kind that concern this behavior and one of these parts, each with its amount, or 0.
+
+        behavior, parts: empty: whichever.
+        """
+        return [
+            (fault, amount_of(fault) or 0.0)
+            for fault in self.faults
+            if fault.kind == kind
+            and (not behavior or fault.behavior in ("", behavior))
+            and (not parts or not fault.part or fault.part in parts)
+        ]
+
+
+def configured(variability: Variability) -> Deviations:
+    """Say a section `control.variability` in faults."""
+    faults = [BodyFault(kind="slow", part=slow.part, amount=slow.factor) for slow in variability.slow]
+    faults += [
+        BodyFault(kind="stall", part=stall.part, amount=stall.seconds, before=stall.before, behavior=stall.behavior)
+        for stall in variability.stall
+    ]
+    faults += [BodyFault(kind="overheated", part=part) for part in variability.overheated]
+    faults += [BodyFault(kind="displaced", part=it.joint, amount=it.angle) for it in variability.displaced]
+    if variability.noise:
+        faults.append(BodyFault(kind="noise", amount=variability.noise))
+    if variability.mute:
+        faults.append(BodyFault(kind="mute" if variability.mute == "silent" else "voiceless"))
+    if variability.lost:
+        faults.append(BodyFault(kind="lost", amount=variability.lost))
+    return Deviations(variability.seed, tuple(faults))
 
 
 def chance(seed: int, *what: str) -> float:
@@ -20,24 +61,24 @@ def normal(seed: int, *what: str) -> float:
     return radius * math.cos(2.0 * math.pi * chance(seed, *what, "angle"))
 
 
-def rate(variability: Variability, parts: tuple[str, ...], behavior: str, occasion: int) -> float:
+def rate(deviations: Deviations, parts: tuple[str, ...], behavior: str, occasion: int) -> float:
     """Speed at which `parts` do `behavior` the `occasion`-th time, 1 = as estimated. The slowest part decides."""
-    noise = math.exp(-variability.noise * normal(variability.seed, behavior, str(occasion)))
-    return noise / max((slow.factor for slow in variability.slow if slow.part in parts), default=1.0)
+    noise = sum(amount for _, amount in deviations.of("noise", behavior))
+    slow = max((factor for _, factor in deviations.of("slow", behavior, parts)), default=1.0)
+    return math.exp(-noise * normal(deviations.seed, behavior, str(occasion))) / slow if noise else 1.0 / slow
 
 
-def stall(variability: Variability, parts: tuple[str, ...], behavior: BlockBehavior) -> Stall | None:
+def stall(deviations: Deviations, parts: tuple[str, ...], behavior: BlockBehavior) -> BodyFault | None:
     """The stall that is due in `behavior`; None: none."""
-    return next(
-        (stall for stall in variability.stall if stall.part in parts and stall.behavior in ("", behavior.id)), None
-    )
+    return next((fault for fault, _ in deviations.of("stall", behavior.id, parts)), None)
 
 
-def overheated_part(variability: Variability, parts: tuple[str, ...]) -> str:
-    """Name of the part whose motor fails; empty: none."""
-    return next((part for part in parts if part in variability.overheated), "")
+def overheating(deviations: Deviations, parts: tuple[str, ...], behavior: BlockBehavior) -> BodyFault | None:
+    """The fault by which a motor gives out in `behavior`; None: none."""
+    return next((fault for fault, _ in deviations.of("overheated", behavior.id, parts)), None)
 
 
-def is_lost(variability: Variability, message: int, at: Seconds) -> bool:
+def is_lost(deviations: Deviations, message: int, at: Seconds) -> bool:
     """True if the `message`-th sync point message gets lost."""
-    return variability.lost > 0.0 and chance(variability.seed, "lost", str(message), f"{at:.6f}") < variability.lost
+    share = max((share for _, share in deviations.of("lost")), default=0.0)
+    return share > 0.0 and chance(deviations.seed, "lost", str(message), f"{at:.6f}") < share

@@ -9,6 +9,7 @@ import zenoh
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.access import OWN, TABLE, Row
 from engage_hri.schemas.behaviors import Gaze, Speech
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.interface import Bus
@@ -66,6 +67,7 @@ async def visit(flows: set[Flow]) -> None:
                 await asyncio.sleep(2.0)
                 await guard.hold()
                 await guard.resume()
+                await guard.switch_faults([BodyFault(kind="slow", part="voice", amount=1.5)])
                 await alice.interrupt("b", "s")
                 await speaking
             await alice.perform(TurnFragment(id="whole", behaviors=(SPEECH,)))

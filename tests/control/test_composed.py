@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Pointing, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, PlannedTime
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.control.body import BehaviorRefused, Body, MouthShape, MovementAuthority, Reached
 from engage_hri.services.control.composed import ComposedBody, Member, composed
@@ -229,3 +230,26 @@ async def test_a_smile_goes_to_the_driver_with_the_face():
     estimate = body.estimate(FaceLexeme(id="f", lexeme="SMILE"), None, WORLD)
 
     assert estimate.parts == ("face",)
+
+
+# -- faults ---------------------------------------------------------------------------------------------------------
+
+
+async def test_a_fault_goes_to_the_driver_whose_part_it_is() -> None:
+    head, arms = of("head", "face", "torso"), of("left_arm", "right_arm")
+    body = composed([head, arms])
+    body.switch_faults((BodyFault(kind="slow", part="right_arm", amount=2.0), BodyFault(kind="stall", part="head")))
+
+    assert [fault.kind for fault in arms.body.faults] == ["slow"]
+    assert [fault.kind for fault in head.body.faults] == ["stall"]
+    assert {fault.kind for fault in body.faults} == {"slow", "stall"}
+
+
+async def test_a_fault_that_nobody_can_play_changes_nothing() -> None:
+    body = composed([of("head", "face"), of("voice")])
+    body.switch_faults((BodyFault(kind="slow", part="head", amount=2.0),))
+    before = body.faults
+    with pytest.raises(InputRefused, match="no driver of this body can play 'slow'"):
+        body.switch_faults((BodyFault(kind="slow", part="left_arm", amount=2.0),))
+
+    assert body.faults == before

@@ -8,7 +8,7 @@ from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from engage_hri.services.control.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.variability import is_lost, normal
+from engage_hri.services.control.variability import Deviations, configured, is_lost, normal
 from tests.control.suite import WORLD, Stage, performed, poses_agree, times
 
 POINT = Pointing(id="p", target="near-right")
@@ -134,10 +134,10 @@ def test_noise_is_normal():
 
 
 def test_lost_messages_are_lost_at_their_rate():
-    deviations = Variability(seed=3, lost=0.25)
+    deviations = configured(Variability(seed=3, lost=0.25))
 
     assert sum(is_lost(deviations, number, 0.0) for number in range(2000)) == pytest.approx(500, abs=60)
-    assert not any(is_lost(Variability(), number, 0.0) for number in range(100))
+    assert not any(is_lost(Deviations(), number, 0.0) for number in range(100))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The simulated body: the torso of `kinematics` on loop time, with the deviations of `Variability`.
+"""The simulated body: the torso of `kinematics` on loop time, with the faults that are switched on.
 
 The position of each part at an instant is a formula (`tracks`, `motion`); a behavior's task only sleeps until its
 next sync point, or until its authority changes. So a part needs no task to go home: it is given its path once.
@@ -13,6 +13,7 @@ from typing import Self
 
 from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
+from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -30,7 +31,7 @@ from engage_hri.services.control.body import (
     Reached,
 )
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.torso import choreography, kinematics, tracks
+from engage_hri.services.control.torso import choreography, displacing, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
@@ -39,17 +40,20 @@ from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.rehearsal import rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire, extended
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
+from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.waiting import Bell
 
+FAULTS = tuple(KINDS)
+"""Kinds of faults that it can play: all that have a name."""
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
 
 class SimulatedBody(Body):
-    """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for `deviations`."""
+    """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for its faults."""
 
     def __init__(
         self,
@@ -59,13 +63,15 @@ class SimulatedBody(Body):
     ) -> None:
         self.capabilities = Capabilities(
             body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
-            joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones,
+            joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
         )  # fmt: skip
-        self._deviations = deviations or Variability()
+        self._deviations = variability.configured(deviations or Variability())
+        for fault in self._deviations.faults:
+            if reason := flaw(fault, self.capabilities):
+                raise InputRefused(Fault(reason=reason, where="control.variability", service="control"))
         self._loop = asyncio.get_running_loop()
-        displaced = {joint.joint: radians(joint.angle) for joint in self._deviations.displaced}
-        self._torso = Torso(self._loop, zones, repertoire, displaced)
-        self._voice = Voice(is_mute=bool(self._deviations.mute))
+        self._torso = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
+        self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
         self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
         """The last pose, as a message, and the rays of eyes and arms in it: often nothing has moved since."""
@@ -80,7 +86,7 @@ class SimulatedBody(Body):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         match behavior:
-            case Speech() if self._deviations.mute == "refuse":
+            case Speech() if self._deviations.of("voiceless"):
                 return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute"))
             case Speech(text=text):
                 return speech_estimate(behavior, utter(text), self._torso.pose(world, pose))
@@ -144,6 +150,23 @@ class SimulatedBody(Body):
     def see(self, world: World) -> None:
         self._torso.world = world
         self._torso.follow()
+
+    # -- faults -------------------------------------------------------------------------------------------------
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        return self._deviations.faults
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        on, displaced = _displaced(self.faults), _displaced(faults)
+        if reason := displacing.objection(self._torso, on, displaced):
+            raise InputRefused(Fault(reason=reason, where="displaced", service="control"))
+        self._deviations = Deviations(self._deviations.seed, tuple(faults))
+        displacing.displace(self._torso, on, displaced)
+        self._torso.deviate(self._deviations)
+        self._voice.is_mute = bool(self._deviations.of("mute"))
+        if self._deviations.of("voiceless"):
+            self._voice.hush()
 
     # -- motion -------------------------------------------------------------------------------------------------
 
@@ -218,11 +241,11 @@ class SimulatedBody(Body):
     async def _fail_or_stall(self, run: Run, point: CoursePoint) -> None:
         if point.sync == OVERHEAT:
             raise BodyFailed(_fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
-        assert run.stall is not None
-        until = inf if run.stall.seconds is None else self._loop.time() + run.stall.seconds
-        while not run.is_over and not run.bell.is_past(until):
+        stall = run.faults[STALL]
+        until = inf if stall is None or stall.amount is None else self._loop.time() + stall.amount
+        while not run.is_over and point in run.pending and not run.bell.is_past(until):
             await run.bell.wait(until)
-        run.pending.remove(point)
+        run.pending = [each for each in run.pending if each is not point]
 
     async def _freeze(self, run: Run) -> None:
         run.motion.brake(self._loop.time())
@@ -252,16 +275,24 @@ class SimulatedBody(Body):
     # -- voice --------------------------------------------------------------------------------------------------
 
     async def _speak(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        if self._deviations.mute == "refuse":
-            raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         await self._voice.wait_for_silence(authority)
         if authority.revoked is not None:
             return
+        if self._deviations.of("voiceless"):
+            raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
         async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
             async for progress in utterance:
                 yield progress
+                if isinstance(progress, Reached) and progress.sync == "end":
+                    return
+        if self._deviations.of("voiceless"):
+            raise BodyFailed(_fault(behavior, "the voice is mute"))
+
+
+def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
+    return {fault.part: radians(fault.amount or 0.0) for fault in faults if fault.kind == "displaced"}
 
 
 def _read(file: str) -> str:

@@ -25,6 +25,7 @@ from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resti
 from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
+from engage_hri.services.control.variability import Deviations
 
 STEP: Seconds = 0.02
 """Seconds between two looks at where the trunk will be."""
@@ -255,6 +256,13 @@ class Torso:
         run.motion.extend(limit, now)
         run.brake_for_hold(now)
         if run.keep_pace(now) or is_extended:
+            self.attention.follow_run(run, now)
+
+    def deviate(self, deviations: Deviations) -> None:
+        """Give exactly these faults to what is under way."""
+        now = self.clock.time()
+        for run in dict.fromkeys(self.runs.values()):
+            run.deviate(deviations, now)
             self.attention.follow_run(run, now)
 
     def owns(self, run: Run) -> bool:

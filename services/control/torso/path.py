@@ -7,6 +7,7 @@ the rate: |q''| rate^2 + |q'| |rate'| <= limit.
 """
 
 from collections.abc import Collection, Sequence
+from copy import copy
 from math import sqrt
 from typing import Any
 
@@ -63,6 +64,11 @@ class Leg(Struct, frozen=True, kw_only=True):
     seconds: Seconds
     velocity: tuple[float, ...] = ()
     marks: tuple[tuple[str, float], ...] = ()
+
+
+def unmarked(legs: Sequence[Leg], sync: str) -> tuple[Leg, ...]:
+    """Legs without that mark."""
+    return tuple([replace(leg, marks=tuple([mark for mark in leg.marks if mark[0] != sync])) for leg in legs])
 
 
 class _Segment(Struct, frozen=True):
@@ -144,6 +150,19 @@ class Path:
         parts = [(each, min(each.seconds, s - each.start)) for each in self._segments if each.start < s]
         ways = [_evaluated(each.coefficients, (SAMPLES * seconds)[:, None])[0] for each, seconds in parts]
         return sum(float(np.sum(np.abs(np.diff(way, axis=0)))) for way in ways)
+
+    def marked(self, sync: str, s: Seconds) -> "Path":
+        """The same path with one more mark."""
+        path = copy(self)
+        path.marks = {**self.marks, sync: s}
+        return path
+
+    def unmarked(self, sync: str) -> "Path":
+        """The same path without that mark."""
+        path = copy(self)
+        path.marks = {each: s for each, s in self.marks.items() if each != sync}
+        path.legs = unmarked(self.legs, sync)
+        return path
 
     @property
     def fastest(self) -> float:

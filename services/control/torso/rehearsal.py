@@ -16,7 +16,6 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.config import Variability
 from engage_hri.services.control.torso import choreography, head, tracks
 from engage_hri.services.control.torso.copied import Clock
 from engage_hri.services.control.torso.course import Course, Impossible
@@ -24,6 +23,7 @@ from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.waiting import EARLY
 
 START, RELEASE, BEGIN = "start", 0, 1
@@ -303,7 +303,7 @@ def _begin(
     waits, forced = _told_apart(course, path, times, passing)
     paced = _paced(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
-    run = Run(behavior, course, authority, Variability(), 0)
+    run = Run(behavior, course, authority, Deviations(), 0)
     run.bell = clock
     torso.take_over(run, path)
     moved.update(course.parts)

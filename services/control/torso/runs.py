@@ -5,17 +5,18 @@ from math import inf
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control import variability
 from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.torso.course import Course, CoursePoint
 from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Leg, Path
+from engage_hri.services.control.torso.path import Leg, Path, unmarked
 from engage_hri.services.control.torso.sizing import hurried
+from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.waiting import Bell
 
-STALL, OVERHEAT = "(stall)", "(overheat)"
+STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")
 """Marks on a path where a fault happens; they are never reported."""
 
 
@@ -31,7 +32,7 @@ class Run:
         behavior: BlockBehavior,
         course: Course,
         authority: MovementAuthority,
-        deviations: Variability,
+        deviations: Deviations,
         occasion: int,
     ) -> None:
         self.behavior = behavior
@@ -53,13 +54,11 @@ class Run:
         """Hold points at which it could not stop any more when it was told to wait."""
         self._tried_aims: list[tuple[str, Seconds]] = []
         """Instants asked for when a smaller path was last looked for."""
-        real = ("head",) if course.parts == ("nod",) else course.parts
-        self.cruise = variability.rate(deviations, real, behavior.id, occasion)
-        self.stall: Stall | None = variability.stall(deviations, real, behavior)
-        if self.stall is not None:
-            self._insert_fault(STALL, self.stall.before)
-        if variability.overheated_part(deviations, real):
-            self._insert_fault(OVERHEAT, "stroke" if self.awaits("stroke") else "end")
+        self.cruise = 1.0
+        self.faults: dict[str, BodyFault | None] = {}
+        """The faults that it has, or has had, by their marks."""
+        self._occasion = occasion
+        self._take_faults(deviations)
 
     def awaits(self, sync: str) -> bool:
         return any(point.sync == sync for point in self.pending)
@@ -89,7 +88,8 @@ class Run:
         if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise, stops)) is None:
             return None
         self.size = reduced.size
-        return reduced.path
+        self._mark_faults(motion := Motion(reduced.path, now), now)
+        return motion.path
 
     def keep_pace(self, now: Seconds) -> bool:
         """Set the rate such that it reaches its next point at the instant asked for. True if that is a new aim."""
@@ -132,7 +132,7 @@ class Run:
     def limit(self, path: Path) -> Seconds:
         """Position on `path`, in its natural seconds, up to which it may go now."""
         for point in self.pending:
-            if point.sync in (STALL, OVERHEAT) or (point.held_with and not self.may_pass(point.held_with)):
+            if point.sync in FAULTS or (point.held_with and not self.may_pass(point.held_with)):
                 return path.marks.get(point.stands_at or point.sync, inf)
         return inf
 
@@ -171,7 +171,7 @@ class Run:
         """Stop waiting at `hold`; return the sync points passed. The same place may be another hold point, too."""
         passed = [point.sync for point in self.pending if point.held_with == hold]
         self.pending = [point for point in self.pending if point.held_with != hold]
-        following = next(point for point in self.pending if point.sync not in (STALL, OVERHEAT))
+        following = next(point for point in self.pending if point.sync not in FAULTS)
         here = self.motion.s(now) + 1e-9
         is_here = following.held_with and self.motion.path.marks[following.sync] <= here
         self.holding = self.stands and bool(is_here)
@@ -181,8 +181,8 @@ class Run:
         """Mark the faults that are still due on new `legs`."""
         marked = {sync for leg in legs for sync, _ in leg.marks}
         for number, point in enumerate(self.pending):
-            if point.sync in (STALL, OVERHEAT) and point.sync not in marked:
-                following = next(each.sync for each in self.pending[number:] if each.sync not in (STALL, OVERHEAT))
+            if point.sync in FAULTS and point.sync not in marked:
+                following = next(each.sync for each in self.pending[number:] if each.sync not in FAULTS)
                 legs = tuple(_marked(leg, point.sync, following) for leg in legs)
         return legs
 
@@ -194,11 +194,40 @@ class Run:
         """Sync points that it has passed by then and not reported yet, each with its instant."""
         passed: list[tuple[str, Seconds]] = []
         for point in () if self.holding else self.pending:
-            due = None if point.sync in (STALL, OVERHEAT) else self.due(point)
+            due = None if point.sync in FAULTS else self.due(point)
             if due is None or due > at or (point.held_with and not self.may_pass(point.held_with)):
                 break
             passed.append((point.sync, due))
         return passed
+
+    def deviate(self, deviations: Deviations, now: Seconds) -> None:
+        """Take over exactly these faults, in the middle of the motion."""
+        before = dict(self.faults)
+        self._take_faults(deviations)
+        for mark in (mark for mark in FAULTS if self.faults[mark] != before.get(mark)):
+            self.motion.path = self.motion.path.unmarked(mark)
+        self._mark_faults(self.motion, now)
+        if now < self.motion.end:
+            self.motion.run_at(self.cruise, now)
+            self._aim = None
+        if (limit := self.limit(self.motion.path)) < self.motion.limit:
+            self.motion.brake(now, limit)
+        self.bell.ring()
+
+    def _take_faults(self, deviations: Deviations) -> None:
+        """Take over the faults that concern it; one that it has already, or has had, does not begin anew."""
+        real = ("head",) if self.course.parts == ("nod",) else self.course.parts
+        self.cruise = variability.rate(deviations, real, self.behavior.id, self._occasion)
+        due = {
+            STALL: variability.stall(deviations, real, self.behavior),
+            OVERHEAT: variability.overheating(deviations, real, self.behavior),
+        }
+        for mark in (mark for mark, fault in due.items() if fault != self.faults.get(mark)):
+            self.pending = [point for point in self.pending if point.sync != mark]
+            self.course = replace(self.course, legs=unmarked(self.course.legs, mark))
+            if (fault := due[mark]) is not None:
+                self._insert_fault(mark, fault.before or ("stroke" if self.awaits("stroke") else "end"))
+        self.faults = dict(due)
 
     def _insert_fault(self, fault: str, before: str) -> None:
         """Put `fault` half-way to sync point `before`, on the leg that has it."""
@@ -208,6 +237,25 @@ class Run:
         legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
         self.course = replace(self.course, legs=legs)
         self.pending.insert(index, CoursePoint(fault))
+
+    def _mark_faults(self, motion: Motion, now: Seconds) -> None:
+        """Mark the faults that are due on the path of a motion, half-way from here. One that comes too late to stop
+        there does not happen."""
+        for number, point in [each for each in enumerate(self.pending) if each[1].sync in FAULTS]:
+            path, here = motion.path, motion.s(now)
+            if point.sync in path.marks:
+                continue
+            before = path.marks[next(each.sync for each in self.pending[number:] if each.sync not in FAULTS)]
+            earlier = max((mark for mark in path.marks.values() if mark < before), default=0.0)
+            half = (max(earlier, here) + before) / 2
+            rate = motion.rate(now)
+            soonest = here + rate * rate / (2 * path.gentlest_brake)
+            if not motion.can_stop_at(half, now):
+                half = soonest
+            if half > before:
+                self.pending = [each for each in self.pending if each is not point]
+            else:
+                motion.path = path.marked(point.sync, half)
 
 
 def _marked(leg: Leg, fault: str, before: str) -> Leg:

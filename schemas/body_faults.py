@@ -1,0 +1,177 @@
+"""Faults of a simulated body: what can be switched on while it runs, and what is on. Thesis 4.2.2, 4.5.3, 5.4.3."""
+
+from collections.abc import Mapping
+from math import inf
+from typing import Literal
+
+from msgspec import Struct
+
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.units import Stamp
+
+
+class BodyFault(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A fault that a simulated body is to play.
+
+    kind: one of `Capabilities.faults`; `KINDS` says what each does, and which of the other fields it takes.
+    part: name of a body part, or of a joint; empty: every part that can have it.
+    amount: how much, in the unit of its kind; None: as much as the kind says.
+    before: the sync point before which it happens. behavior: id of the only behavior that it concerns; empty: all.
+    """
+
+    kind: str
+    part: str = ""
+    amount: float | None = None
+    before: str = ""
+    behavior: str = ""
+
+
+class SwitchFaults(Request, frozen=True, kw_only=True, tag="switch_faults", omit_defaults=True):
+    """cmd: operator or wizard -> control: from now on the body has exactly these faults. Ends in `FaultsSwitched`.
+
+    It is refused, and nothing changes, if there is one among them that the body cannot play.
+    """
+
+    faults: tuple[BodyFault, ...] = ()
+
+
+class FaultsSwitched(Outcome, frozen=True, kw_only=True, tag="faults_switched", omit_defaults=True):
+    """evt: terminal state of `SwitchFaults`: these are on."""
+
+    faults: tuple[BodyFault, ...] = ()
+
+
+class BodyFaults(Struct, frozen=True, kw_only=True, tag="body_faults", omit_defaults=True):
+    """state: control. All faults that are switched on, by the configuration or since; none: the body is healthy.
+
+    Published at the start and at every change; a late subscriber gets the last one.
+
+    at: when it was published.
+    """
+
+    at: Stamp
+    faults: tuple[BodyFault, ...] = ()
+
+
+class FaultKind(Struct, frozen=True, kw_only=True):
+    """A kind of fault.
+
+    does: what goes wrong, and what one sees of it. on: what `part` may name; empty: it takes none. voice: true if the
+    voice is among these parts.
+    amount: what `amount` is, with its unit; empty: it takes none. usual: the amount where none is given; None: as
+    `amount` says. low, high: the range of the amount. needs_amount: true if there must be one.
+    before, behavior: true if it takes that field.
+    """
+
+    does: str
+    on: Literal["", "part", "joint", "part or joint"] = ""
+    voice: bool = False
+    amount: str = ""
+    usual: float | None = None
+    low: float = 0.0
+    high: float = inf
+    needs_amount: bool = False
+    before: bool = False
+    behavior: bool = False
+
+
+KINDS: Mapping[str, FaultKind] = {
+    "slow": FaultKind(
+        does="The part takes that many times as long as it says: sync points come late, and what is tied to them "
+        "waits.",
+        on="part", voice=True, amount="factor of time; below 1: quicker, within the limits", usual=2.0, low=0.05,
+        high=100.0, behavior=True,
+    ),
+    "stall": FaultKind(
+        does="The part stops half-way to a sync point (`before`; without it to its target), and goes on after a "
+        "while. Meanwhile no point is reported; a behavior that is overdue is given up like any other.",
+        on="part", amount="seconds; without it for ever", before=True, behavior=True,
+    ),
+    "overheated": FaultKind(
+        does="The motor gives out half-way to a sync point (`before`; without it to the target): the behavior fails "
+        "by that name, and the part goes home.",
+        on="part", before=True, behavior=True,
+    ),
+    "noise": FaultKind(
+        does="Each behavior is somewhat quicker or slower than it was said to be, drawn from the seed.",
+        amount="standard deviation of the logarithm of its duration; 0.1 is about 10 %", usual=0.1, high=2.0,
+        behavior=True,
+    ),
+    "displaced": FaultKind(
+        does="The joint is elsewhere than the body believes, as if somebody had moved it, until a behavior moves it: "
+        "that comes early or late, once.",
+        on="joint", amount="degrees, its true angle", low=-180.0, high=180.0, needs_amount=True,
+    ),
+    "miscalibrated": FaultKind(
+        does="The joint is beside the angle that it measures: looks and points are beside their targets, which "
+        "people see and the body does not know.",
+        on="part or joint", amount="degrees by which its true angle is greater; of a part: of each of its joints",
+        usual=4.0, low=-45.0, high=45.0,
+    ),
+    "mute": FaultKind(
+        does="The voice makes no sound and does not know it: words and marks are reported, and nobody hears them.",
+    ),
+    "voiceless": FaultKind(
+        does="The voice cannot speak and knows it: it refuses what it is to say, and what it is saying fails.",
+    ),
+    "lost": FaultKind(
+        does="Messages about sync points never come on the bus: what is tied to one waits, and goes on when it is "
+        "overdue, or is given up; outcomes always come.",
+        amount="share of these messages, 0 to 1", usual=0.1, high=1.0,
+    ),
+}  # fmt: skip
+"""Faults that all simulated bodies mean alike. A body may have others, of which it says itself what they do."""
+SYNCS = SYNC_POINTS[1:]
+"""Sync points that a fault may come before."""
+
+
+def flaw(fault: BodyFault, body: Capabilities) -> str:
+    """Say why a body cannot play a fault, as far as that is known without it; empty: it can."""
+    if fault.kind not in body.faults:
+        return f"this body cannot play {fault.kind!r}; it can play {', '.join(body.faults) or 'no fault'}"
+    if (kind := KINDS.get(fault.kind)) is None:
+        return ""
+    superfluous = [
+        name
+        for name, given, is_taken in (
+            ("part", fault.part, kind.on), ("amount", fault.amount is not None, kind.amount),
+            ("before", fault.before, kind.before), ("behavior", fault.behavior, kind.behavior),
+        )
+        if given and not is_taken
+    ]  # fmt: skip
+    if superfluous:
+        return f"{fault.kind} takes no {' and no '.join(superfluous)}"
+    if (fault.part or kind.on == "joint") and fault.part not in (known := parts_of(kind, body)):
+        return f"{fault.kind} of {fault.part!r}: known are {', '.join(known)}"
+    if fault.before and fault.before not in SYNCS:
+        return f"{fault.kind} before {fault.before!r}: known are {', '.join(SYNCS)}"
+    if fault.amount is None:
+        return f"{fault.kind} needs an amount: {kind.amount}" if kind.needs_amount else ""
+    if not kind.low <= fault.amount <= kind.high:
+        return f"the amount of {fault.kind} is {fault.amount:g}: expected {kind.low:g}..{kind.high:g} ({kind.amount})"
+    return ""
+
+
+def parts_of(kind: FaultKind, body: Capabilities) -> tuple[str, ...]:
+    """Names of the parts and joints of a body that a fault of this kind may concern. The face has no angles."""
+    parts = [part for part in body.parts if kind.voice or part != "voice"] if "part" in kind.on else []
+    joints = [limit.joint for limit in body.joints if limit.part != "face"] if "joint" in kind.on else []
+    return (*(part for part in parts if not joints or part not in ("face", "voice")), *joints)
+
+
+def amount_of(fault: BodyFault) -> float | None:
+    """Amount of a fault: the one that is given, else the usual one of its kind; None: there is none."""
+    kind = KINDS.get(fault.kind)
+    return fault.amount if fault.amount is not None or kind is None else kind.usual
+
+
+def words(fault: BodyFault) -> str:
+    """A fault in words: `slow right_arm 3`, `stall right_arm before stroke in wave`."""
+    amount = amount_of(fault)
+    said = (
+        fault.kind, fault.part, "" if amount is None else f"{amount:g}",
+        f"before {fault.before}" if fault.before else "", f"in {fault.behavior}" if fault.behavior else "",
+    )  # fmt: skip
+    return " ".join(filter(None, said))

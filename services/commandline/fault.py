@@ -1,0 +1,104 @@
+"""Command `engage fault`: switch faults of a running robot's simulated body, and tell which it can play."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.body_faults import KINDS, BodyFault, FaultKind, parts_of, words
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.options import Connected
+from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
+
+PATIENCE: Seconds = 5.0
+"""Seconds in which control has to answer."""
+NONE, LIST = "none", "list"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Connected):
+    kind: Annotated[str, typer.Argument(metavar="KIND|none|list", help="`list` tells what each kind does.")]
+    part: Annotated[str, typer.Option(metavar="PART", help="A body part or a joint; without it all.")] = ""
+    amount: Annotated[
+        float | None, typer.Option(metavar="X", help="How much, in the unit of the kind.", show_default=False)
+    ] = None
+    before: Annotated[str, typer.Option(metavar="SYNC", help="The sync point before which it happens.")] = ""
+    behavior: Annotated[str, typer.Option(metavar="ID", help="The only behavior that it concerns.")] = ""
+    off: Annotated[bool, typer.Option("--off", help="Switch it off; without options all of its kind.")] = False
+
+    @property
+    def fault(self) -> BodyFault:
+        """The fault that is meant."""
+        return BodyFault(
+            kind=self.kind, part=self.part, amount=self.amount, before=self.before, behavior=self.behavior
+        )
+
+
+def main(options: Options) -> int:
+    config = options.load()
+    if options.kind in (NONE, LIST) and (options.fault != BodyFault(kind=options.kind) or options.off):
+        raise InputRefused(Fault(reason="takes no further options", where=options.kind))
+    run_until_signal(_switch(options, config))
+    return DONE
+
+
+async def _switch(options: Options, config: Config) -> None:
+    from engage_hri.services.client.robot import Robot
+
+    async with (
+        await options.open(config.bus, "operator") as hub,
+        Robot.on(hub.join(unique_name("fault"), "operator")) as robot,
+    ):
+        on = await robot.faults_on(PATIENCE)
+        if options.kind == LIST:
+            print(listed(await robot.capabilities(PATIENCE), on))
+            return
+        on = await robot.switch_faults(switched(on, options.fault, off=options.off), timeout=PATIENCE)
+    print(f"on: {', '.join(map(words, on)) or 'nothing; the body is healthy'}")
+
+
+def switched(on: tuple[BodyFault, ...], fault: BodyFault, *, off: bool = False) -> tuple[BodyFault, ...]:
+    """Faults that are to be on: those that are, with this one, or without it and its like.
+
+    fault: replaces one that differs in its amount alone. off: those of its kind that have the fields which it has.
+    Raises InputRefused if none of them is on.
+    """
+    if fault.kind == NONE:
+        return ()
+    if not off:
+        return (*(each for each in on if _where(each) != _where(fault)), fault)
+    left = tuple(each for each in on if not _is_meant(each, fault))
+    if left == on:
+        raise InputRefused(Fault(reason="is not on", where=words(fault), advice=f"on: {', '.join(map(words, on))}"))
+    return left
+
+
+def listed(body: Capabilities, on: tuple[BodyFault, ...]) -> str:
+    """Text about all faults that a body can play, and those that are on."""
+    lines = []
+    for name in body.faults:
+        kind = KINDS.get(name)
+        lines.append(f"{name}: {kind.does if kind else 'a fault of this body alone'}")
+        lines += [f"    --{option}: {what}" for option, what in (_options(kind, body) if kind else {}).items()]
+    lines.append(f"on: {', '.join(map(words, on)) or 'nothing'}" if body.faults else "this body can play no faults")
+    return "\n".join(lines)
+
+
+def _options(kind: FaultKind, body: Capabilities) -> dict[str, str]:
+    parts, amount = ", ".join(parts_of(kind, body)), kind.amount
+    usual = "" if kind.usual is None else f"; without it {kind.usual:g}"
+    options = {"part": parts and f"{parts}{'' if kind.on == 'joint' else '; without it all'}"}
+    options |= {"amount": amount and f"{amount}{usual}", "before": "a sync point" if kind.before else ""}
+    return {option: what for option, what in options.items() if what}
+
+
+def _where(fault: BodyFault) -> tuple[str, ...]:
+    return (fault.kind, fault.part, fault.before, fault.behavior)
+
+
+def _is_meant(fault: BodyFault, like: BodyFault) -> bool:
+    given = zip(_where(fault), _where(like), strict=True)
+    return all(has == wanted or not wanted for has, wanted in given) and like.amount in (None, fault.amount)

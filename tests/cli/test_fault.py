@@ -1,0 +1,71 @@
+"""`engage fault` beside a body in a process of its own, over real sockets; and what it sends, from what was on."""
+
+import asyncio
+from asyncio.subprocess import Process
+
+import pytest
+
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.commandline.fault import listed, switched
+from engage_hri.services.control.torso.body import SimulatedBody
+from tests.bus.places import free_endpoint
+from tests.cli.command import start
+from tests.cli.test_processes import PATIENCE, line, stopped
+
+SLOW, STALL = BodyFault(kind="slow", part="head", amount=3.0), BodyFault(kind="stall", part="head", before="end")
+
+
+async def said(process: Process) -> tuple[int, str, str]:
+    out, err = await asyncio.wait_for(process.communicate(), PATIENCE)
+    assert process.returncode is not None
+    return process.returncode, out.decode().strip(), err.decode().strip()
+
+
+@pytest.mark.real_time
+async def test_faults_are_switched_from_the_command_line() -> None:
+    where = ("--robot", "faulty", "--connect", endpoint := free_endpoint())
+    control = await start("run", "control", "--robot", "faulty", "--listen", endpoint, "--set",
+                          "control.variability.noise=0.2")  # fmt: skip
+    try:
+        await line(control, "control is ready")
+        stall = ("stall", "--part", "right_arm", "--before", "stroke")
+        assert await said(await start("fault", *stall, *where)) == (
+            0, "on: noise 0.2, stall right_arm before stroke", ""
+        )  # fmt: skip
+        code, out, _ = await said(await start("fault", "list", *where))
+        assert (code, out.splitlines()[-1]) == (0, "on: noise 0.2, stall right_arm before stroke")
+        assert "voiceless: The voice cannot speak and knows it" in out
+        assert await said(await start("fault", "noise", "--off", *where)) == (
+            0, "on: stall right_arm before stroke", ""
+        )  # fmt: skip
+        code, _, error = await said(await start("fault", "slow", "--part", "wing", *where))
+        assert code == 2
+        assert error.startswith("slow: slow of 'wing': known are head, torso, left_arm, right_arm, face, voice")
+        assert await said(await start("fault", "none", *where)) == (0, "on: nothing; the body is healthy", "")
+    finally:
+        await stopped(control)
+
+
+def test_a_fault_is_added_and_replaces_one_of_another_amount() -> None:
+    assert switched((SLOW,), STALL) == (SLOW, STALL)
+    faster = BodyFault(kind="slow", part="head", amount=2.0)
+    assert switched((SLOW, STALL), faster) == (STALL, faster)
+    assert switched((SLOW, STALL), BodyFault(kind="slow")) == (SLOW, STALL, BodyFault(kind="slow"))
+    assert switched((SLOW, STALL), BodyFault(kind="none")) == ()
+
+
+def test_what_is_named_is_switched_off_and_what_is_not_on_is_an_error() -> None:
+    assert switched((SLOW, STALL), BodyFault(kind="slow"), off=True) == (STALL,)
+    assert switched((SLOW, STALL), BodyFault(kind="stall", part="head"), off=True) == (SLOW,)
+    with pytest.raises(InputRefused, match=r"slow left_arm 2: is not on \(on: slow head 3\)"):
+        switched((SLOW,), BodyFault(kind="slow", part="left_arm"), off=True)
+
+
+async def test_the_list_tells_what_each_kind_does_and_takes() -> None:
+    text = listed(SimulatedBody().capabilities, (SLOW,))
+
+    assert "\n    --amount: factor of time; below 1: quicker, within the limits; without it 2\n" in text
+    assert text.endswith("\non: slow head 3")
+    assert listed(Capabilities(body="real", types=(), parts=()), ()) == "this body can play no faults"
