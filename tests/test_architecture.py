@@ -72,7 +72,7 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
-    "services/bus": "memory zenoh > interface payloads > config journal keyring",
+    "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
     "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
     " > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
