@@ -18,6 +18,8 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.runtime.steps import Steps, portions
+from engage_hri.services.runtime.unhurried import SLICE
 
 AbortMode = Literal["relax", "freeze"]
 Revocation = Literal["relax", "freeze", "taken_over"]
@@ -296,6 +298,22 @@ class Body(ABC):
         world: the entities that targets name, in metres.
         """
         return [self.estimate(item.behavior, item.pose, world) for item in items]
+
+    def rehearse_in_steps(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Steps[Sequence[Estimate]]:
+        """Do what `rehearse` does, as a generator: at each `yield` other work may get its turn.
+
+        Not overridden, a plan is one step, and of behaviors that are each by themselves four are.
+        items, world, others: as of `rehearse`. All of them stay as they are; where the body is may change meanwhile.
+        """
+        if any(item.times for item in items):
+            return self.rehearse(items, world, others)
+        told: list[Estimate] = []
+        for portion in portions(items, 4):
+            told += self.rehearse(portion, world, others)
+            yield SLICE
+        return told
 
     @abstractmethod
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

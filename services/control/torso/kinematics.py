@@ -10,11 +10,14 @@ from collections.abc import Iterable, Mapping
 from math import atan2, cos, hypot, radians, sin
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
 from engage_hri.schemas.body import BodyPose, JointAngle, JointLimit, Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
 
+Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 Pose = Mapping[str, float]
 """Angle of each joint; radians, of the face a share of the way, 0 at rest."""
@@ -187,6 +190,22 @@ def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool
     """True if an elbow, forearm or hand is in the table or closer than the clearance."""
     forearms = [arm(pose, side) for side in sides]
     return any(_in_table(point) for ray in forearms for point in (ray.origin, _tip(ray), _edge_crossing(ray)))
+
+
+def above_table(yaw: Array, pitch: Array, elbow: Array) -> Array:
+    """Distances in metres by which arms stay out of the table, the torso upright; where one is in it, below 0.
+
+    yaw, pitch, elbow: angles of the joints of an arm, of any one shape. The same points count as in `touches_table`.
+    """
+    forward, out = np.cos(yaw), pitch + elbow
+    elbow_x, elbow_z = UPPER_ARM * np.sin(pitch) * forward, SHOULDER["left"][2] - UPPER_ARM * np.cos(pitch)
+    hand_x, hand_z = elbow_x + FOREARM * np.sin(out) * forward, elbow_z - FOREARM * np.cos(out)
+    is_across = (elbow_x < TABLE_EDGE) & (hand_x > TABLE_EDGE)
+    part = (TABLE_EDGE - elbow_x) / np.where(is_across, hand_x - elbow_x, 1.0)
+    edge, top = TABLE_EDGE - CLEARANCE, TABLE_TOP + CLEARANCE
+    at_edge = np.where(is_across, elbow_z + part * (hand_z - elbow_z) - top, np.inf)
+    at_elbow, at_hand = np.maximum(edge - elbow_x, elbow_z - top), np.maximum(edge - hand_x, hand_z - top)
+    return np.asarray(np.minimum(np.minimum(at_elbow, at_hand), at_edge))
 
 
 def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:

@@ -27,7 +27,7 @@ AT_REST = 1e-9
 SAMPLES = np.linspace(0.0, 1.0, 33)
 _STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 
-_LEAST: Seconds = 0.02
+LEAST: Seconds = 0.02
 """Least time of a leg on which something moves."""
 _NOTHINGS: tuple[Seconds, ...] = (0.0004, 0.001, 0.002, 0.005, 0.01)
 """Times to try for a leg that needs none: whoever is all but there, and all but at rest, is there at once."""
@@ -191,7 +191,7 @@ class _Limits:
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         least = _NOTHINGS if seconds <= 0.0 else ()
-        for each in (*least, *(max(seconds, _LEAST) * stretch for stretch in _STRETCHES)):
+        for each in (*least, *(max(seconds, LEAST) * stretch for stretch in _STRETCHES)):
             connection = self._with_peaks(_quintic(start, end, each), each)
             if connection.excess <= 0.0:
                 return connection
