@@ -7,6 +7,7 @@ hanging down, forward positive; the elbow flexes the forearm forward, so that an
 
 import math
 from collections.abc import Iterable, Mapping
+from functools import cache, lru_cache
 from math import atan2, cos, hypot, radians, sin
 from typing import Literal
 
@@ -109,6 +110,7 @@ class ArmAim(Struct, frozen=True):
     """Angles a little later, still on target."""
 
 
+@cache
 def joints_of(part: str) -> tuple[str, ...]:
     return tuple(limit.joint for limit in JOINTS if limit.part == part)
 
@@ -172,10 +174,20 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
 
     radius: of what is pointed at. Raises Unreachable.
     """
+    aim = _aim(side, target, radius, pose["torso_turn"], pose["torso_lean"])
+    if isinstance(aim, str):
+        raise Unreachable(aim)
+    return aim
+
+
+@lru_cache(256)  # of one place it is asked from many poses of the arm, with the same answer
+def _aim(side: Side, target: Vector, radius: Meters, turn: Radians, lean: Radians) -> ArmAim | str:
+    """Angles that point at `target`, or why there are none."""
+    pose = {"torso_turn": turn, "torso_lean": lean}
     x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
     distance = hypot(x, y, z)
     if distance > REACH:
-        raise Unreachable(f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m")
+        return f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m"
     reason = ""
     for degrees in range(20, -32, -2):
         pitch = radians(degrees)
@@ -183,13 +195,12 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
         reason = _objection(side, stroke, target, radius, pose) or _objection(side, held, target, radius, pose)
         if not reason:
             return ArmAim(stroke, held)
-    raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
+    return f"the {side} arm finds no way to point at it: {reason}"
 
 
 def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool:
     """True if an elbow, forearm or hand is in the table or closer than the clearance."""
-    forearms = [arm(pose, side) for side in sides]
-    return any(_in_table(point) for ray in forearms for point in (ray.origin, _tip(ray), _edge_crossing(ray)))
+    return any(_is_in_table(arm(pose, side)) for side in sides)
 
 
 def above_table(yaw: Array, pitch: Array, elbow: Array) -> Array:
@@ -225,10 +236,9 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
     for name, angle in zip(names, angles, strict=True):
         if not LIMIT[name].low <= angle <= LIMIT[name].high:
             return f"{name} cannot turn to {math.degrees(angle):.0f} degrees"
-    there = {**pose, **dict(zip(names, angles, strict=True))}
-    if touches_table(there, (side,)):
+    forearm = arm({**pose, **dict(zip(names, angles, strict=True))}, side)
+    if _is_in_table(forearm):
         return "the table is in the way"
-    forearm = arm(there, side)
     is_near = (
         math.dist(_tip(forearm), target) < radius + HAND_TO_TARGET or math.dist(forearm.origin, target) < FOREARM
     )
@@ -238,6 +248,10 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
 def _tip(forearm: Ray) -> Vector:
     assert forearm.tip is not None
     return forearm.tip
+
+
+def _is_in_table(forearm: Ray) -> bool:
+    return any(_in_table(point) for point in (forearm.origin, _tip(forearm), _edge_crossing(forearm)))
 
 
 def _in_table(point: Vector) -> bool:

@@ -4,7 +4,7 @@ Time is that of a clock: of the event loop for the body, of its own for a rehear
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from msgspec.structs import replace
@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
-from engage_hri.services.control.torso.aiming import NECK, Aim
+from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.estimates import Added, infeasible, motion_estimate, poses
 from engage_hri.services.control.torso.head import Fixation
@@ -94,16 +94,26 @@ class Torso:
                 here.update(zip(track.joints, track.angles(now), strict=True))
         # Paths of head and arms are laid for where the torso is going to be.
         torso, leaning = self.tracks["torso"], self.runs.get("torso")
-        trunk = torso.angles(now) if pose is None and (real or not self.misbelieved) else None
+        trunk = torso.angles(now) if real or not self.misbelieved else None
         here.update(zip(torso.joints, torso.angles(max(now, torso.motion.end)), strict=True))
         if leaning is not None and leaning.is_setting_out and torso.is_moving(now):
             here.update((joint, leaning.course.on_target[joint]) for joint in torso.joints)
         if not real:
             here.update(self.misbelieved)
-        here = tracks.updated(here, pose)
-        base = self.attention.angles_at([here[joint] for joint in torso.joints])
-        rest = {**tracks.bases(self.tracks), **dict(zip(NECK, base, strict=True))}
-        return Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk)
+        rest = {**tracks.bases(self.tracks), **self._gaze_at_rest(here)}
+        described = Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk)
+        return described if pose is None else self.placed(described, pose)
+
+    def placed(self, situation: Situation, pose: BodyPose) -> Situation:
+        """The same situation with the joints at rest in `pose`, as far as it has them."""
+        here, rest = tracks.updated(situation.pose, pose), situation.rest
+        if any(here[joint] != situation.pose[joint] for joint in TRUNK):
+            rest = {**rest, **self._gaze_at_rest(here)}
+        return replace(situation, pose=here, rest=rest, trunk=None)
+
+    def _gaze_at_rest(self, pose: Mapping[str, float]) -> dict[str, float]:
+        """Angles to which the head goes back, with the trunk as in `pose`."""
+        return dict(zip(NECK, self.attention.angles_at([pose[joint] for joint in TRUNK]), strict=True))
 
     def path(self, course: Course, situation: Situation | None = None) -> Path:
         """Lay a path along `course`. Raises Impossible.

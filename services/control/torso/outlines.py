@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Degrees
 from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.path import LEAST, MARGIN, SAMPLES, SHARE, Array, JointMotion, Leg
+from engage_hri.services.control.torso.path import LEAST, MARGIN, SAMPLES, SHARE, Array, Leg
 
 Flags = NDArray[np.bool_]
 
@@ -31,9 +31,13 @@ _CHANGES = _POWERS[2:] * _POWERS[1:5] * SAMPLES[:, None] ** _POWERS[:4]
 
 
 class Asked(Struct, frozen=True):
-    """A path from `start` along `legs`. to_target: the number of legs to the target. is_arm: the table matters."""
+    """A path from the angles `start`, at `speeds`, along `legs`.
 
-    start: JointMotion
+    to_target: the number of legs to the target. is_arm: the table matters.
+    """
+
+    start: tuple[float, ...]
+    speeds: tuple[float, ...]
     legs: tuple[Leg, ...]
     to_target: int
     is_arm: bool
@@ -52,12 +56,16 @@ def outlines(asked: Sequence[Asked]) -> list[Degrees | None]:
 
 
 def _is_plain(asked: Asked) -> bool:
-    """True if each leg takes its time, and starts without an acceleration."""
-    return all(leg.seconds > 0.0 for leg in asked.legs) and not asked.start.a.any()
+    """True if each leg takes its time, or nothing moves at all."""
+    return all(leg.seconds > 0.0 for leg in asked.legs) or (not asked.is_arm and _stays(asked))
+
+
+def _stays(asked: Asked) -> bool:
+    return not any(asked.speeds) and all(leg.goal == asked.start and not any(leg.velocity) for leg in asked.legs)
 
 
 def _shape(asked: Asked) -> tuple[int, int, int, bool]:
-    return len(asked.start.q), len(asked.legs), asked.to_target, asked.is_arm
+    return len(asked.start), len(asked.legs), asked.to_target, asked.is_arm
 
 
 def _alike(asked: Sequence[Asked]) -> list[Degrees | None]:
@@ -72,8 +80,8 @@ def _alike(asked: Sequence[Asked]) -> list[Degrees | None]:
     goal = np.array([leg.goal for leg in legs]).reshape(-1, count, joints)
     out = np.array([leg.velocity or still for leg in legs]).reshape(-1, count, joints)
     seconds = np.maximum(np.array([leg.seconds for leg in legs]), LEAST).reshape(-1, count, 1)
-    begin = np.concatenate((np.array([each.start.q for each in asked])[:, None], goal[:, :-1]), axis=1)
-    into = np.concatenate((np.array([each.start.v for each in asked])[:, None], out[:, :-1]), axis=1)
+    begin = np.concatenate((np.array([each.start for each in asked])[:, None], goal[:, :-1]), axis=1)
+    into = np.concatenate((np.array([each.speeds for each in asked])[:, None], out[:, :-1]), axis=1)
     way, v, w = goal - begin, into * seconds, out * seconds
     terms = np.stack(
         (begin, v, np.zeros_like(v), 10 * way - 6 * v - 4 * w, -15 * way + 8 * v + 7 * w, 6 * way - 3 * v - 3 * w)

@@ -7,7 +7,7 @@ from msgspec import Struct
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.world import World
 from engage_hri.services.control.torso import choreography, tracks
-from engage_hri.services.control.torso.course import Course, Impossible, Situation
+from engage_hri.services.control.torso.course import Course, Impossible, Situation, angles
 from engage_hri.services.control.torso.estimates import infeasible, is_arm, is_gaze, poses, posture_estimate
 from engage_hri.services.control.torso.moving import Torso
 from engage_hri.services.control.torso.outlines import Asked, outlines
@@ -43,9 +43,10 @@ def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps
 def _told(torso: Torso, items: Sequence[EstimateItem], world: World) -> list[Estimate]:
     told: dict[int, Estimate] = {}
     opened: list[_Open] = []
+    here = torso.situation(world)
     for number, item in enumerate(items):
         try:
-            made = _opened(torso, number, item, world)
+            made = _opened(torso, number, item, here)
         except Impossible as impossible:
             told[number] = infeasible(item.behavior, impossible)
         else:
@@ -59,15 +60,19 @@ def _told(torso: Torso, items: Sequence[EstimateItem], world: World) -> list[Est
     return [told.get(number) or torso.estimate(item.behavior, item.pose, world) for number, item in enumerate(items)]
 
 
-def _opened(torso: Torso, number: int, item: EstimateItem, world: World) -> _Open | None:
+def _opened(torso: Torso, number: int, item: EstimateItem, here: Situation) -> _Open | None:
     """Plan a motion; None: only its path says what it comes to. Raises Impossible."""
-    situation = torso.situation(world, item.pose)
+    situation = here if item.pose is None else torso.placed(here, item.pose)
     course = choreography.plan(item.behavior, situation)
     to_target = next((count for count, leg in enumerate(course.legs, 1) if ("stroke", 1.0) in leg.marks), 0)
-    from_here = item.pose is None and not torso.misbelieved
-    if not to_target or not (is_gaze(course) or is_arm(course)) or (from_here and torso.is_carried(course)):
+    if not to_target or not (is_gaze(course) or is_arm(course)):
         return None
-    start = torso.start(course, None if from_here else situation)
+    start, speeds = angles(course.joints, situation.pose), (0.0,) * len(course.joints)
+    if item.pose is None and not torso.misbelieved:
+        state = torso.start(course)
+        if torso.is_carried(course) or state.a.any():
+            return None
+        start, speeds = tuple(state.q.tolist()), tuple(state.v.tolist())
     legs = course.legs if is_arm(course) else course.legs[:to_target]
-    asked = Asked(start, legs, to_target, is_arm(course), tracks.limits_of(course.parts))
+    asked = Asked(start, speeds, legs, to_target, is_arm(course), tracks.limits_of(course.parts))
     return _Open(number, course, situation, asked)
