@@ -80,8 +80,9 @@ SERVICES: dict[str, Service] = {
 }
 PARTS = (
     ("codec", "engage_hri.services.bus.memory", ("encode", "decode", "published")),
-    ("estimates", "engage_hri.services.control.service", ("_Control.estimate",)),
-    ("choice", "engage_hri.services.generation.pipeline", ("choose", "prepared", "choose_steps")),
+    ("estimates", "engage_hri.services.control.service", ("_Control.estimate", "_Control._estimated")),
+    ("choice", "engage_hri.services.generation.pipeline", ("choose", "weigh", "unasked", "choice")),
+    ("phrases", "engage_hri.services.generation.pipeline", ("proposed",)),
     ("block", "engage_hri.services.generation.pipeline", ("Emission.plan", "Emission.__init__")),
 )  # fmt: skip
 """Parts of a trip in one process, and the functions that make them up, as far as the measured code has them."""

@@ -8,7 +8,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
-from engage_hri.services.generation.references.policy import ReferenceScene
+from engage_hri.services.generation.references.pairs import ReferenceScene
 
 TANGRAMS = (
     "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",

@@ -1,11 +1,12 @@
 """Outlines of many paths at once: how far the joints turn to the target, and whether the table is in the way.
 
 A path is laid leg by leg, each sampled by itself. A question about many motions needs two numbers of each; here the
-legs of all of them are the columns of one product. Where a leg would have to be longer than it likes, or anything is
-as close to a limit as rounding, there is no outline: that path has to be laid.
+legs of all of them are the columns of one product. Where anything is as close to a limit as rounding, or the table is
+in the way, there is no outline: that path has to be laid.
 """
 
 from collections.abc import Sequence
+from functools import cache
 from itertools import groupby
 from operator import itemgetter
 
@@ -13,15 +14,26 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Degrees
 from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.path import LEAST, MARGIN, SAMPLES, SHARE, Array, Leg
+from engage_hri.services.control.torso.path import (
+    LEAST,
+    MARGIN,
+    OUTSIDE,
+    SAMPLES,
+    SHARE,
+    STRETCHES,
+    Array,
+    Leg,
+)
+from engage_hri.services.control.torso.tracks import limits_of
 
 Flags = NDArray[np.bool_]
 
-DOUBT = 1e-9
+DOUBT = 1e-10
 """Share of a limit, or metres above the table, within which rounding might decide."""
+TRIES = 8
+"""Times that are tried for a leg. One that needs still more time has to be laid."""
 ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table, as `tracks.meets_table` does."""
 _POWERS = np.arange(6.0)
@@ -41,7 +53,7 @@ class Asked(Struct, frozen=True):
     legs: tuple[Leg, ...]
     to_target: int
     is_arm: bool
-    limits: tuple[JointLimit, ...]
+    parts: tuple[str, ...]
 
 
 def outlines(asked: Sequence[Asked]) -> list[Degrees | None]:
@@ -71,53 +83,79 @@ def _shape(asked: Asked) -> tuple[int, int, int, bool]:
 def _alike(asked: Sequence[Asked]) -> list[Degrees | None]:
     """Outlines of paths with as many joints and legs.
 
-    Arrays below are paths x legs x joints. A leg from q with speed v to one with speed w, both without acceleration,
-    is a polynomial of degree five in the share of its time.
+    A leg between two angles and speeds, without acceleration at both, is a polynomial of degree five in the share of
+    its time: arrays of its terms are 6 x legs x joints.
     """
     joints, count, to_target, is_arm = _shape(asked[0])
     legs = [leg for each in asked for leg in each.legs]
     still = (0.0,) * joints
     goal = np.array([leg.goal for leg in legs]).reshape(-1, count, joints)
     out = np.array([leg.velocity or still for leg in legs]).reshape(-1, count, joints)
-    seconds = np.maximum(np.array([leg.seconds for leg in legs]), LEAST).reshape(-1, count, 1)
-    begin = np.concatenate((np.array([each.start for each in asked])[:, None], goal[:, :-1]), axis=1)
-    into = np.concatenate((np.array([each.speeds for each in asked])[:, None], out[:, :-1]), axis=1)
-    way, v, w = goal - begin, into * seconds, out * seconds
-    terms = np.stack(
-        (begin, v, np.zeros_like(v), 10 * way - 6 * v - 4 * w, -15 * way + 8 * v + 7 * w, 6 * way - 3 * v - 3 * w)
-    )
-    columns = terms.reshape(6, -1)
-    values = _VALUES @ columns
-    limits = [each.limits for each in asked]
-    is_sure = _keeps(values, columns, seconds, limits, begin.shape)
-    turned = np.abs(np.diff(values, axis=0)).sum(axis=0).reshape(begin.shape)[:, :to_target].sum(axis=(1, 2))
+    begin = np.concatenate((np.array([[each.start] for each in asked]), goal[:, :-1]), axis=1)
+    into = np.concatenate((np.array([[each.speeds] for each in asked]), out[:, :-1]), axis=1)
+    bounds = np.stack([_bounds(each.parts) for each in asked for _ in each.legs], axis=1)
+    ends = np.stack((begin, into, goal, out)).reshape(4, -1, joints)
+    natural = np.maximum(np.array([leg.seconds for leg in legs]), LEAST)
+    terms, seconds, turned, is_laid = _laid(ends, natural, bounds)
+    is_sure: Flags = np.all(is_laid.reshape(-1, count), axis=1)
     if is_arm:
-        is_sure = is_sure & _is_clear(terms, seconds[..., 0])
-    degrees = np.degrees(turned).tolist()
+        is_sure &= _is_clear(terms.reshape(6, -1, count, joints), seconds.reshape(-1, count))
+    degrees = np.degrees(turned.reshape(-1, count)[:, :to_target].sum(axis=1)).tolist()
     return [each if sure else None for each, sure in zip(degrees, is_sure.tolist(), strict=True)]
 
 
-def _keeps(
-    values: Array, columns: Array, seconds: Array, limits: Sequence[Sequence[JointLimit]], shape: tuple[int, ...]
-) -> Flags:
-    """True for each path all of whose legs keep the limits of their joints at their natural pace, beyond doubt."""
-    low, high, speed, acceleration = (
-        np.array([[getattr(limit, name) for limit in each] for each in limits])[:, None]
-        for name in ("low", "high", "speed", "acceleration")
-    )
-    lowest, highest = values.min(axis=0).reshape(shape), values.max(axis=0).reshape(shape)
-    fastest = np.abs(_SPEEDS @ columns[1:]).max(axis=0).reshape(shape) / (seconds * speed)
-    hardest = np.abs(_CHANGES @ columns[2:]).max(axis=0).reshape(shape) / (seconds**2 * acceleration)
-    keeps = (
-        (fastest < MARGIN - DOUBT)
-        & (hardest < MARGIN * SHARE - DOUBT)
-        & (np.maximum(low - lowest, highest - high) < DOUBT / 2 * (high - low))
-    )
-    return np.asarray(keeps.all(axis=(1, 2)))
+@cache
+def _bounds(parts: tuple[str, ...]) -> Array:
+    """Lowest and highest angles, speeds and accelerations of some parts' joints: 4 x joints."""
+    each = [(limit.low, limit.high, limit.speed, limit.acceleration) for limit in limits_of(parts)]
+    return np.array(each).T
+
+
+def _laid(ends: Array, natural: Array, bounds: Array) -> tuple[Array, Array, Array, Flags]:
+    """Lay legs as `Path` does: each takes its natural time, or as many tenths more as the limits ask for.
+
+    ends: angles and speeds at the start and at the end, bounds: of the joints; both 4 x legs x joints.
+    Returns the terms of each leg, its seconds, how far all joints turn on it, and whether that is beyond doubt.
+    """
+    begin, into, goal, out = ends
+    terms, seconds = np.empty((6, *begin.shape)), natural.copy()
+    turned, is_sure = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.bool_)
+    left = np.arange(len(begin))
+    for stretch in STRETCHES[:TRIES]:
+        taken = natural[left] * stretch
+        way, v, w = goal[left] - begin[left], into[left] * taken[:, None], out[left] * taken[:, None]
+        third, fourth, fifth = 10 * way - 6 * v - 4 * w, 8 * v + 7 * w - 15 * way, 6 * way - 3 * v - 3 * w
+        tried = np.stack((begin[left], v, np.zeros_like(v), third, fourth, fifth))
+        columns = tried.reshape(6, -1)
+        values = (_VALUES @ columns).reshape(-1, *way.shape)
+        excess = _excess(values, columns, taken, bounds[:, left])
+        good = excess < -DOUBT
+        done = left[good]
+        terms[:, done], seconds[done], is_sure[done] = tried[:, good], taken[good], True
+        turned[done] = np.abs(np.diff(values[:, good], axis=0)).sum(axis=(0, 2))
+        left = left[excess > DOUBT]
+        if not left.size:
+            break
+    return terms, seconds, turned, is_sure
+
+
+def _excess(values: Array, columns: Array, seconds: Array, bounds: Array) -> Array:
+    """Excess of each leg over the limits of its joints, as `Path` has it; <= 0: all are kept."""
+    shape, (low, high, fastest, hardest) = values.shape[1:], bounds
+    speed = np.abs(_SPEEDS @ columns[1:]).max(axis=0).reshape(shape) / (seconds[:, None] * fastest)
+    change = np.abs(_CHANGES @ columns[2:]).max(axis=0).reshape(shape)
+    change = change / (seconds[:, None] ** 2 * hardest)
+    outside = np.maximum(low - values.min(axis=0), values.max(axis=0) - high)
+    outside = outside / (high - low) - OUTSIDE
+    worst = np.maximum(np.maximum(speed / MARGIN - 1.0, change / (MARGIN * SHARE) - 1.0), outside)
+    return np.asarray(worst.max(axis=1))
 
 
 def _is_clear(terms: Array, seconds: Array) -> Flags:
-    """True for each path of an arm that stays clear of the table, beyond doubt. seconds: paths x legs."""
+    """True for each path of an arm that stays clear of the table, beyond doubt.
+
+    terms: 6 x paths x legs x joints. seconds: paths x legs.
+    """
     ends = seconds.cumsum(axis=1)
     at = ALONG * ends[:, -1:]
     leg = np.minimum((at[..., None] >= ends[:, None]).sum(axis=2), seconds.shape[1] - 1)

@@ -23,9 +23,12 @@ Array = NDArray[np.float64]
 SHARE = 0.6
 MARGIN = 0.97
 """Share of a limit that sampled peaks may reach: between two samples a peak may be higher."""
+OUTSIDE = 1e-9
+"""Share of a joint's range by which a path may be outside of it."""
 AT_REST = 1e-9
 SAMPLES = np.linspace(0.0, 1.0, 33)
-_STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
+STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
+"""Factors of a leg's natural duration, in the order in which they are tried."""
 
 LEAST: Seconds = 0.02
 """Least time of a leg on which something moves."""
@@ -191,7 +194,7 @@ class _Limits:
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         least = _NOTHINGS if seconds <= 0.0 else ()
-        for each in (*least, *(max(seconds, LEAST) * stretch for stretch in _STRETCHES)):
+        for each in (*least, *(max(seconds, LEAST) * stretch for stretch in STRETCHES)):
             connection = self._with_peaks(_quintic(start, end, each), each)
             if connection.excess <= 0.0:
                 return connection
@@ -208,7 +211,7 @@ class _Limits:
         speed = float(np.max(np.abs(velocity) / self.speed))
         acceleration = float(np.max(np.abs(change) / self.acceleration))
         outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
-        excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - 1e-9)
+        excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - OUTSIDE)
         return _Connection(coefficients, seconds, speed, acceleration, excess)
 
 

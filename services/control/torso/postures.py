@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.world import World
-from engage_hri.services.control.torso import choreography, tracks
+from engage_hri.services.control.torso import choreography
 from engage_hri.services.control.torso.course import Course, Impossible, Situation, angles
 from engage_hri.services.control.torso.estimates import infeasible, is_arm, is_gaze, poses, posture_estimate
 from engage_hri.services.control.torso.moving import Torso
@@ -74,5 +74,5 @@ def _opened(torso: Torso, number: int, item: EstimateItem, here: Situation) -> _
             return None
         start, speeds = tuple(state.q.tolist()), tuple(state.v.tolist())
     legs = course.legs if is_arm(course) else course.legs[:to_target]
-    asked = Asked(start, speeds, legs, to_target, is_arm(course), tracks.limits_of(course.parts))
+    asked = Asked(start, speeds, legs, to_target, is_arm(course), course.parts)
     return _Open(number, course, situation, asked)

@@ -1,6 +1,6 @@
 """Head and arms before each reference: on the target of the one before, or at rest (decision 0024). Pure."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
@@ -21,15 +21,18 @@ class HeadAndArms(Struct, frozen=True):
     def arm(self, arm: str) -> str:
         return dict(self.arms).get(arm, CURRENT_POSE)
 
-    def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "HeadAndArms":
-        """The posture that a gesture at `target` leaves: what it does not use goes home."""
-        if gesture == "none":
-            return self.home_again(motions)
-        arms = dict(self.home_again(motions).arms)
-        if gesture != "directed_gaze_with_pointing":
-            return HeadAndArms(target, tuple(arms.items()))
-        arms[arm_of(motions.point(CURRENT_POSE, target))] = target
-        return HeadAndArms(motions.glance or target, tuple(sorted(arms.items())))
+    def afterwards(self, target: str, motions: Motions) -> Mapping[GestureChoice, "HeadAndArms"]:
+        """The postures that the gestures at `target` leave: what one does not use goes home."""
+        home = self.home_again(motions)
+        looking = HeadAndArms(target, home.arms)
+        moved = {**dict(home.arms), arm_of(motions.point(CURRENT_POSE, target)): target}
+        pointing = HeadAndArms(motions.glance or target, tuple(sorted(moved.items())))
+        return {
+            "none": home,
+            "gaze": looking,
+            "directed_gaze": looking,
+            "directed_gaze_with_pointing": pointing,
+        }
 
     def home_again(self, motions: Motions) -> "HeadAndArms":
         """The posture once all is over that a reference has moved. A glance lasts until the next look."""
