@@ -13,10 +13,13 @@ from engage_hri.services.control.torso.moving import Torso
 from engage_hri.services.control.torso.outlines import Asked, outlines
 from engage_hri.services.runtime.steps import Steps, portions
 
-AT_ONCE = 16
-"""Questions that are worked on between two pauses: about a millisecond."""
-ELEMENTS = 32
-"""Elements that a question counts for (see `steps`)."""
+AT_ONCE = 64
+"""Motions whose outlines are drawn in one go: about a millisecond."""
+ELEMENTS, OF_A_PATH = 24, 256
+"""Elements that a motion counts for (see `steps`), and one whose path has to be laid."""
+
+State = tuple[tuple[float, ...], tuple[float, ...]]
+"""Angles and speeds of joints."""
 
 
 class _Open(Struct, frozen=True):
@@ -33,46 +36,60 @@ def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps
 
     torso: one whose clock stands still.
     """
-    told: list[Estimate] = []
-    for portion in portions(items, AT_ONCE):
-        told += _told(torso, portion, world)
-        yield ELEMENTS * len(portion)
-    return told
-
-
-def _told(torso: Torso, items: Sequence[EstimateItem], world: World) -> list[Estimate]:
+    questions = _Questions(torso, world)
     told: dict[int, Estimate] = {}
     opened: list[_Open] = []
-    here = torso.situation(world)
     for number, item in enumerate(items):
         try:
-            made = _opened(torso, number, item, here)
+            made = questions.opened(number, item)
         except Impossible as impossible:
             told[number] = infeasible(item.behavior, impossible)
         else:
             opened += [made] if made is not None else []
-    for each, degrees in zip(opened, outlines([each.asked for each in opened]), strict=True):
-        if degrees is not None:
-            behavior = items[each.number].behavior
-            told[each.number] = posture_estimate(
-                behavior, each.course, degrees, poses(each.course, each.situation.pose)
-            )
-    return [told.get(number) or torso.estimate(item.behavior, item.pose, world) for number, item in enumerate(items)]
+        yield ELEMENTS
+    for portion in portions(opened, AT_ONCE):
+        for each, degrees in zip(portion, outlines([each.asked for each in portion]), strict=True):
+            if degrees is not None:
+                both = poses(each.course, each.situation.pose)
+                told[each.number] = posture_estimate(items[each.number].behavior, each.course, degrees, both)
+        yield ELEMENTS * len(portion)
+    for number, item in enumerate(items):
+        if number not in told:
+            told[number] = torso.estimate(item.behavior, item.pose, world)
+            yield OF_A_PATH
+    return [told[number] for number in range(len(items))]
 
 
-def _opened(torso: Torso, number: int, item: EstimateItem, here: Situation) -> _Open | None:
-    """Plan a motion; None: only its path says what it comes to. Raises Impossible."""
-    situation = here if item.pose is None else torso.placed(here, item.pose)
-    course = choreography.plan(item.behavior, situation)
-    to_target = next((count for count, leg in enumerate(course.legs, 1) if ("stroke", 1.0) in leg.marks), 0)
-    if not to_target or not (is_gaze(course) or is_arm(course)):
-        return None
-    start, speeds = angles(course.joints, situation.pose), (0.0,) * len(course.joints)
-    if item.pose is None and not torso.misbelieved:
-        state = torso.start(course)
-        if torso.is_carried(course) or state.a.any():
+class _Questions:
+    """Questions of one instant. Where the parts are now is looked up once."""
+
+    def __init__(self, torso: Torso, world: World) -> None:
+        self._torso = torso
+        self._here = torso.situation(world)
+        self._states: dict[tuple[str, ...], State | None] = {}
+
+    def opened(self, number: int, item: EstimateItem) -> _Open | None:
+        """Plan a motion; None: only its path says what it comes to. Raises Impossible."""
+        situation = self._here if item.pose is None else self._torso.placed(self._here, item.pose)
+        course = choreography.plan(item.behavior, situation)
+        to_target = next((count for count, leg in enumerate(course.legs, 1) if ("stroke", 1.0) in leg.marks), 0)
+        if not to_target or not (is_gaze(course) or is_arm(course)):
             return None
-        start, speeds = tuple(state.q.tolist()), tuple(state.v.tolist())
-    legs = course.legs if is_arm(course) else course.legs[:to_target]
-    asked = Asked(start, speeds, legs, to_target, is_arm(course), course.parts)
-    return _Open(number, course, situation, asked)
+        if item.pose is None and not self._torso.misbelieved:
+            state = self._state(course)
+        else:
+            state = angles(course.joints, situation.pose), (0.0,) * len(course.joints)
+        if state is None:
+            return None
+        legs = course.legs if is_arm(course) else course.legs[:to_target]
+        return _Open(number, course, situation, Asked(*state, legs, to_target, is_arm(course), course.parts))
+
+    def _state(self, course: Course) -> State | None:
+        """Angles and speeds of the parts now; None: the trunk carries them, or they are about to change speed."""
+        if self._torso.is_carried(course):
+            return None
+        if course.parts not in self._states:
+            state = self._torso.start(course)
+            plain = None if state.a.any() else (tuple(state.q.tolist()), tuple(state.v.tolist()))
+            self._states[course.parts] = plain
+        return self._states[course.parts]
