@@ -48,7 +48,7 @@ from engage_hri.services.generation.references.motions import (
     onward,
     onward_told,
 )
-from engage_hri.services.generation.references.pairs import ReferenceScene, considered
+from engage_hri.services.generation.references.pairs import ReferenceScene, considered, shown
 from engage_hri.services.generation.references.policy import choose
 from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.generation.references.sequence import Movements
@@ -162,8 +162,9 @@ class BruteForce(Choosing):
 
     def cost(self) -> Seconds:
         scene = self.scene()
+        seems = shown([reference.target for reference in self.references], scene, self.motions)
         tables = [
-            [pair for pair in considered(reference, scene, self.motions, CONFIG)
+            [pair for pair in considered(reference, seems[reference.target], scene, self.motions, CONFIG)
              if not pair.ruled_out and pair.reliability >= reference.minimum_reliability]
             for reference in self.references
         ]  # fmt: skip
@@ -173,7 +174,7 @@ class BruteForce(Choosing):
             total, posture = 0.0, HeadAndArms()
             for reference, pair, each in zip(self.references, sequence, movements, strict=True):
                 total += each.cost(pair, posture)
-                posture = posture.afterwards(reference.target, self.motions)[pair.gesture]
+                posture = posture.afterwards(reference.target, each.arm, self.motions)[pair.gesture]
             least = min(least, total)
         assert math.isclose(least, self.least), f"{least} instead of {self.least}"
         return least

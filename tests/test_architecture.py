@@ -75,8 +75,8 @@ LAYERS = {
     "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
     "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
     " > variability > config",
-    "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline > block head"
-    " > references turns > permits > config",
+    "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"
+    " > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > recognizer > perceive statistics > events > config",
 }

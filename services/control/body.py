@@ -18,9 +18,10 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.runtime.steps import Steps, portions
-from engage_hri.services.runtime.unhurried import SLICE
+from engage_hri.services.runtime.steps import Steps
 
+ELEMENTS = 128
+"""Elements that an estimate counts for (see `runtime.steps`): some four are made between two pauses."""
 AbortMode = Literal["relax", "freeze"]
 Revocation = Literal["relax", "freeze", "taken_over"]
 """How a behavior ends early: by an abort, or since the body gives one of its parts to another behavior."""
@@ -304,15 +305,17 @@ class Body(ABC):
     ) -> Steps[Sequence[Estimate]]:
         """Do what `rehearse` does, as a generator: at each `yield` other work may get its turn.
 
-        Not overridden, a plan is one step, and of behaviors that are each by themselves four are.
+        Not overridden, behaviors that are each by themselves are estimated one by one. A plan is one step, and so are
+        all where `rehearse` is overridden.
+
         items, world, others: as of `rehearse`. All of them stay as they are; where the body is may change meanwhile.
         """
-        if any(item.times for item in items):
+        if type(self).rehearse is not Body.rehearse or any(item.times for item in items):
             return self.rehearse(items, world, others)
         told: list[Estimate] = []
-        for portion in portions(items, 4):
-            told += self.rehearse(portion, world, others)
-            yield SLICE
+        for item in items:
+            told.append(self.estimate(item.behavior, item.pose, world))
+            yield ELEMENTS
         return told
 
     @abstractmethod

@@ -1,6 +1,7 @@
 """Plan of a fragment, pure: phrases are proposed, the body is asked, references are chosen, the block is emitted."""
 
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 
 from msgspec.structs import replace
 
@@ -13,7 +14,7 @@ from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
-from engage_hri.services.generation.references.motions import Motions, onward, onward_told
+from engage_hri.services.generation.references.motions import Motions, NotAsked, onward, onward_told
 from engage_hri.services.generation.references.pairs import ReferenceScene
 from engage_hri.services.generation.references.phrases import proposed
 from engage_hri.services.generation.references.policy import Choices, choice, weigh
@@ -70,7 +71,11 @@ def planning(
             answers = yield onward(ways, motions, permits.only_hand)
             assert answers is not None, "a question is sent its answers"
             motions = onward_told(ways, motions, answers)
-        chosen = yield from choice(tables, scene, motions, config, apart)
+            with suppress(NotAsked):
+                chosen = yield from choice(tables, scene, motions, config, apart)
+                break
+        else:
+            chosen = yield from choice(tables, scene, motions, config, apart)
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
     return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 

@@ -89,23 +89,32 @@ class SimulatedBody(Body):
     def rehearse(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
     ) -> Sequence[Estimate]:
-        return finished(self.rehearse_in_steps(items, world, others))
+        return finished(self._rehearsed(items, world, others))
 
     def rehearse_in_steps(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
     ) -> Steps[Sequence[Estimate]]:
-        clock = Clock(self._loop.time())  # All is answered as of now.
+        if type(self).rehearse is not SimulatedBody.rehearse:  # what a subclass says counts
+            return self.rehearse(items, world, others)
+        return (yield from self._rehearsed(items, world, others))
+
+    def _rehearsed(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem]
+    ) -> Steps[Sequence[Estimate]]:
+        """Estimate all as of now, whatever happens between the steps."""
+        clock, told = Clock(self._loop.time()), dict[int, Estimate]()
+        still, is_mine = beside(self._torso, clock, world), type(self).estimate is SimulatedBody.estimate
         moving = [item for item in items if item.times] if not self._torso.misbelieved else []
-        still = beside(self._torso, Clock(clock.at), world)
-        told: dict[int, Estimate] = {}
         if moving:
-            copy = beside(self._torso, clock, world)
-            told |= zip(map(id, moving), rehearsed(copy, clock, moving, others), strict=True)
-        brief = [item for item in items if item.only == "posture" and id(item) not in told]
+            going = Clock(clock.at)
+            copy = beside(self._torso, going, world)
+            told |= zip(map(id, moving), rehearsed(copy, going, moving, others), strict=True)
+        brief = [item for item in items if is_mine and item.only == "posture" and id(item) not in told]
         told |= zip(map(id, brief), (yield from postures(still, brief, world)), strict=True)
         for item in items:
             if id(item) not in told:
-                told[id(item)] = self._estimate(still, item.behavior, item.pose, world)
+                asked = (item.behavior, item.pose, world)
+                told[id(item)] = self._estimate(still, *asked) if is_mine else self.estimate(*asked)
                 yield ELEMENTS
         return [told[id(item)] for item in items]
 

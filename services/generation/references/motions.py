@@ -28,6 +28,10 @@ class Way(Struct, frozen=True):
     target: str
 
 
+class NotAsked(LookupError):
+    """A motion is needed for which the body has not been asked."""
+
+
 class Motions(Struct, frozen=True):
     """Estimates by (since, target): a head or an arm that is on `since`, CURRENT_POSE or AT_REST, goes to `target`.
 
@@ -41,19 +45,28 @@ class Motions(Struct, frozen=True):
     looks_last: bool = False
 
     def gaze(self, since: str, target: str) -> Estimate:
-        return self.gazes[since, target]
+        """The gaze at `target` from there. Raises NotAsked."""
+        return _known(self.gazes, since, target)
 
     def point(self, since: str, target: str) -> Estimate:
-        return self.points[since, target]
+        """The point at `target` from there. Raises NotAsked."""
+        return _known(self.points, since, target)
 
     def has(self, way: Way) -> bool:
         """True if the body has been asked for this motion."""
         return (way.since, way.target) in (self.gazes if way.part == "head" else self.points)
 
 
+def _known(motions: dict[tuple[str, str], Estimate], since: str, target: str) -> Estimate:
+    try:
+        return motions[since, target]
+    except KeyError:
+        raise NotAsked(f"from {since!r} to {target!r}") from None
+
+
 def arm_of(point: Estimate) -> str:
     """Name of the arm (or arms) that the body would point with."""
-    return "+".join(sorted(point.parts))
+    return point.parts[0] if len(point.parts) == 1 else "+".join(sorted(point.parts))
 
 
 def hand_of(point: Estimate) -> Hand | None:

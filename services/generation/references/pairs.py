@@ -14,8 +14,8 @@ from engage_hri.schemas.world import World
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.distractors import (
     Layout,
-    in_gaze_cone,
-    in_pointing_cylinder,
+    in_gaze_cones,
+    in_pointing_cylinders,
     in_zone,
     laid_out,
 )
@@ -73,18 +73,34 @@ class Pair(Struct, frozen=True, kw_only=True):
         )  # fmt: skip
 
 
+class Shown(Struct, frozen=True):
+    """Ids of the objects that a gaze, and a point, at a target may seem to mean; None: any."""
+
+    gazed: frozenset[str] | None
+    pointed: frozenset[str] | None
+
+
+def shown(targets: Sequence[str], scene: ReferenceScene, motions: Motions) -> dict[str, Shown]:
+    """What gazes and points at the targets may seem to mean."""
+    gazes = {each: ray for each in targets if (ray := motions.gaze(CURRENT_POSE, each).ray) is not None}
+    points = {each: ray for each in targets if (ray := motions.point(CURRENT_POSE, each).ray) is not None}
+    cones = in_gaze_cones(list(gazes.values()), scene.half_angle, scene.layout)
+    cylinders = in_pointing_cylinders(list(points.values()), scene.pointing_radius, scene.layout)
+    gazed, pointed = dict(zip(gazes, cones, strict=True)), dict(zip(points, cylinders, strict=True))
+    return {each: Shown(gazed.get(each), pointed.get(each)) for each in targets}
+
+
 def considered(
-    reference: Reference, scene: ReferenceScene, motions: Motions, config: GenerationConfig
+    reference: Reference, seems: Shown, scene: ReferenceScene, motions: Motions, config: GenerationConfig
 ) -> tuple[Pair, ...]:
-    """The table of a reference: every pair of gesture and phrase (J x S) with its distractors and reliability."""
+    """The table of a reference: every pair of gesture and phrase (J x S) with its distractors and reliability.
+
+    seems: what a gaze and a point at its target may seem to mean.
+    """
     target = reference.target
     universe = scene.universe - {target}
-    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
-    gazed, pointed = universe, universe
-    if gaze.ray is not None:
-        gazed = in_gaze_cone(gaze.ray, scene.half_angle, scene.layout) - {target}
-    if point.ray is not None:
-        pointed = in_pointing_cylinder(point.ray, scene.pointing_radius, scene.layout) - {target}
+    gazed = universe if seems.gazed is None else seems.gazed - {target}
+    pointed = universe if seems.pointed is None else seems.pointed - {target}
     no_gaze, no_point = _obstacles(target, scene, motions)
     said = [
         universe.intersection(option.distractors) if option.text and not option.deictic else universe
@@ -94,11 +110,11 @@ def considered(
     for gesture in GESTURES:
         points = gesture == POINT
         obstacle = "" if gesture == "none" else no_gaze or (no_point if points else "")
-        shown = universe if gesture == "none" else gazed & pointed if points else gazed
+        left = universe if gesture == "none" else gazed & pointed if points else gazed
         channels = {spoken: channel_reliability(gesture, spoken, config) for spoken in ("", "words")}
         for order, option in enumerate(reference.options or ()):
             channel = channels["words" if option.text else ""]
-            distractors = shown & said[order]
+            distractors = left & said[order]
             ruled_out = obstacle
             if option.deictic and not points:
                 ruled_out = "a deictic phrase needs a point"

@@ -13,7 +13,7 @@ from engage_hri.schemas.behaviors import Hand, Reference
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.fragments import PairConsidered, ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, hand_of
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, distinct, hand_of
 from engage_hri.services.generation.references.pairs import (
     POINT,
     ROUNDING,
@@ -23,6 +23,7 @@ from engage_hri.services.generation.references.pairs import (
     below,
     considered,
     deictic_warnings,
+    shown,
 )
 from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.generation.references.sequence import Movements, cheapest
@@ -69,8 +70,10 @@ def weigh(
 ) -> Steps[list[Table]]:
     """The tables of all pairs of each reference. motions: from where the body is."""
     tables = []
+    seems = shown(distinct([reference.target for reference in references]), scene, motions)
+    yield (len(scene.layout.owner) + 64) * len(seems) // 64
     for reference in references:
-        pairs = considered(reference, scene, motions, config)
+        pairs = considered(reference, seems[reference.target], scene, motions, config)
         tables.append(Table(reference, pairs, config))
         yield 3 * len(pairs) + len(scene.universe) // 4
     return tables
@@ -83,7 +86,7 @@ def choice(
     config: GenerationConfig,
     apart: Collection[str] = (),
 ) -> Steps[Choices]:
-    """Do what `choose` does, with tables from `weigh`."""
+    """Do what `choose` does, with tables from `weigh`. Raises NotAsked, too: the body is to be asked for more."""
     best = yield from cheapest(tables, motions, config, apart)
     explained: list[ReferenceChoice] = []
     for table, pair, posture in zip(tables, best.pairs, best.postures, strict=False):

@@ -38,19 +38,22 @@ class Sequel(Struct, frozen=True):
 
 
 class Movements:
-    """What each gesture at a target takes from a posture: each way of head and arm is looked up once."""
+    """What each gesture at a target takes from a posture: each way of head and arm is looked up once.
+
+    arm: the one that points at it.
+    """
 
     def __init__(self, target: str, motions: Motions, config: GenerationConfig) -> None:
         self._target = target
         self._motions = motions
         self._config = config
-        self._arm = arm_of(motions.point(CURRENT_POSE, target))
+        self.arm = arm_of(motions.point(CURRENT_POSE, target))
         self._waiting = config.wait_weight * config.expected_delay
         self._heads: dict[str, tuple[str, Seconds]] = {}
         self._arms: dict[str, tuple[str, Seconds]] = {}
 
     def ways(self, posture: HeadAndArms) -> tuple[Way, Way]:
-        return Way("head", posture.head, self._target), Way("arm", posture.arm(self._arm), self._target)
+        return Way("head", posture.head, self._target), Way("arm", posture.arm(self.arm), self._target)
 
     def hindrance(self, gesture: GestureChoice, posture: HeadAndArms) -> str:
         """Reason why the body cannot make `gesture` from `posture`; empty if it can."""
@@ -79,7 +82,7 @@ class Movements:
         return known
 
     def _point(self, posture: HeadAndArms) -> tuple[str, Seconds]:
-        since = posture.arm(self._arm)
+        since = posture.arm(self.arm)
         if (known := self._arms.get(since)) is None:
             point = self._motions.point(since, self._target)
             known = refusal("point from there", point), self._config.arm_cost(point.arm_degrees)
@@ -108,7 +111,7 @@ def unasked(
         while not onward and (possible := table.candidates(level)):
             level += 1
             for posture in postures:
-                after = posture.afterwards(reference.target, motions)
+                after = posture.afterwards(reference.target, movements.arm, motions)
                 for gesture in possible:
                     if not (is_known[posture] and movements.hindrance(gesture, posture)):
                         onward[after[gesture]] = None
@@ -158,7 +161,7 @@ def _continued(
     preferences = [(pair, pair.preference) for pair in pairs]
     for way in ways:
         posture = way.posture
-        after = posture.afterwards(target, motions)
+        after = posture.afterwards(target, movements.arm, motions)
         for pair, preference in preferences:
             if movements.hindrance(pair.gesture, posture):
                 continue
