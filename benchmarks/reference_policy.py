@@ -37,9 +37,21 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.process import run
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import Motions, collect, distinct, from_each_other, from_here
-from engage_hri.services.generation.references.policy import ReferenceScene, choose, considered, cost
+from engage_hri.services.generation.references.motions import (
+    AT_REST,
+    CURRENT_POSE,
+    Motions,
+    Way,
+    distinct,
+    from_here,
+    from_here_told,
+    onward,
+    onward_told,
+)
+from engage_hri.services.generation.references.pairs import ReferenceScene, considered, shown
+from engage_hri.services.generation.references.policy import choose
 from engage_hri.services.generation.references.posture import HeadAndArms
+from engage_hri.services.generation.references.sequence import Movements
 from engage_hri.services.generation.service import generate
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import running
@@ -93,19 +105,24 @@ class Body:
         self.capabilities = self._body.capabilities
 
     def estimates(self, items: tuple[EstimateItem, ...]) -> tuple[Estimate, ...]:
+        if self._known is None:
+            return tuple(self._body.rehearse(items, self._world))
         return tuple(self._estimate(item) for item in items)
 
     def _estimate(self, item: EstimateItem) -> Estimate:
-        if self._known is None:
-            return self._body.estimate(item.behavior, item.pose, self._world)
+        assert self._known is not None
         question = msgspec.msgpack.encode(item)
         if question not in self._known:
             self._known[question] = self._body.estimate(item.behavior, item.pose, self._world)
         return self._known[question]
 
     def motions(self, sequence: list[str]) -> Motions:
-        here = self.estimates(from_here(distinct(sequence)))
-        return collect(sequence, here, self.estimates(from_each_other(sequence, here)))
+        """All motions between the targets, and from rest."""
+        targets = distinct(sequence)
+        here = from_here_told(targets, self.estimates(from_here(targets)))
+        ways = [Way("head", since, target) for target in targets for since in (AT_REST, *targets)]
+        ways += [Way("arm", way.since, way.target) for way in ways if here.point(CURRENT_POSE, way.target).feasible]
+        return onward_told(ways, here, self.estimates(onward(ways, here)))
 
 
 class Choosing:
@@ -145,17 +162,19 @@ class BruteForce(Choosing):
 
     def cost(self) -> Seconds:
         scene = self.scene()
+        seems = shown([reference.target for reference in self.references], scene, self.motions)
         tables = [
-            [pair for pair in considered(reference, scene, self.motions, CONFIG)
+            [pair for pair in considered(reference, seems[reference.target], scene, self.motions, CONFIG)
              if not pair.ruled_out and pair.reliability >= reference.minimum_reliability]
             for reference in self.references
         ]  # fmt: skip
+        movements = [Movements(reference.target, self.motions, CONFIG) for reference in self.references]
         least = math.inf
         for sequence in itertools.product(*tables):
             total, posture = 0.0, HeadAndArms()
-            for reference, pair in zip(self.references, sequence, strict=True):
-                total += cost(pair, reference.target, posture, self.motions, CONFIG)
-                posture = posture.after(pair.gesture, reference.target, self.motions)
+            for reference, pair, each in zip(self.references, sequence, movements, strict=True):
+                total += each.cost(pair, posture)
+                posture = posture.afterwards(reference.target, each.arm, self.motions)[pair.gesture]
             least = min(least, total)
         assert math.isclose(least, self.least), f"{least} instead of {self.least}"
         return least

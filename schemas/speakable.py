@@ -8,6 +8,7 @@ not found, only places at which a text can be cut without cutting a syllable in 
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 Script = Literal["spaced", "ideographs", "kana", "clusters"]
@@ -78,6 +79,7 @@ def has_words(text: str) -> bool:
     return any(map(str.isalnum, text))
 
 
+@lru_cache(1024)  # the same few phrases again and again
 def word_count(text: str) -> float:
     """Length of a text, in words of a script with spaces."""
     said = [token for token in tokens(text) if token.letters]

@@ -32,7 +32,7 @@ PURE_MACHINERY = {
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
-    "services/runtime/publisher.py", "services/client/chunking.py",
+    "services/runtime/publisher.py", "services/runtime/steps.py", "services/client/chunking.py",
     "services/client/event_stream.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
@@ -46,11 +46,11 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
-    "services/bus": "memory zenoh > interface payloads > config journal keyring",
+    "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
     "services/control": "service > drivers > torso > composed ordinary voice > shown"
     " > actions estimates refusals switching unheard waiting > live > body > variability > config",
-    "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
-    " > references turns > permits > config",
+    "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"
+    " > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > recognizer > perceive statistics > events > config",
 }

@@ -10,9 +10,9 @@ import platform
 import time
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Coroutine, Iterable, Iterator
 from enum import Enum, auto
-from typing import Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from msgspec import Struct
 
@@ -185,7 +185,7 @@ class Subscription(Reading[Received]):
             self._wake()
 
 
-Answer = Callable[[Message], Message]
+Answer = Callable[[Message], Message | Coroutine[Any, Any, Message]]
 
 
 class Bus(ABC):
@@ -302,9 +302,9 @@ class Bus(ABC):
 
     @abstractmethod
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
-        """Serve an `rpc` key for the life of this bus. `answer` is quick and pure; an EngageError becomes a Fault.
+        """Serve an `rpc` key for the life of this bus. `answer` changes nothing; an EngageError becomes a Fault.
 
-        empty: the question that a query without payload is, as programs that know only Zenoh send it.
+        answer: a coroutine if it takes long. empty: the question of a query without payload, as from plain Zenoh.
         """
 
     @abstractmethod

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import deque
+from collections.abc import Coroutine
 from itertools import count
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
+from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.interface import Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
 
@@ -201,10 +203,15 @@ class MemoryBus(Bus):
         super().__init__(hub.robot, name, role, "loop", run, count(1))
         self.is_alive = False
         self.answers: dict[str, Answer] = {}
+        self.under_way = Answering()
         self._hub = hub
         self._subscriptions: dict[Subscription, int] = {}
         """Subscriptions, and the number of the last message that was replayed to each."""
         self._overflowed = 0
+
+    @property
+    def is_there(self) -> bool:
+        return not self._gone
 
     @property
     def health(self) -> BusHealth:
@@ -251,15 +258,32 @@ class MemoryBus(Bus):
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         await asyncio.sleep(0)
-        server = None if self._gone else await self._hub.answerer(key, self.name, self.now() + timeout)
-        if server is None:
-            raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
-        answer = server.answers[key]
+        deadline = self.now() + timeout
+        while not self._gone and (server := await self._hub.answerer(key, self.name, deadline)) is not None:
+            task: asyncio.Task[Message] | None = None
+            try:
+                told = server.answers[key](self._hub.carried(message))
+                if not isinstance(told, Coroutine):
+                    return self._hub.carried(told)
+                task = server.under_way.begin(told, key)
+            except EngageError as error:
+                raise InputRefused(error.fault) from error
+            except (Exception, asyncio.CancelledError) as error:  # nothing was awaited: it is the server's mistake
+                raise InputRefused(server.failed(error, f"a question on {key}")) from error
+            await asyncio.wait([task], timeout=max(deadline - self.now(), 0.0))
+            if not task.done():
+                break
+            if server.is_there:
+                return self._answer_of(task, server, key)
+        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+
+    def _answer_of(self, task: "asyncio.Task[Message]", server: "MemoryBus", key: str) -> Message:
+        """The answer that a server has given in steps. Raises InputRefused."""
         try:
-            return self._hub.carried(answer(self._hub.carried(message)))
+            return self._hub.carried(task.result())
         except EngageError as error:
             raise InputRefused(error.fault) from error
-        except (Exception, asyncio.CancelledError) as error:  # nothing is awaited here: it is the server's mistake
+        except (Exception, asyncio.CancelledError) as error:
             raise InputRefused(server.failed(error, f"a question on {key}")) from error
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
@@ -280,6 +304,7 @@ class MemoryBus(Bus):
         if self._gone:
             return
         self._gone = True
+        self.under_way.end()
         self._subscriptions.clear()
         self._hub.forget(self.name)
         if self.is_alive:

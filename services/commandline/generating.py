@@ -36,9 +36,9 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     from engage_hri.services.control.drivers import made
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.generation.head.inhibitions import Leases
-    from engage_hri.services.generation.pipeline import glance, plan, targets
+    from engage_hri.services.generation.pipeline import glance, planned, planning, targets
     from engage_hri.services.generation.references.discourse import NO_DISCOURSE
-    from engage_hri.services.generation.references.motions import collect, distinct, from_each_other, from_here
+    from engage_hri.services.generation.references.motions import distinct, from_here, from_here_told
     from engage_hri.services.generation.references.policy import Unreferable
     from engage_hri.services.generation.turns.policy import TurnPolicy
 
@@ -46,8 +46,8 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     permits = Leases(config.generation).permits()
     turns = TurnPolicy(config.robot, config.generation)
 
-    def estimated(items: Sequence[EstimateItem]) -> list[Estimate]:
-        return [body.estimate(item.behavior, item.pose, world) for item in items]
+    def estimated(items: Sequence[EstimateItem]) -> Sequence[Estimate]:
+        return body.rehearse(items, world)
 
     plans = []
     discourse = NO_DISCOURSE
@@ -57,19 +57,28 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
             continue
         fragment = checked(each, world, config.robot)
         turn = turns.accept(fragment, fragment.addressee)
-        sequence = targets(fragment)
+        sequence = distinct(targets(fragment))
         glanced = glance(fragment, turn, config.generation)
-        here = estimated(from_here(distinct(sequence), permits.only_hand, glance=glanced))
-        onward = estimated(from_each_other(sequence, here, permits.only_hand, glanced))
-        motions = collect(sequence, here, onward, glanced)
+        here = estimated(from_here(sequence, permits.only_hand, glance=glanced))
+        motions = from_here_told(sequence, here, glanced)
         try:
             if not turn.backchannel:
                 discourse = discourse.in_turn(turn.turn, turn.addressee)
-            planned = plan(
-                fragment, turn, world, body.capabilities, motions, permits, config.generation, discourse=discourse
+            emitted = planned(
+                planning(
+                    fragment,
+                    turn,
+                    world,
+                    body.capabilities,
+                    motions,
+                    permits,
+                    config.generation,
+                    discourse=discourse,
+                ),
+                estimated,
             )
-            discourse = discourse.naming(fragment.id, [mention.object for mention in planned.mentions])
-            plans.append(planned)
+            discourse = discourse.naming(fragment.id, [mention.object for mention in emitted.mentions])
+            plans.append(emitted)
         except Unreferable as error:
             where = f"{source}: {fragment.id}: {error.fault.where}"
             fault = replace(error.fault, where=where, line=_line(fragment, error.fault.where))

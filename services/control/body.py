@@ -19,10 +19,13 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.runtime.steps import Steps
 
 if TYPE_CHECKING:
     from engage_hri.services.control.config import ControlConfig
 
+ELEMENTS = 128
+"""Elements that an estimate counts for (see `runtime.steps`): some four are made between two pauses."""
 AbortMode = Literal["relax", "freeze"]
 Revocation = Literal["relax", "freeze", "taken_over"]
 """How a behavior ends early: by an abort, or since the body gives one of its parts to another behavior."""
@@ -309,6 +312,24 @@ class Body(ABC):
         world: the entities that targets name, in metres.
         """
         return [self.estimate(item.behavior, item.pose, world) for item in items]
+
+    def rehearse_in_steps(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Steps[Sequence[Estimate]]:
+        """Do what `rehearse` does, as a generator: at each `yield` other work may get its turn.
+
+        Not overridden, behaviors that are each by themselves are estimated one by one. A plan is one step, and so are
+        all where `rehearse` is overridden.
+
+        items, world, others: as of `rehearse`. All of them stay as they are; where the body is may change meanwhile.
+        """
+        if type(self).rehearse is not Body.rehearse or any(item.times for item in items):
+            return self.rehearse(items, world, others)
+        told: list[Estimate] = []
+        for item in items:
+            told.append(self.estimate(item.behavior, item.pose, world))
+            yield ELEMENTS
+        return told
 
     @abstractmethod
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

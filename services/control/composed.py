@@ -26,6 +26,7 @@ from engage_hri.services.control.body import (
     Progress,
 )
 from engage_hri.services.control.refusals import unsupported
+from engage_hri.services.runtime.steps import Steps, finished
 
 GAZE_PART, LIPS_PART, VOICE_PART = "head", "face", "voice"
 """Parts whose owner tells the gaze axis, has the lips, and says what is being said."""
@@ -112,6 +113,11 @@ class ComposedBody(Body):
     def rehearse(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
     ) -> Sequence[Estimate]:
+        return finished(self.rehearse_in_steps(items, world, others))
+
+    def rehearse_in_steps(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Steps[Sequence[Estimate]]:
         told: dict[int, Estimate] = {}
         owners = [self._owner(item.behavior, item.pose, world) for item in items]
         whose = [self._owner(item.behavior, item.pose, world) for item in others]
@@ -119,7 +125,9 @@ class ComposedBody(Body):
             mine = [number for number, owner in enumerate(owners) if owner is member]
             beside = [item for item, owner in zip(others, whose, strict=True) if owner is member]
             if mine:
-                estimates = member.body.rehearse([items[number] for number in mine], world, beside)
+                estimates = yield from member.body.rehearse_in_steps(
+                    [items[number] for number in mine], world, beside
+                )
                 told |= dict(zip(mine, (_within(member, each) for each in estimates), strict=True))
         for number, owner in enumerate(owners):
             if owner is None:

@@ -1,7 +1,9 @@
 """The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
+from collections.abc import Coroutine
 from contextlib import aclosing, nullcontext
+from typing import Any
 
 from msgspec.structs import replace
 
@@ -54,6 +56,8 @@ from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.control.variability import Deviations, is_lost
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.steps import Steps
+from engage_hri.services.runtime.unhurried import InTurns
 
 
 async def embody(
@@ -107,6 +111,7 @@ class _Control:
         self._config = config
         self._body = body
         self._estimates = IncomingEstimates(bus)
+        self._rehearsals = InTurns()
         self._tasks = tasks
         self._actions = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
@@ -120,13 +125,17 @@ class _Control:
 
     # -- reads --------------------------------------------------------------------------------------------------
 
-    def estimate(self, question: Message) -> Message:
+    def estimate(self, question: Message) -> Message | Coroutine[Any, Any, Message]:
         if not isinstance(question, EstimateBehaviors):
             raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
+        return self._rehearsals.answer(self._estimated(question, self._world))
+
+    def _estimated(self, question: EstimateBehaviors, world: World) -> Steps[Message]:
         refused = [self._refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
         others = [item for item in question.others if self._refused(item.behavior) is None]
-        estimates = iter(self._estimates.take(known, self._body.rehearse(known, self._world, others)))
+        told = yield from self._body.rehearse_in_steps(known, world, others)
+        estimates = iter(self._estimates.take(known, told))
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def _refused(self, behavior: BlockBehavior) -> Estimate | None:

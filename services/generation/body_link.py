@@ -1,5 +1,6 @@
 """Questions of generation to the body: its capabilities, and the costs of the motions that references need."""
 
+import asyncio
 from collections.abc import Sequence
 
 from engage_hri.schemas import keys
@@ -9,15 +10,17 @@ from engage_hri.schemas.faults import Fault, NoReply, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.generation.block.emission import FragmentPlan
+from engage_hri.services.generation.pipeline import Planning
 from engage_hri.services.generation.references.motions import (
     Motions,
-    collect,
     distinct,
-    from_each_other,
     from_here,
+    from_here_told,
     last_motions,
     pose_after,
 )
+from engage_hri.services.runtime.unhurried import SLICE
 
 
 class BodyLink:
@@ -38,7 +41,7 @@ class BodyLink:
     async def motions(
         self, sequence: Sequence[str], hand: Hand | None, moving: Sequence[BlockBehavior] = (), glance: str = ""
     ) -> Motions:
-        """Costs, rays and poses of all that references to the `sequence` of targets could need.
+        """Costs, rays and poses of a look and a point at each target of the `sequence`, from where the body is.
 
         hand: the only one allowed; None: either. moving: gazes and points under way, in order; they will be on target
         before the references begin. glance: see `Motions`. Raises NoReply without a body.
@@ -51,9 +54,27 @@ class BodyLink:
                 self.capabilities = described
         last = last_motions(moving)
         pose = pose_after(last, await self._estimates(last))
-        here = await self._estimates(from_here(distinct(sequence), hand, pose, glance))
-        onward = await self._estimates(from_each_other(sequence, here, hand, glance))
-        return collect(sequence, here, onward, glance)
+        each = distinct(sequence)
+        return from_here_told(each, await self._estimates(from_here(each, hand, pose, glance)), glance)
+
+    async def planned(self, planning: Planning) -> FragmentPlan:
+        """The plan that is being made, a slice at a time; its questions go to the body. Raises as they do."""
+        told: Sequence[Estimate] | None = None
+        done = 0
+        try:
+            while True:
+                asked = planning.send(told)
+                told = None
+                if not isinstance(asked, int):
+                    told, done = await self._estimates(asked), 0
+                elif (done := done + asked) >= SLICE:
+                    done = 0
+                    await asyncio.sleep(0)
+        except StopIteration as end:
+            plan: FragmentPlan = end.value
+            return plan
+        finally:
+            planning.close()
 
     async def _estimates(self, items: tuple[EstimateItem, ...]) -> tuple[Estimate, ...]:
         if not items:

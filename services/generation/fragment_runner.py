@@ -24,7 +24,7 @@ from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import glance, plan, targets
+from engage_hri.services.generation.pipeline import glance, planning, targets
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
@@ -239,8 +239,14 @@ class FragmentRunner:
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
                 before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
-                heard = self._heard_in(turn)
-                made = plan(fragment, turn, self._world, body, motions, permits(), self._config, before, heard)
+                heard, permitted, config = self._heard_in(turn), permits(), self._config
+                made = await self._body.planned(
+                    planning(fragment, turn, self._world, body, motions, permitted, config, before, heard)
+                )
+                if performance.is_over:  # cancelled meanwhile
+                    return None
+                if permits() != permitted:
+                    continue  # what was inhibited meanwhile is not begun
                 performance.begin(made)
                 try:
                     pending = await self._send_block(performance, followed)

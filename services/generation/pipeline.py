@@ -1,11 +1,12 @@
-"""Plan of a fragment, made in one pure step: phrases are proposed, references are chosen, the block is emitted."""
+"""Plan of a fragment, pure: phrases are proposed, the body is asked, references are chosen, the block is emitted."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference
-from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.body import Capabilities, Estimate, EstimateItem
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.block.emission import Emission, FragmentPlan
@@ -13,12 +14,17 @@ from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
-from engage_hri.services.generation.references.motions import Motions
+from engage_hri.services.generation.references.motions import Motions, NotAsked, onward, onward_told
+from engage_hri.services.generation.references.pairs import ReferenceScene
 from engage_hri.services.generation.references.phrases import proposed
-from engage_hri.services.generation.references.policy import Choices, ReferenceScene, choose
+from engage_hri.services.generation.references.policy import Choices, choice, weigh
 from engage_hri.services.generation.references.posture import references_apart
+from engage_hri.services.generation.references.sequence import unasked
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
+
+Planning = Generator[int | tuple[EstimateItem, ...], Sequence[Estimate] | None, FragmentPlan]
+"""The making of a plan, in steps (see `runtime.steps`) and questions to the body, which are sent the answers."""
 
 
 def references(fragment: TurnFragment) -> tuple[Reference, ...]:
@@ -37,7 +43,7 @@ def glance(fragment: TurnFragment, turn: TurnPlan, config: GenerationConfig) -> 
     return turn.addressee if config.profile == "check-back" and len(references(fragment)) > 1 else ""
 
 
-def plan(
+def planning(
     fragment: TurnFragment,
     turn: TurnPlan,
     world: World,
@@ -47,11 +53,11 @@ def plan(
     config: GenerationConfig,
     before: Continuation = NO_CONTINUATION,
     discourse: Discourse = NO_DISCOURSE,
-) -> FragmentPlan:
+) -> Planning:
     """Plan the block of a checked fragment. Raises RunFailed where a reference cannot be made at all.
 
-    body, motions: needed for references only. before: continuation of the turn's blocks under way. discourse: what
-    was referred to before this fragment.
+    body, motions: needed for references only; at least those motions that start where the body is. before:
+    continuation of the turn's blocks under way. discourse: what was referred to before this fragment.
     """
     chosen = Choices()
     order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
@@ -59,9 +65,31 @@ def plan(
     made = proposed(references(fragment), world, config, discourse)
     if made.references:
         motions = replace(motions, looks_last=config.profile == "figure-3.3")
-        chosen = choose(made.references, _scene(world, body, permits, config), motions, config, apart)
+        scene = _scene(world, body, permits, config)
+        tables = yield from weigh(made.references, scene, motions, config)
+        while ways := unasked(tables, motions, config, apart):
+            answers = yield onward(ways, motions, permits.only_hand)
+            assert answers is not None, "a question is sent its answers"
+            motions = onward_told(ways, motions, answers)
+            with suppress(NotAsked):
+                chosen = yield from choice(tables, scene, motions, config, apart)
+                break
+        else:
+            chosen = yield from choice(tables, scene, motions, config, apart)
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
     return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
+
+
+def planned(planning: Planning, answers: Callable[[tuple[EstimateItem, ...]], Sequence[Estimate]]) -> FragmentPlan:
+    """The plan, made in one go. answers: asks the body."""
+    told: Sequence[Estimate] | None = None
+    while True:
+        try:
+            asked = planning.send(told)
+        except StopIteration as end:
+            plan: FragmentPlan = end.value
+            return plan
+        told = None if isinstance(asked, int) else answers(asked)
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> ReferenceScene:

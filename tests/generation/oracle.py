@@ -14,7 +14,7 @@ from typing import NamedTuple
 from engage_hri.schemas.behaviors import Reference
 from engage_hri.services.generation.config import Channel
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
-from engage_hri.services.generation.references.policy import ReferenceScene
+from engage_hri.services.generation.references.pairs import ReferenceScene
 from tests.generation.tables import body, flat_world, scene
 
 HEAD, ARM, WORD, WAIT = 6, 10, 210, 180

@@ -1,14 +1,17 @@
 """Worlds and bodies as tables of numbers: distractors and degrees are what a test says they are."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from engage_hri.schemas.behaviors import Reference, SpeechOption
-from engage_hri.schemas.body import Estimate, Ray
+from engage_hri.schemas.body import Estimate, EstimateItem, Ray
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.block.emission import FragmentPlan
+from engage_hri.services.generation.pipeline import planned, planning
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
-from engage_hri.services.generation.references.policy import ReferenceScene
+from engage_hri.services.generation.references.pairs import ReferenceScene
 
 TANGRAMS = (
     "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",
@@ -16,6 +19,15 @@ TANGRAMS = (
 )  # fmt: skip
 HEIGHT = 1000.0
 """Of eyes and hands above the table, each right above what it is on: rays are parallel, cones are circles."""
+
+
+def plan(*arguments: Any, **named: Any) -> FragmentPlan:
+    """Plan a fragment with a body that is known in full."""
+
+    def asked(items: Sequence[EstimateItem]) -> Sequence[Estimate]:
+        raise AssertionError(f"the motions are incomplete: {items}")
+
+    return planned(planning(*arguments, **named), asked)
 
 
 def flat_world(places: Mapping[str, tuple[float, float]]) -> World:

@@ -9,10 +9,10 @@ from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import checked
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import plan, targets
+from engage_hri.services.generation.pipeline import targets
 from engage_hri.services.generation.turns.policy import plan_turn
 from tests.generation.emitted import POINT, by_id, lines
-from tests.generation.tables import TANGRAMS, body, flat_world, scene
+from tests.generation.tables import TANGRAMS, body, flat_world, plan, scene
 
 
 def others(target: str) -> str:

@@ -12,11 +12,10 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import plan
 from engage_hri.services.generation.references.phrases import Proposals, proposed
 from engage_hri.services.generation.turns.policy import plan_turn
 from engage_hri.services.tangram.table import tangram_table
-from tests.generation.tables import body
+from tests.generation.tables import body, plan
 
 SMALL, BIG = 0.02, 0.04
 CONFIG = GenerationConfig()

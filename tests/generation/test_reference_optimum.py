@@ -9,7 +9,8 @@ from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE
-from engage_hri.services.generation.references.policy import GESTURES, Choices, choose
+from engage_hri.services.generation.references.pairs import GESTURES
+from engage_hri.services.generation.references.policy import Choices, choose
 from tests.generation.oracle import Best, Problem, optimum, optimum_by_gestures
 from tests.generation.tables import option, refer
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from engage_hri.services.realizer.plan.instants import Classes, instants
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import finished
 
 POINTS = [Point("b", f"p{number}") for number in range(7)]
 Graph = dict[Point, dict[Point, tuple[float, int]]]

@@ -6,8 +6,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Gesture, Speech
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Relations, Term
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import finished
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.stage import block
 

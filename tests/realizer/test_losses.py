@@ -18,8 +18,8 @@ from engage_hri.services.realizer.plan.known import Holder, Known, qualified
 from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Order, Relations, Term
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import finished
 from tests.realizer.oracle import SEVEN, estimate, phases_of, points_of, relaxed
 from tests.realizer.way_round import closed, read
 

@@ -19,8 +19,8 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.speaking_order import SpeakingOrder
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.runtime.steps import finished
 from tests.realizer.oracle import consult, estimate, relaxed
 
 DEPENDENTS = (

@@ -15,8 +15,8 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import Equal, Term
 from engage_hri.services.realizer.plan.schedule import Solution
-from engage_hri.services.realizer.plan.steps import Steps, finished
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.runtime.steps import Steps, finished
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, OTHER, SPEECH, at, plan, timed, warnings
 from tests.realizer.stage import after, block, together

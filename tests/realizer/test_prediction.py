@@ -6,7 +6,7 @@ import pytest
 
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
-from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.runtime.steps import finished
 
 
 def net(size: int, places: tuple[Place, ...], bounds: tuple[Bound, ...] = ()) -> PetriNet:

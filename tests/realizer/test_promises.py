@@ -9,8 +9,8 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import Relations, relation_steps
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import finished
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, before, block, stage, together

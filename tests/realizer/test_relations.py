@@ -34,8 +34,8 @@ from engage_hri.services.realizer.plan.relations import (
     needing,
     relation_steps,
 )
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import finished
 
 
 class Ref(NamedTuple):

@@ -12,8 +12,8 @@ from engage_hri.schemas.body import Phase
 from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.remaining import remaining, untied
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import finished
 from tests.realizer.oracle import estimate
 
 IDS = "abcd"

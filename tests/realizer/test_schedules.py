@@ -17,7 +17,7 @@ from engage_hri.services.realizer.plan.cycles import components
 from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.prediction import Foresight, Impossible, predict
 from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, critical_path, solve
-from engage_hri.services.realizer.plan.steps import finished
+from engage_hri.services.runtime.steps import finished
 
 QUARTERS = st.integers(-8, 8).map(lambda each: each / 4)
 Arcs = Iterable[tuple[int, int, float]]

@@ -16,12 +16,12 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.planning import SLICE, unhurried
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block, plan_steps
 from engage_hri.services.realizer.plan.relations import BlockRefused
-from engage_hri.services.realizer.plan.steps import Steps, finished, portions
+from engage_hri.services.runtime.steps import Steps, finished, portions
+from engage_hri.services.runtime.unhurried import SLICE, unhurried
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
 from tests.realizer.stage import Stage, block, stage, together

@@ -21,9 +21,10 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
 from engage_hri.services.bus.keyring import Keys
+from engage_hri.services.bus.zenoh.answers import Answers
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.expiry import Expiry
-from engage_hri.services.bus.zenoh.history import History, finish, form_asked, in_form, pack, refuse
+from engage_hri.services.bus.zenoh.history import History, pack
 from engage_hri.services.bus.zenoh.links import Links
 from engage_hri.services.bus.zenoh.order import Envelope, SentLog
 from engage_hri.services.bus.zenoh.own_clock import own_clock
@@ -250,7 +251,7 @@ class ZenohBus(Bus):
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
         self._subscriptions: list[Subscription] = []
-        self._answers: list[Any] = []
+        self._answers = Answers(self, hub.session, hub.bridge, hub.run)
         self._overflowed = 0
         self._token: Any = None
 
@@ -342,25 +343,7 @@ class ZenohBus(Bus):
         return answered.result()
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
-        def reply(query: zenoh.Query) -> None:
-            form = "json"
-            try:
-                form = form_asked(query)
-                asked = query.payload.to_bytes() if query.payload else b""
-                question = empty if empty is not None and not asked else decode(asked, str(query.encoding))
-                payload, encoding = in_form(answer(question), form)
-                query.reply(key, payload, encoding=encoding)
-            except EngageError as error:
-                refuse(query, error.fault, form)
-            except (Exception, asyncio.CancelledError) as error:
-                refuse(query, self.failed(error, f"a question on {key}"), form)
-            finally:
-                finish(query)
-
-        session = self._hub.session
-        self._answers.append(session.declare_queryable(key, self._hub.bridge.questions(reply)))
-        # A participant that asked too early learns from this token that it may ask again.
-        self._answers.append(session.liveliness().declare_token(keys.own(self._hub.run, f"answers/{key}")))
+        self._answers.serve(key, answer, empty)
 
     def declare_alive(self) -> None:
         if self._token is None and not self._gone:
@@ -374,8 +357,7 @@ class ZenohBus(Bus):
         self._gone = True
         for subscription in list(self._subscriptions):
             subscription.close()
-        for declared in reversed(self._answers):
-            declared.undeclare()
+        self._answers.close()
         if self._token is not None:
             self._token.undeclare()
             self._hub.peers.note(self.name, self._hub.run, False)

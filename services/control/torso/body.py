@@ -37,6 +37,7 @@ from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
+from engage_hri.services.control.torso.postures import postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire, extended
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
@@ -45,9 +46,12 @@ from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.waiting import Bell
+from engage_hri.services.runtime.steps import Steps, finished
 
 FAULTS = tuple(KINDS)
 """Kinds of faults that it can play: all that have a name."""
+ELEMENTS = 256
+"""Elements that an estimate with a path counts for (see `steps`)."""
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
@@ -85,25 +89,49 @@ class SimulatedBody(Body):
     # -- the contract -------------------------------------------------------------------------------------------
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        return self._estimate(self._torso, behavior, pose, world)
+
+    def _estimate(self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         match behavior:
             case Speech() if self._deviations.of("voiceless"):
                 return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute"))
             case Speech(text=text):
-                return speech_estimate(behavior, utter(text), self._torso.pose(world, pose))
+                return speech_estimate(behavior, utter(text), torso.pose(world, pose))
             case Wait(duration=duration):
-                return wait_estimate(behavior, duration or 0.0, self._torso.pose(world, pose))
-        return self._torso.estimate(behavior, pose, world)
+                return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
+        return torso.estimate(behavior, pose, world)
 
     def rehearse(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
     ) -> Sequence[Estimate]:
-        moving = [item for item in items if item.times]
-        if self._torso.misbelieved or not moving:
-            return super().rehearse(items, world, others)
-        clock = Clock(self._loop.time())
-        copy = beside(self._torso, clock, world)
-        told = dict(zip(map(id, moving), rehearsed(copy, clock, moving, others), strict=True))
-        return [told.get(id(item)) or self.estimate(item.behavior, item.pose, world) for item in items]
+        return finished(self._rehearsed(items, world, others))
+
+    def rehearse_in_steps(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Steps[Sequence[Estimate]]:
+        if type(self).rehearse is not SimulatedBody.rehearse:  # what a subclass says counts
+            return self.rehearse(items, world, others)
+        return (yield from self._rehearsed(items, world, others))
+
+    def _rehearsed(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem]
+    ) -> Steps[Sequence[Estimate]]:
+        """Estimate all as of now, whatever happens between the steps."""
+        clock, told = Clock(self._loop.time()), dict[int, Estimate]()
+        still, is_mine = beside(self._torso, clock, world), type(self).estimate is SimulatedBody.estimate
+        moving = [item for item in items if item.times] if not self._torso.misbelieved else []
+        if moving:
+            going = Clock(clock.at)
+            copy = beside(self._torso, going, world)
+            told |= zip(map(id, moving), rehearsed(copy, going, moving, others), strict=True)
+        brief = [item for item in items if is_mine and item.only == "posture" and id(item) not in told]
+        told |= zip(map(id, brief), (yield from postures(still, brief, world)), strict=True)
+        for item in items:
+            if id(item) not in told:
+                asked = (item.behavior, item.pose, world)
+                told[id(item)] = self._estimate(still, *asked) if is_mine else self.estimate(*asked)
+                yield ELEMENTS
+        return [told[id(item)] for item in items]
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         match behavior:

@@ -6,12 +6,14 @@ from itertools import pairwise
 from math import inf
 
 import numpy as np
+from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Degrees, Seconds
+from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.course import Course, CoursePoint, Impossible
 from engage_hri.services.control.torso.motion import SLOWEST
 from engage_hri.services.control.torso.path import Array, Path
@@ -55,23 +57,44 @@ def motion_estimate(
 
     added: what the trunk adds to the path, if it moves.
     """
-    is_gaze, is_arm = course.parts == ("head",), course.parts[0].endswith("_arm")
     degrees = 0.0
-    if is_gaze or is_arm:
+    if is_gaze(course) or is_arm(course):
         until = path.marks.get("stroke", path.length)
         degrees = math.degrees(path.travel(until) if added is None else _travel(path, until, added))
+    phases = _phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake)
+    return replace(posture_estimate(behavior, course, degrees, (pose, pose_end)), phases=phases)
+
+
+def posture_estimate(
+    behavior: BlockBehavior, course: Course, degrees: Degrees, poses: tuple[BodyPose, BodyPose]
+) -> Estimate:
+    """Estimate a behavior without phases. degrees: of head or arm, to the target. poses: on target, at the end."""
     return Estimate(
         behavior=behavior.id,
         feasible=True,
         degraded=course.note,
         parts=("head",) if course.parts == ("nod",) else course.parts,
-        phases=_phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake),
-        head_degrees=degrees if is_gaze else 0.0,
-        arm_degrees=degrees if is_arm else 0.0,
+        head_degrees=degrees if is_gaze(course) else 0.0,
+        arm_degrees=degrees if is_arm(course) else 0.0,
         ray=course.ray,
-        pose_after=pose,
-        pose_end=pose_end,
+        pose_after=poses[0],
+        pose_end=poses[1],
     )
+
+
+def is_gaze(course: Course) -> bool:
+    return course.parts == ("head",)
+
+
+def is_arm(course: Course) -> bool:
+    return course.parts[0].endswith("_arm")
+
+
+def poses(course: Course, pose: Mapping[str, float]) -> tuple[BodyPose, BodyPose]:
+    """Poses of all joints on target and at the end. pose: at the start, with the trunk where it is going to be."""
+    # A nod is on top of the gaze, and leaves the neck where that has it.
+    moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
+    return kinematics.pose_message({**pose, **course.on_target}), kinematics.pose_message({**pose, **dict(moved)})
 
 
 def _travel(path: Path, until: Seconds, added: Added) -> float:

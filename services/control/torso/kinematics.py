@@ -7,14 +7,18 @@ hanging down, forward positive; the elbow flexes the forearm forward, so that an
 
 import math
 from collections.abc import Iterable, Mapping
+from functools import cache, lru_cache
 from math import atan2, cos, hypot, radians, sin
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
 from engage_hri.schemas.body import BodyPose, JointAngle, JointLimit, Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
 
+Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 Pose = Mapping[str, float]
 """Angle of each joint; radians, of the face a share of the way, 0 at rest."""
@@ -106,6 +110,7 @@ class ArmAim(Struct, frozen=True):
     """Angles a little later, still on target."""
 
 
+@cache
 def joints_of(part: str) -> tuple[str, ...]:
     return tuple(limit.joint for limit in JOINTS if limit.part == part)
 
@@ -169,10 +174,20 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
 
     radius: of what is pointed at. Raises Unreachable.
     """
+    aim = _aim(side, target, radius, pose["torso_turn"], pose["torso_lean"])
+    if isinstance(aim, str):
+        raise Unreachable(aim)
+    return aim
+
+
+@lru_cache(256)  # of one place it is asked from many poses of the arm, with the same answer
+def _aim(side: Side, target: Vector, radius: Meters, turn: Radians, lean: Radians) -> ArmAim | str:
+    """Angles that point at `target`, or why there are none."""
+    pose = {"torso_turn": turn, "torso_lean": lean}
     x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
     distance = hypot(x, y, z)
     if distance > REACH:
-        raise Unreachable(f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m")
+        return f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m"
     reason = ""
     for degrees in range(20, -32, -2):
         pitch = radians(degrees)
@@ -180,13 +195,28 @@ def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
         reason = _objection(side, stroke, target, radius, pose) or _objection(side, held, target, radius, pose)
         if not reason:
             return ArmAim(stroke, held)
-    raise Unreachable(f"the {side} arm finds no way to point at it: {reason}")
+    return f"the {side} arm finds no way to point at it: {reason}"
 
 
 def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool:
     """True if an elbow, forearm or hand is in the table or closer than the clearance."""
-    forearms = [arm(pose, side) for side in sides]
-    return any(_in_table(point) for ray in forearms for point in (ray.origin, _tip(ray), _edge_crossing(ray)))
+    return any(_is_in_table(arm(pose, side)) for side in sides)
+
+
+def above_table(yaw: Array, pitch: Array, elbow: Array) -> Array:
+    """Distances in metres by which arms stay out of the table, the torso upright; where one is in it, below 0.
+
+    yaw, pitch, elbow: angles of the joints of an arm, of any one shape. The same points count as in `touches_table`.
+    """
+    forward, out = np.cos(yaw), pitch + elbow
+    elbow_x, elbow_z = UPPER_ARM * np.sin(pitch) * forward, SHOULDER["left"][2] - UPPER_ARM * np.cos(pitch)
+    hand_x, hand_z = elbow_x + FOREARM * np.sin(out) * forward, elbow_z - FOREARM * np.cos(out)
+    is_across = (elbow_x < TABLE_EDGE) & (hand_x > TABLE_EDGE)
+    part = (TABLE_EDGE - elbow_x) / np.where(is_across, hand_x - elbow_x, 1.0)
+    edge, top = TABLE_EDGE - CLEARANCE, TABLE_TOP + CLEARANCE
+    at_edge = np.where(is_across, elbow_z + part * (hand_z - elbow_z) - top, np.inf)
+    at_elbow, at_hand = np.maximum(edge - elbow_x, elbow_z - top), np.maximum(edge - hand_x, hand_z - top)
+    return np.asarray(np.minimum(np.minimum(at_elbow, at_hand), at_edge))
 
 
 def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:
@@ -206,10 +236,9 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
     for name, angle in zip(names, angles, strict=True):
         if not LIMIT[name].low <= angle <= LIMIT[name].high:
             return f"{name} cannot turn to {math.degrees(angle):.0f} degrees"
-    there = {**pose, **dict(zip(names, angles, strict=True))}
-    if touches_table(there, (side,)):
+    forearm = arm({**pose, **dict(zip(names, angles, strict=True))}, side)
+    if _is_in_table(forearm):
         return "the table is in the way"
-    forearm = arm(there, side)
     is_near = (
         math.dist(_tip(forearm), target) < radius + HAND_TO_TARGET or math.dist(forearm.origin, target) < FOREARM
     )
@@ -219,6 +248,10 @@ def _objection(side: Side, angles: tuple[float, float, float], target: Vector, r
 def _tip(forearm: Ray) -> Vector:
     assert forearm.tip is not None
     return forearm.tip
+
+
+def _is_in_table(forearm: Ray) -> bool:
+    return any(_in_table(point) for point in (forearm.origin, _tip(forearm), _edge_crossing(forearm)))
 
 
 def _in_table(point: Vector) -> bool:

@@ -4,7 +4,7 @@ Time is that of a clock: of the event loop for the body, of its own for a rehear
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from msgspec.structs import replace
@@ -15,9 +15,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
-from engage_hri.services.control.torso.aiming import NECK, Aim
+from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.estimates import Added, infeasible, motion_estimate
+from engage_hri.services.control.torso.estimates import Added, infeasible, motion_estimate, poses
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
@@ -75,13 +75,8 @@ class Torso:
     def _estimate(self, behavior: BlockBehavior, situation: Situation, *, moving: bool) -> Estimate:
         course = choreography.plan(behavior, situation)
         path = self.path(course, None if moving and not self.misbelieved else situation)
-        # A nod is on top of the gaze, and leaves the neck where that has it.
-        moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
-        on_target, end = {**situation.pose, **course.on_target}, {**situation.pose, **dict(moved)}
         added = self._added(course) if moving and not self.misbelieved else None
-        return motion_estimate(
-            behavior, course, path, kinematics.pose_message(on_target), kinematics.pose_message(end), added
-        )
+        return motion_estimate(behavior, course, path, *poses(course, situation.pose), added)
 
     def _added(self, course: Course) -> Added | None:
         """Tell what the trunk adds to a path that begins now; None: nothing."""
@@ -100,30 +95,47 @@ class Torso:
                 here.update(zip(track.joints, track.angles(now), strict=True))
         # Paths of head and arms are laid for where the torso is going to be.
         torso, leaning = self.tracks["torso"], self.runs.get("torso")
-        trunk = torso.angles(now) if pose is None and (real or not self.misbelieved) else None
+        trunk = torso.angles(now) if real or not self.misbelieved else None
         here.update(zip(torso.joints, torso.angles(max(now, torso.motion.end)), strict=True))
         if leaning is not None and leaning.is_setting_out and torso.is_moving(now):
             here.update((joint, leaning.course.on_target[joint]) for joint in torso.joints)
         if not real:
             here.update(self.misbelieved)
-        here = tracks.updated(here, pose)
-        base = self.attention.angles_at([here[joint] for joint in torso.joints])
-        rest = {**tracks.bases(self.tracks), **dict(zip(NECK, base, strict=True))}
-        return Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk)
+        rest = {**tracks.bases(self.tracks), **self._gaze_at_rest(here)}
+        described = Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk)
+        return described if pose is None else self.placed(described, pose)
+
+    def placed(self, situation: Situation, pose: BodyPose) -> Situation:
+        """The same situation with the joints at rest in `pose`, as far as it has them."""
+        here, rest = tracks.updated(situation.pose, pose), situation.rest
+        if any(here[joint] != situation.pose[joint] for joint in TRUNK):
+            rest = {**rest, **self._gaze_at_rest(here)}
+        return replace(situation, pose=here, rest=rest, trunk=None)
+
+    def _gaze_at_rest(self, pose: Mapping[str, float]) -> dict[str, float]:
+        """Angles to which the head goes back, with the trunk as in `pose`."""
+        return dict(zip(NECK, self.attention.angles_at([pose[joint] for joint in TRUNK]), strict=True))
 
     def path(self, course: Course, situation: Situation | None = None) -> Path:
         """Lay a path along `course`. Raises Impossible.
 
         situation: start at rest in its pose; None: start from where the parts are, as they move.
         """
-        if situation is not None and course.parts != ("nod",):
-            start = resting([situation.pose[joint] for joint in course.joints])
-        else:
-            now = self.clock.time()
-            start = tracks.joined([self.tracks[part].start_at(now, course.aim) for part in course.parts])
-            if course.aim is not None and not self.tracks["torso"].is_still(now, course.aim):
-                return self._path_on_the_move(start, course)
+        start = self.start(course, situation)
+        if situation is None and self.is_carried(course):
+            return self._path_on_the_move(start, course)
         return laid_path(start, course)
+
+    def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
+        """State in which a path along `course` begins. situation: as for `path`."""
+        if situation is not None and course.parts != ("nod",):
+            return resting([situation.pose[joint] for joint in course.joints])
+        now = self.clock.time()
+        return tracks.joined([self.tracks[part].start_at(now, course.aim) for part in course.parts])
+
+    def is_carried(self, course: Course) -> bool:
+        """True if the trunk moves what goes along `course` to a target."""
+        return course.aim is not None and not self.tracks["torso"].is_still(self.clock.time(), course.aim)
 
     def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""

@@ -24,11 +24,14 @@ Array = NDArray[np.float64]
 SHARE = 0.6
 MARGIN = 0.97
 """Share of a limit that sampled peaks may reach: between two samples a peak may be higher."""
+OUTSIDE = 1e-9
+"""Share of a joint's range by which a path may be outside of it."""
 AT_REST = 1e-9
 SAMPLES = np.linspace(0.0, 1.0, 33)
-_STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
+STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
+"""Factors of a leg's natural duration, in the order in which they are tried."""
 
-_LEAST: Seconds = 0.02
+LEAST: Seconds = 0.02
 """Least time of a leg on which something moves."""
 _NOTHINGS: tuple[Seconds, ...] = (0.0004, 0.001, 0.002, 0.005, 0.01)
 """Times to try for a leg that needs none: whoever is all but there, and all but at rest, is there at once."""
@@ -210,7 +213,7 @@ class _Limits:
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         least = _NOTHINGS if seconds <= 0.0 else ()
-        for each in (*least, *(max(seconds, _LEAST) * stretch for stretch in _STRETCHES)):
+        for each in (*least, *(max(seconds, LEAST) * stretch for stretch in STRETCHES)):
             connection = self._with_peaks(_quintic(start, end, each), each)
             if connection.excess <= 0.0:
                 return connection
@@ -227,7 +230,7 @@ class _Limits:
         speed = float(np.max(np.abs(velocity) / self.speed))
         acceleration = float(np.max(np.abs(change) / self.acceleration))
         outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
-        excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - 1e-9)
+        excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - OUTSIDE)
         return _Connection(coefficients, seconds, speed, acceleration, excess)
 
 

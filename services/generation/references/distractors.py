@@ -48,31 +48,42 @@ def laid_out(objects: Sequence[Entity]) -> Layout:
     )
 
 
-def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[str]:
-    """Ids of the objects that have their centre or a corner of their footprint in the cone around the gaze axis.
+def in_gaze_cones(gazes: Sequence[Ray], half_angle: Radians, layout: Layout) -> list[frozenset[str]]:
+    """Ids of the objects that have their centre or a corner of their footprint in the cone around each gaze axis.
 
     The angle between axis and eye-to-point decides: the same set as the ellipse the cone cuts from the table
     (decision B4).
     """
-    reach = layout.places - np.asarray(gaze.origin)
-    along = reach @ _unit(gaze.axis)
-    distance = np.linalg.norm(reach, axis=1)
+    reach = layout.places - _vectors([gaze.origin for gaze in gazes])[:, None]
+    along = np.einsum("gpx,gx->gp", reach, _units(gazes))
+    distance = np.sqrt(np.einsum("gpx,gpx->gp", reach, reach))
     angle_rad = np.arccos(np.clip(along / np.maximum(distance, TOLERANCE), -1.0, 1.0))
     inside = (angle_rad <= half_angle + TOLERANCE) | (distance <= TOLERANCE)
-    return frozenset(layout.ids[index] for index in np.unique(layout.owner[inside]))
+    return [frozenset(layout.ids[index] for index in layout.owner[each].tolist()) for each in inside]
 
 
-def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozenset[str]:
-    """Ids of the objects in the half-cylinder ahead of the hand, around the axis from elbow to hand (decision B5).
+def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[str]:
+    """Ids of the objects in the cone around one gaze axis."""
+    return in_gaze_cones([gaze], half_angle, layout)[0]
+
+
+def in_pointing_cylinders(forearms: Sequence[Ray], radius: Meters, layout: Layout) -> list[frozenset[str]]:
+    """Ids of the objects in the half-cylinder ahead of each hand, around the axis from elbow to hand (decision B5).
 
     An object of radius r counts when its centre is within `radius` + r of the axis.
     """
-    reach = layout.centres - np.asarray(forearm.tip if forearm.tip is not None else forearm.origin)
-    axis = _unit(forearm.axis)
-    along = reach @ axis
-    off_axis = np.linalg.norm(reach - np.outer(along, axis), axis=1)
+    tips = [forearm.tip if forearm.tip is not None else forearm.origin for forearm in forearms]
+    reach, axes = layout.centres - _vectors(tips)[:, None], _units(forearms)
+    along = np.einsum("fox,fx->fo", reach, axes)
+    beside = reach - along[..., None] * axes[:, None]
+    off_axis = np.sqrt(np.einsum("fox,fox->fo", beside, beside))
     inside = (along >= -TOLERANCE) & (off_axis <= radius + layout.radii + TOLERANCE)
-    return frozenset(layout.ids[index] for index in np.flatnonzero(inside))
+    return [frozenset(layout.ids[index] for index in np.flatnonzero(each).tolist()) for each in inside]
+
+
+def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozenset[str]:
+    """Ids of the objects in the half-cylinder ahead of one hand."""
+    return in_pointing_cylinders([forearm], radius, layout)[0]
 
 
 def extent(entity: Entity) -> Meters:
@@ -98,6 +109,11 @@ def angle_off_axis(gaze: Ray, place: Vector) -> Radians:
 
 def _vectors(vectors: Sequence[Vector]) -> NDArray[np.float64]:
     return np.array(vectors, dtype=np.float64).reshape(-1, 3)
+
+
+def _units(rays: Sequence[Ray]) -> NDArray[np.float64]:
+    axes = _vectors([ray.axis for ray in rays])
+    return np.asarray(axes / np.sqrt(np.einsum("rx,rx->r", axes, axes))[:, None])
 
 
 def _unit(axis: Vector) -> NDArray[np.float64]:

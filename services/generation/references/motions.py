@@ -1,9 +1,15 @@
-"""Motions that references may need: the questions to the body, and its estimates by pose."""
+"""Motions that references may need: the questions to the body, and its estimates by pose.
 
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+First it is asked for a gaze and a point at each target from where it is: that says what can be meant, and which
+pairs of gesture and phrase may win. Then only for motions from postures that these leave. All that is asked is what
+a motion comes to, never its phases.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Hand, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
@@ -12,6 +18,18 @@ CURRENT_POSE = ""
 """Start of a motion: where the body is now."""
 AT_REST = ":rest"
 """Start of a motion: where head or arm go when they have nothing to do. No entity has such an id."""
+
+
+class Way(Struct, frozen=True):
+    """A motion of the head or an arm that is on `since`, to `target`."""
+
+    part: Literal["head", "arm"]
+    since: str
+    target: str
+
+
+class NotAsked(LookupError):
+    """A motion is needed for which the body has not been asked."""
 
 
 class Motions(Struct, frozen=True):
@@ -27,15 +45,28 @@ class Motions(Struct, frozen=True):
     looks_last: bool = False
 
     def gaze(self, since: str, target: str) -> Estimate:
-        return self.gazes[since, target]
+        """The gaze at `target` from there. Raises NotAsked."""
+        return _known(self.gazes, since, target)
 
     def point(self, since: str, target: str) -> Estimate:
-        return self.points[since, target]
+        """The point at `target` from there. Raises NotAsked."""
+        return _known(self.points, since, target)
+
+    def has(self, way: Way) -> bool:
+        """True if the body has been asked for this motion."""
+        return (way.since, way.target) in (self.gazes if way.part == "head" else self.points)
+
+
+def _known(motions: dict[tuple[str, str], Estimate], since: str, target: str) -> Estimate:
+    try:
+        return motions[since, target]
+    except KeyError:
+        raise NotAsked(f"from {since!r} to {target!r}") from None
 
 
 def arm_of(point: Estimate) -> str:
     """Name of the arm (or arms) that the body would point with."""
-    return "+".join(sorted(point.parts))
+    return point.parts[0] if len(point.parts) == 1 else "+".join(sorted(point.parts))
 
 
 def hand_of(point: Estimate) -> Hand | None:
@@ -59,7 +90,7 @@ def last_motions(moving: Sequence[BlockBehavior]) -> tuple[EstimateItem, ...]:
     """Questions for the last gaze and the last point of `moving`: they decide where head and arms will be."""
     points = [behavior for behavior in moving if isinstance(behavior, Pointing)]
     gazes = [behavior for behavior in moving if not isinstance(behavior, Pointing)]
-    return tuple(EstimateItem(behavior=behavior) for behavior in (*gazes[-1:], *points[-1:]))
+    return tuple([_question(behavior, None) for behavior in (*gazes[-1:], *points[-1:])])
 
 
 def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> ExpectedPose:
@@ -74,7 +105,7 @@ def pose_after(items: Sequence[EstimateItem], answers: Sequence[Estimate]) -> Ex
 
 
 def from_here(
-    targets: Sequence[str], hand: Hand | None = None, pose: ExpectedPose = HERE_AND_NOW, glance: str = ""
+    targets: Iterable[str], hand: Hand | None = None, pose: ExpectedPose = HERE_AND_NOW, glance: str = ""
 ) -> tuple[EstimateItem, ...]:
     """First question: a gaze and a point at each of the distinct `targets`, from where the body is or will be.
 
@@ -82,99 +113,66 @@ def from_here(
     """
     items = []
     for target in targets:
-        point = Pointing(id=f"point at {target}", target=target, mode=hand)
-        items.append(EstimateItem(behavior=_gaze(target), pose=pose.head))
-        items.append(EstimateItem(behavior=point, pose=pose.arms))
+        items.append(_question(_gaze(target), pose.head))
+        items.append(_question(_point(target, hand), pose.arms))
     if glance:
-        items.append(EstimateItem(behavior=_gaze(glance), pose=pose.head))
+        items.append(_question(_gaze(glance), pose.head))
     return tuple(items)
 
 
-def from_each_other(
-    sequence: Sequence[str], answers: Sequence[Estimate], hand: Hand | None = None, glance: str = ""
-) -> tuple[EstimateItem, ...]:
-    """Second question: the same from the poses that an earlier reference of the `sequence` of targets may leave.
-
-    Those are: on its target, at rest again, and for the head on who was glanced at. A point starts on a target only
-    where one arm makes both, one right after the other. answers: to `from_here` of `distinct(sequence)`.
-    """
-    first = _from_here(sequence, answers, glance)
-    items = []
-    for since, target, one_arm in _steps(sequence, first):
-        pose = first.gaze(CURRENT_POSE, since).pose_after
-        items.append(EstimateItem(behavior=_gaze(target), pose=pose))
-        if one_arm:
-            # The block will name this hand: no other may be asked about, whichever is nearer from there.
-            named = hand_of(first.point(CURRENT_POSE, target)) or hand
-            pointing = Pointing(id=f"point at {target}", target=target, mode=named)
-            items.append(EstimateItem(behavior=pointing, pose=first.point(CURRENT_POSE, since).pose_after))
-    for target in distinct(sequence[1:]):
-        gaze, point = first.gaze(CURRENT_POSE, target), first.point(CURRENT_POSE, target)
-        items.append(EstimateItem(behavior=_gaze(target), pose=gaze.pose_end))
-        if point.feasible:
-            pointing = Pointing(id=f"point at {target}", target=target, mode=hand_of(point) or hand)
-            items.append(EstimateItem(behavior=pointing, pose=point.pose_end))
-    for target in _after_glances(sequence, first):
-        items.append(EstimateItem(behavior=_gaze(target), pose=first.gaze(CURRENT_POSE, glance).pose_after))
-    return tuple(items)
-
-
-def collect(
-    sequence: Sequence[str], here: Sequence[Estimate], onward: Sequence[Estimate], glance: str = ""
-) -> Motions:
-    """The answers to both questions, by where the motion starts and what it goes to."""
-    motions = _from_here(sequence, here, glance)
-    answers = iter(onward)
-    for since, target, one_arm in _steps(sequence, motions):
-        motions.gazes[since, target] = next(answers)
-        if one_arm:
-            motions.points[since, target] = next(answers)
-    for target in distinct(sequence[1:]):
-        motions.gazes[AT_REST, target] = next(answers)
-        here_too = motions.point(CURRENT_POSE, target)
-        motions.points[AT_REST, target] = next(answers) if here_too.feasible else here_too
-    for target in _after_glances(sequence, motions):
-        motions.gazes[glance, target] = next(answers)
-    return motions
-
-
-def distinct(sequence: Sequence[str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(sequence))
-
-
-def _gaze(target: str) -> Gaze:
-    return Gaze(id=f"gaze at {target}", target=target)
-
-
-def _after_glances(sequence: Sequence[str], motions: Motions) -> tuple[str, ...]:
-    """Targets that may be looked at after a glance."""
-    return distinct(sequence[1:]) if motions.glance else ()
-
-
-def _from_here(sequence: Sequence[str], answers: Sequence[Estimate], glance: str = "") -> Motions:
-    gazes: dict[tuple[str, str], Estimate] = {}
-    points: dict[tuple[str, str], Estimate] = {}
+def from_here_told(targets: Sequence[str], answers: Sequence[Estimate], glance: str = "") -> Motions:
+    """Motions from where the body is. targets, answers, glance: of `from_here`."""
     each = answers[:-1] if glance else answers
-    for target, gaze, point in zip(distinct(sequence), each[::2], each[1::2], strict=True):
-        gazes[CURRENT_POSE, target], points[CURRENT_POSE, target] = gaze, point
+    gazes = {(CURRENT_POSE, target): gaze for target, gaze in zip(targets, each[::2], strict=True)}
+    points = {(CURRENT_POSE, target): point for target, point in zip(targets, each[1::2], strict=True)}
     if glance and answers[-1].feasible:
         gazes[CURRENT_POSE, glance] = answers[-1]
         return Motions(gazes, points, glance)
     return Motions(gazes, points)
 
 
-def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str, bool]]:
-    """Pairs of a target and a later one, each once, and whether one arm points at both, one after the other.
+def onward(ways: Sequence[Way], motions: Motions, hand: Hand | None = None) -> tuple[EstimateItem, ...]:
+    """Second question: motions from where earlier references leave head and arms. hand: the only one allowed.
 
-    A look lasts over references without one only in profile `figure-3.3`, where nobody is glanced at.
+    The block will name the hand that points at a target from here: no other may be asked about, whichever is nearer
+    from there.
     """
-    next_to_each_other = set(pairwise(sequence))
-    seen: set[tuple[str, str]] = set()
-    for index, target in enumerate(sequence):
-        there = motions.point(CURRENT_POSE, target)
-        for since in sequence[index - 1 : index] if motions.glance and index else sequence[:index]:
-            if (since, target) not in seen:
-                seen.add((since, target))
-                before = motions.point(CURRENT_POSE, since)
-                one_arm = before.feasible and there.feasible and arm_of(before) == arm_of(there)
-                yield since, target, one_arm and (since, target) in next_to_each_other
+    items = []
+    for way in ways:
+        if way.part == "head":
+            items.append(_question(_gaze(way.target), _left(way, motions.gazes)))
+        else:
+            named = hand_of(motions.point(CURRENT_POSE, way.target)) or hand
+            items.append(_question(_point(way.target, named), _left(way, motions.points)))
+    return tuple(items)
+
+
+def onward_told(ways: Sequence[Way], motions: Motions, answers: Sequence[Estimate]) -> Motions:
+    """Add the motions of a second question. ways, answers: of `onward`."""
+    gazes, points = dict(motions.gazes), dict(motions.points)
+    for way, answer in zip(ways, answers, strict=True):
+        (gazes if way.part == "head" else points)[way.since, way.target] = answer
+    return replace(motions, gazes=gazes, points=points)
+
+
+def distinct(sequence: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(sequence))
+
+
+def _left(way: Way, known: dict[tuple[str, str], Estimate]) -> BodyPose | None:
+    """The pose in which a way starts."""
+    if way.since == AT_REST:
+        return known[CURRENT_POSE, way.target].pose_end
+    return known[CURRENT_POSE, way.since].pose_after
+
+
+def _gaze(target: str) -> Gaze:
+    return Gaze(id=f"gaze at {target}", target=target)
+
+
+def _point(target: str, hand: Hand | None) -> Pointing:
+    return Pointing(id=f"point at {target}", target=target, mode=hand)
+
+
+def _question(behavior: BlockBehavior, pose: BodyPose | None) -> EstimateItem:
+    return EstimateItem(behavior=behavior, pose=pose, only="posture")

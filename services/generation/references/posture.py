@@ -1,6 +1,6 @@
 """Head and arms before each reference: on the target of the one before, or at rest (decision 0024). Pure."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
@@ -8,7 +8,7 @@ from engage_hri.schemas.behaviors import Constraint, FragmentBehavior, Reference
 from engage_hri.schemas.fragments import GestureChoice
 from engage_hri.schemas.speakable import word_count
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
-from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, arm_of
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
 
 
 class HeadAndArms(Struct, frozen=True):
@@ -19,22 +19,25 @@ class HeadAndArms(Struct, frozen=True):
     """(arm, target) of the arms that have moved, by arm."""
 
     def arm(self, arm: str) -> str:
-        return dict(self.arms).get(arm, CURRENT_POSE)
+        return next((target for each, target in self.arms if each == arm), CURRENT_POSE)
 
-    def after(self, gesture: GestureChoice, target: str, motions: Motions) -> "HeadAndArms":
-        """The posture that a gesture at `target` leaves: what it does not use goes home."""
-        if gesture == "none":
-            return self.home_again(motions)
-        arms = dict(self.home_again(motions).arms)
-        if gesture != "directed_gaze_with_pointing":
-            return HeadAndArms(target, tuple(arms.items()))
-        arms[arm_of(motions.point(CURRENT_POSE, target))] = target
-        return HeadAndArms(motions.glance or target, tuple(sorted(arms.items())))
+    def afterwards(self, target: str, arm: str, motions: Motions) -> Mapping[GestureChoice, "HeadAndArms"]:
+        """The postures that the gestures at `target` leave: what one does not use goes home. arm: that points."""
+        home = self.home_again(motions)
+        looking = HeadAndArms(target, home.arms)
+        moved = tuple(sorted([each for each in home.arms if each[0] != arm] + [(arm, target)]))
+        pointing = HeadAndArms(motions.glance or target, moved)
+        return {
+            "none": home,
+            "gaze": looking,
+            "directed_gaze": looking,
+            "directed_gaze_with_pointing": pointing,
+        }
 
     def home_again(self, motions: Motions) -> "HeadAndArms":
         """The posture once all is over that a reference has moved. A glance lasts until the next look."""
         moved = self.head not in (CURRENT_POSE, motions.glance) and not motions.looks_last
-        return HeadAndArms(AT_REST if moved else self.head, tuple((arm, AT_REST) for arm, _ in self.arms))
+        return HeadAndArms(AT_REST if moved else self.head, tuple([(arm, AT_REST) for arm, _ in self.arms]))
 
 
 def references_apart(

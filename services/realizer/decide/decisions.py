@@ -22,8 +22,8 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken, promises_of
-from engage_hri.services.realizer.plan.steps import finished
 from engage_hri.services.realizer.points import ORIGIN, Point, performer
+from engage_hri.services.runtime.steps import finished
 
 
 class Decisions:

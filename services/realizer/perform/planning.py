@@ -24,11 +24,8 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_steps
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
-from engage_hri.services.realizer.plan.steps import Steps, T
 from engage_hri.services.realizer.points import Point
-
-SLICE = 512
-"""Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
+from engage_hri.services.runtime.unhurried import unhurried
 
 
 class Planning:
@@ -174,22 +171,3 @@ class Planning:
 async def planned_alone(bus: Bus, block: Block, config: RealizerConfig) -> Plan:
     """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
     return await Planning(bus, config, LiveBlocks(), list).plan(Live(PerformBlock(id="plan", block=block), ()))
-
-
-async def unhurried(steps: Steps[T]) -> T:
-    """The result of long work, done a slice at a time: whatever else is due comes in between.
-
-    A cancellation takes effect at the end of the slice.
-    """
-    done = 0
-    try:
-        while True:
-            done += next(steps)
-            if done >= SLICE:
-                done = 0
-                await asyncio.sleep(0)
-    except StopIteration as end:
-        result: T = end.value
-        return result
-    finally:
-        steps.close()

@@ -17,7 +17,6 @@ from engage_hri.services.realizer.plan.instants import Classes, Instant, instant
 from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
-from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
 from engage_hri.services.realizer.plan.stops import prolonged
 from engage_hri.services.realizer.points import (
     EPSILON,
@@ -29,6 +28,7 @@ from engage_hri.services.realizer.points import (
     gate_point,
     performer,
 )
+from engage_hri.services.runtime.steps import PORTION, Steps, portions
 
 
 class Assembly(Struct, frozen=True):

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from engage_hri.services.realizer.plan.steps import PORTION, Steps
+from engage_hri.services.runtime.steps import PORTION, Steps
 
 
 def components(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[list[int]]]:

@@ -17,7 +17,6 @@ from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, Impossible
 from engage_hri.services.realizer.plan.relations import BlockRefused, Order, Relations
-from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import (
     AS_IN_DRAFTS,
@@ -33,6 +32,7 @@ from engage_hri.services.realizer.plan.words import (
     way_round,
 )
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.runtime.steps import Steps
 
 FACES = types_with(family="face", lasts=True)
 

@@ -5,8 +5,8 @@ from collections.abc import Container, Sequence
 from msgspec.structs import replace
 
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations
-from engage_hri.services.realizer.plan.steps import Steps, portions
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.runtime.steps import Steps, portions
 
 
 class Times:

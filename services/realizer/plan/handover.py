@@ -18,8 +18,8 @@ from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import ARMS, Chain
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import EPSILON, ON_TARGET, SHIFTS, WITH_STROKE, Point
+from engage_hri.services.runtime.steps import Steps
 
 _OTHER: Mapping[str, tuple[str, Hand]] = {
     arm: (parts[0], hand)

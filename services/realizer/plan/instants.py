@@ -12,8 +12,8 @@ from msgspec import Struct
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
-from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
+from engage_hri.services.runtime.steps import PORTION, Steps, portions
 
 _OFFSET = re.compile(r"\s*[+-]\s*[0-9.]+(e[+-]?[0-9]+)?\s*$", re.IGNORECASE)
 """Offset behind the point that a reference names: `+0.5`."""

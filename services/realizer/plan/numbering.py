@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
-from engage_hri.services.realizer.plan.steps import PORTION, Steps, portions
+from engage_hri.services.runtime.steps import PORTION, Steps, portions
 
 _Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], tuple[Seconds, str]]
 TieT = TypeVar("TieT", Place, Bound)

@@ -6,8 +6,8 @@ from math import inf
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, solve
-from engage_hri.services.realizer.plan.steps import PORTION, Steps
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.runtime.steps import PORTION, Steps
 
 
 class Foresight(Place, frozen=True):

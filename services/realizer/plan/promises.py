@@ -8,8 +8,8 @@ from msgspec import Struct
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term, at_line
-from engage_hri.services.realizer.plan.steps import Steps, portions
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
+from engage_hri.services.runtime.steps import Steps, portions
 
 
 class Broken(Struct, frozen=True):

@@ -29,8 +29,8 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.steps import PORTION, Steps, finished, portions
 from engage_hri.services.realizer.points import ORIGIN, Point
+from engage_hri.services.runtime.steps import PORTION, Steps, finished, portions
 
 
 class BlockRefused(InputRefused):

@@ -11,8 +11,8 @@ from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
-from engage_hri.services.realizer.plan.steps import Steps, portions
 from engage_hri.services.realizer.points import ORIGIN, Point, frozen
+from engage_hri.services.runtime.steps import Steps, portions
 
 
 def remaining(

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import EPSILON
+from engage_hri.services.runtime.steps import Steps
 
 LAGS_AN_ELEMENT = 32
 """Number of lags that take as long as one element of a block: see `steps`."""

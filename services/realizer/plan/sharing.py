@@ -26,8 +26,8 @@ from engage_hri.services.realizer.plan.handover import (
 from engage_hri.services.realizer.plan.known import BLOCK_END, Holder, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
-from engage_hri.services.realizer.plan.steps import Steps
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.runtime.steps import Steps
 
 
 class Waits(NamedTuple):

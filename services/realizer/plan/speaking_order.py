@@ -16,8 +16,8 @@ from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.prediction import Circle, least
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.plan.steps import PORTION, Steps
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.runtime.steps import PORTION, Steps
 
 WORK = 400
 """Orders that are tried, times behaviors of the block."""

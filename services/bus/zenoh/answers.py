@@ -1,0 +1,78 @@
+"""The answering end of questions over Zenoh: decodes them, has the server answer, and replies or refuses."""
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any
+
+import zenoh
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.messages import Message, decode
+from engage_hri.services.bus.answering import MOST, Answering
+from engage_hri.services.bus.interface import Answer, Bus, is_asked_to_stop
+from engage_hri.services.bus.zenoh.history import finish, form_asked, in_form, refuse
+from engage_hri.services.bus.zenoh.session import LoopBridge
+
+
+class Answers:
+    """All that one participant answers."""
+
+    def __init__(self, bus: Bus, session: zenoh.Session, bridge: LoopBridge, run: str) -> None:
+        """run: the process."""
+        self._bus = bus
+        self._session = session
+        self._bridge = bridge
+        self._run = run
+        self._declared: list[Any] = []
+        self._under_way = Answering()
+
+    def serve(self, key: str, answer: Answer, empty: Message | None) -> None:
+        """See `Bus.answer`."""
+
+        def reply(query: zenoh.Query) -> None:
+            form = "json"
+            try:
+                form = form_asked(query)
+                asked = query.payload.to_bytes() if query.payload else b""
+                question = empty if empty is not None and not asked else decode(asked, str(query.encoding))
+                told = answer(question)
+                if not isinstance(told, Coroutine):
+                    self._reply(query, key, told, form)
+                elif self._under_way.is_full:
+                    told.close()
+                    reason = f"{MOST} questions are being answered"
+                    raise InputRefused(Fault(reason=reason, where=key, advice="wait for answers before you ask more"))
+                else:
+                    self._under_way.begin(self._later(query, key, told, form), key)
+                    return
+            except EngageError as error:
+                refuse(query, error.fault, form)
+            except (Exception, asyncio.CancelledError) as error:
+                refuse(query, self._bus.failed(error, f"a question on {key}"), form)
+            finish(query)
+
+        self._declared.append(self._session.declare_queryable(key, self._bridge.questions(reply)))
+        # A participant that asked too early learns from this token that it may ask again.
+        self._declared.append(self._session.liveliness().declare_token(keys.own(self._run, f"answers/{key}")))
+
+    async def _later(self, query: zenoh.Query, key: str, told: Coroutine[Any, Any, Message], form: str) -> None:
+        try:
+            self._reply(query, key, await told, form)
+        except EngageError as error:
+            refuse(query, error.fault, form)
+        except (Exception, asyncio.CancelledError) as error:
+            if is_asked_to_stop():
+                raise
+            refuse(query, self._bus.failed(error, f"a question on {key}"), form)
+        finally:
+            finish(query)
+
+    def _reply(self, query: zenoh.Query, key: str, message: Message, form: str) -> None:
+        payload, encoding = in_form(message, form)
+        query.reply(key, payload, encoding=encoding)
+
+    def close(self) -> None:
+        self._under_way.end()
+        for declared in reversed(self._declared):
+            declared.undeclare()

@@ -1,0 +1,95 @@
+"""Answers to questions for postures alone: what a motion comes to, without its phases. Many of them at once."""
+
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from engage_hri.schemas.body import Estimate, EstimateItem
+from engage_hri.schemas.world import World
+from engage_hri.services.control.torso import choreography
+from engage_hri.services.control.torso.course import Course, Impossible, Situation, angles
+from engage_hri.services.control.torso.estimates import infeasible, is_arm, is_gaze, poses, posture_estimate
+from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.outlines import Asked, outlines
+from engage_hri.services.runtime.steps import Steps, portions
+
+AT_ONCE = 64
+"""Motions whose outlines are drawn in one go: about a millisecond."""
+ELEMENTS, OF_A_PATH = 24, 256
+"""Elements that a motion counts for (see `steps`), and one whose path has to be laid."""
+
+State = tuple[tuple[float, ...], tuple[float, ...]]
+"""Angles and speeds of joints."""
+
+
+class _Open(Struct, frozen=True):
+    """A motion whose degrees are still to be found. number: of the question."""
+
+    number: int
+    course: Course
+    situation: Situation
+    asked: Asked
+
+
+def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps[list[Estimate]]:
+    """Estimate each motion by itself, as `Torso.estimate` does but for the phases, with pauses.
+
+    torso: one whose clock stands still.
+    """
+    questions = _Questions(torso, world)
+    told: dict[int, Estimate] = {}
+    opened: list[_Open] = []
+    for number, item in enumerate(items):
+        try:
+            made = questions.opened(number, item)
+        except Impossible as impossible:
+            told[number] = infeasible(item.behavior, impossible)
+        else:
+            opened += [made] if made is not None else []
+        yield ELEMENTS
+    for portion in portions(opened, AT_ONCE):
+        for each, degrees in zip(portion, outlines([each.asked for each in portion]), strict=True):
+            if degrees is not None:
+                both = poses(each.course, each.situation.pose)
+                told[each.number] = posture_estimate(items[each.number].behavior, each.course, degrees, both)
+        yield ELEMENTS * len(portion)
+    for number, item in enumerate(items):
+        if number not in told:
+            told[number] = torso.estimate(item.behavior, item.pose, world)
+            yield OF_A_PATH
+    return [told[number] for number in range(len(items))]
+
+
+class _Questions:
+    """Questions of one instant. Where the parts are now is looked up once."""
+
+    def __init__(self, torso: Torso, world: World) -> None:
+        self._torso = torso
+        self._here = torso.situation(world)
+        self._states: dict[tuple[str, ...], State | None] = {}
+
+    def opened(self, number: int, item: EstimateItem) -> _Open | None:
+        """Plan a motion; None: only its path says what it comes to. Raises Impossible."""
+        situation = self._here if item.pose is None else self._torso.placed(self._here, item.pose)
+        course = choreography.plan(item.behavior, situation)
+        to_target = next((count for count, leg in enumerate(course.legs, 1) if ("stroke", 1.0) in leg.marks), 0)
+        if not to_target or not (is_gaze(course) or is_arm(course)):
+            return None
+        if item.pose is None and not self._torso.misbelieved:
+            state = self._state(course)
+        else:
+            state = angles(course.joints, situation.pose), (0.0,) * len(course.joints)
+        if state is None:
+            return None
+        legs = course.legs if is_arm(course) else course.legs[:to_target]
+        return _Open(number, course, situation, Asked(*state, legs, to_target, is_arm(course), course.parts))
+
+    def _state(self, course: Course) -> State | None:
+        """Angles and speeds of the parts now; None: the trunk carries them, or they are about to change speed."""
+        if self._torso.is_carried(course):
+            return None
+        if course.parts not in self._states:
+            state = self._torso.start(course)
+            plain = None if state.a.any() else (tuple(state.q.tolist()), tuple(state.v.tolist()))
+            self._states[course.parts] = plain
+        return self._states[course.parts]

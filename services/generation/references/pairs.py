@@ -1,0 +1,217 @@
+"""Pairs of a gesture and a phrase, as far as posture does not matter: distractors, reliability, and what may win."""
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from typing import get_args
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import Reference, SpeechOption
+from engage_hri.schemas.body import Estimate, NoPointZone
+from engage_hri.schemas.fragments import GestureChoice
+from engage_hri.schemas.units import Meters, Probability, Radians, Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.references.distractors import (
+    Layout,
+    in_gaze_cones,
+    in_pointing_cylinders,
+    in_zone,
+    laid_out,
+)
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions
+from engage_hri.services.generation.references.reliability import channel_reliability, reliability
+
+GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
+"""All gestures, the set J of the thesis, from fewer movements to more."""
+POINT: GestureChoice = "directed_gaze_with_pointing"
+DIRECTED: tuple[GestureChoice, ...] = ("directed_gaze", POINT)
+ROUNDING = 9
+"""Decimals of costs and reliabilities that count: sums of the same numbers in another order are equal."""
+_RANK = {gesture: number for number, gesture in enumerate(GESTURES)}
+
+
+class ReferenceScene(Struct, frozen=True, kw_only=True, dict=True):
+    """The objects and the limits of gestures. no_gaze, no_point: why the robot may not look or point; "": it may."""
+
+    world: World
+    half_angle: Radians
+    pointing_radius: Meters
+    zones: tuple[NoPointZone, ...] = ()
+    no_gaze: str = ""
+    no_point: str = ""
+
+    @cached_property
+    def layout(self) -> Layout:
+        return laid_out(self.world.objects)
+
+    @cached_property
+    def universe(self) -> frozenset[str]:
+        return frozenset(self.layout.ids)
+
+
+class Pair(Struct, frozen=True, kw_only=True):
+    """A gesture with a phrase, as far as posture does not matter.
+
+    order: the place of the phrase among the reference's options. ruled_out: why it cannot be performed, or empty.
+    """
+
+    gesture: GestureChoice
+    order: int
+    option: SpeechOption
+    distractors: frozenset[str]
+    channel: Probability
+    reliability: Probability
+    ruled_out: str = ""
+
+    @property
+    def preference(self) -> tuple[bool, float, int, int]:
+        """Sort key among pairs of equal cost: the least wins (decision B13)."""
+        return (
+            not (self.gesture == POINT and self.option.deictic), -round(self.reliability, ROUNDING),
+            _RANK[self.gesture], self.order,
+        )  # fmt: skip
+
+
+class Shown(Struct, frozen=True):
+    """Ids of the objects that a gaze, and a point, at a target may seem to mean; None: any."""
+
+    gazed: frozenset[str] | None
+    pointed: frozenset[str] | None
+
+
+def shown(targets: Sequence[str], scene: ReferenceScene, motions: Motions) -> dict[str, Shown]:
+    """What gazes and points at the targets may seem to mean."""
+    gazes = {each: ray for each in targets if (ray := motions.gaze(CURRENT_POSE, each).ray) is not None}
+    points = {each: ray for each in targets if (ray := motions.point(CURRENT_POSE, each).ray) is not None}
+    cones = in_gaze_cones(list(gazes.values()), scene.half_angle, scene.layout)
+    cylinders = in_pointing_cylinders(list(points.values()), scene.pointing_radius, scene.layout)
+    gazed, pointed = dict(zip(gazes, cones, strict=True)), dict(zip(points, cylinders, strict=True))
+    return {each: Shown(gazed.get(each), pointed.get(each)) for each in targets}
+
+
+def considered(
+    reference: Reference, seems: Shown, scene: ReferenceScene, motions: Motions, config: GenerationConfig
+) -> tuple[Pair, ...]:
+    """The table of a reference: every pair of gesture and phrase (J x S) with its distractors and reliability.
+
+    seems: what a gaze and a point at its target may seem to mean.
+    """
+    target = reference.target
+    universe = scene.universe - {target}
+    gazed = universe if seems.gazed is None else seems.gazed - {target}
+    pointed = universe if seems.pointed is None else seems.pointed - {target}
+    no_gaze, no_point = _obstacles(target, scene, motions)
+    said = [
+        universe.intersection(option.distractors) if option.text and not option.deictic else universe
+        for option in reference.options or ()
+    ]
+    pairs = []
+    for gesture in GESTURES:
+        points = gesture == POINT
+        obstacle = "" if gesture == "none" else no_gaze or (no_point if points else "")
+        left = universe if gesture == "none" else gazed & pointed if points else gazed
+        channels = {spoken: channel_reliability(gesture, spoken, config) for spoken in ("", "words")}
+        for order, option in enumerate(reference.options or ()):
+            channel = channels["words" if option.text else ""]
+            distractors = left & said[order]
+            ruled_out = obstacle
+            if option.deictic and not points:
+                ruled_out = "a deictic phrase needs a point"
+            elif channel == 0:
+                ruled_out = "neither gesture nor phrase"
+            pairs.append(
+                Pair(
+                    gesture=gesture,
+                    order=order,
+                    option=option,
+                    distractors=distractors,
+                    channel=channel,
+                    reliability=reliability(len(distractors), channel),
+                    ruled_out=ruled_out,
+                )
+            )
+    return tuple(pairs)
+
+
+class Table:
+    """The pairs of a reference, and those that may win.
+
+    minimum: the reliability that is asked for. points: why the body cannot point at the target, empty: it can.
+    """
+
+    def __init__(self, reference: Reference, pairs: tuple[Pair, ...], config: GenerationConfig) -> None:
+        given = reference.minimum_reliability
+        self.reference = reference
+        self.pairs = pairs
+        self.minimum = config.minimum_reliability if given is None else given
+        self._config = config
+        self._left: Sequence[Pair] = [pair for pair in pairs if not pair.ruled_out]
+        self._choices: list[Mapping[GestureChoice, Pair]] = []
+
+    def candidates(self, level: int) -> Mapping[GestureChoice, Pair]:
+        """The pair of each gesture that may win, whatever the posture; empty if there are none of this level.
+
+        level: 0 for the best; each next one for what is left if the body can do none of those before it.
+        """
+        while level >= len(self._choices) and self._left:
+            best = candidates(self._left, self.minimum, self._config)
+            self._left = [pair for pair in self._left if pair.gesture not in best]
+            self._choices.append(best)
+        return self._choices[level] if level < len(self._choices) else {}
+
+
+def candidates(
+    possible: Sequence[Pair], minimum: Probability, config: GenerationConfig
+) -> Mapping[GestureChoice, Pair]:
+    """The pair of each gesture that may win, whatever the posture: the one with the best phrase.
+
+    Only pairs that reach `minimum` count or, if there are none, the most reliable ones (decision B10).
+    """
+    good = [pair for pair in possible if not below(pair.reliability, minimum)]
+    if not good:
+        most = max(round(pair.reliability, ROUNDING) for pair in possible)
+        good = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
+    best: dict[GestureChoice, Pair] = {}
+    for pair in sorted(good, key=lambda pair: (round(speaking(pair, config), ROUNDING), pair.preference)):
+        best.setdefault(pair.gesture, pair)
+    return best
+
+
+def speaking(pair: Pair, config: GenerationConfig) -> Seconds:
+    """Cost of the words of a pair."""
+    return config.seconds_per_word * pair.option.cost if pair.option.text else 0.0
+
+
+def refusal(verb: str, motion: Estimate) -> str:
+    """Reason why the body cannot make a motion; empty if it can."""
+    if motion.feasible:
+        return ""
+    return f"cannot {verb}: {motion.fault.reason if motion.fault else 'the body refuses'}"
+
+
+def below(value: Probability, minimum: Probability) -> bool:
+    return round(value - minimum, ROUNDING) < 0
+
+
+def deictic_warnings(references: Collection[Reference], scene: ReferenceScene) -> list[str]:
+    """Warnings of deictic phrases with a list of distractors that are not all other objects (decision B8)."""
+    return [
+        f"{reference.id}: the distractors of the deictic {option.text!r} are everything else, not those listed"
+        for reference in references
+        for option in reference.options or ()
+        if option.deictic
+        and option.distractors
+        and set(option.distractors) - {reference.target} != scene.universe - {reference.target}
+    ]
+
+
+def _obstacles(target: str, scene: ReferenceScene, motions: Motions) -> tuple[str, str]:
+    """Reasons why the robot cannot look, and cannot point, at `target`; each empty if it can (decision B9)."""
+    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
+    no_gaze = scene.no_gaze or refusal("look", gaze)
+    no_point = scene.no_point or refusal("point", point)
+    entity = scene.world.entity(target)
+    if not no_point and entity is not None and in_zone(entity.position, scene.zones):
+        no_point = "cannot point: in a no-point zone"
+    return no_gaze, no_point
