@@ -73,7 +73,7 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > shown > actions estimates unheard waiting > live > body"
+    "services/control": "testing > service > torso > voice > shown > actions estimates unheard waiting > live > body"
     " > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
@@ -206,6 +206,7 @@ def _is_pure(place: PurePosixPath) -> bool:
         and len(place.parts) > 2
         and place.parts[1] not in COMPOSERS | SHARED
         and place.name != "service.py"
+        and "testing" not in place.parts  # tests that are installed
         and str(place) not in SHELLS
     )
 

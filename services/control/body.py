@@ -1,7 +1,7 @@
 """The contract of a body: behaviors in, measured sync points out. Everything specific to a robot is behind it.
 
 The realizer knows sync points, not joints. A robot with an SDK joins by one class: `docs/control.md` walks through it
-and `tests/control/contract.py` is the suite that it has to pass.
+and `services/control/testing` is the suite that it has to pass.
 """
 
 import asyncio
