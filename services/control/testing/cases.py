@@ -1,9 +1,10 @@
 """One behavior that a law is judged by, the connection of the body meanwhile, and what went wrong in words."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from contextlib import suppress
 from types import TracebackType
+from typing import Any
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import EngageError
@@ -116,3 +117,11 @@ def place_of(error: BaseException) -> str:
             found = f" at {file.replace(chr(92), '/').rpartition('/')[2]}, line {trace.tb_lineno}"
         trace = trace.tb_next
     return found
+
+
+async def still_running(before: Set["asyncio.Task[Any]"]) -> list["asyncio.Task[Any]"]:
+    """List tasks that have come since `before`, and do not end by themselves now."""
+    for _ in range(3):
+        await asyncio.sleep(0)
+    came = asyncio.all_tasks() - before - {asyncio.current_task()}
+    return sorted((task for task in came if not task.done()), key=lambda task: task.get_name())

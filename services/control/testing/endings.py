@@ -9,14 +9,17 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import AbortMode, Body, Spoke
+from engage_hri.services.control.testing.cases import Connection, still_running
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
 from engage_hri.services.control.testing.laws import broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, recorded, violations
-from engage_hri.services.control.testing.stage import PATIENCE, Stage
+from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
 from engage_hri.services.control.testing.suite import Suite, does_not_apply, trials
 
 AT_ONCE: Seconds = 3.0
 """Time within which a behavior ends that is aborted: it may brake, and freeze for a moment."""
+WORD: Seconds = 1.0
+"""Time that a voice has for saying its word to the end."""
 HOWS: tuple[AbortMode, ...] = ("relax", "freeze")
 
 
@@ -97,9 +100,9 @@ class EndingLaws(Suite):
         self.check_pose(
             await self.pose(body), home, joints, stages[0].behavior, what="the safe pose as `home` returns"
         )
-        if body.state().moving or body.state().speaking:
+        if not await standing(body, WORD) or body.state().speaking:
             broken(
-                expected="`moving` false and silence as `home` returns",
+                expected=f"`moving` false and silence {ms(WORD)} after `home` has returned",
                 measured=f"moving {body.state().moving}, speaking {body.state().speaking!r}",
             )
         await asyncio.wait([stage.task for stage in stages], timeout=AT_ONCE)
@@ -183,6 +186,29 @@ class EndingLaws(Suite):
                 expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{unit}",
                 measured=f"{degrees(each.measured)}{unit}, {ms(when)} after it was asked for",
             )
+
+    async def test_leaves_no_task_once_it_is_disconnected(self) -> None:
+        """Once `connected()` is left, no task of the driver goes on.
+
+        Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`.
+        """
+        before = asyncio.all_tasks()
+        body = self.make()
+        connection = Connection(body)
+        await connection.enter()
+        body.see(self.world)
+        for behavior in self.able(body):
+            Stage(body, behavior, "end")
+        await asyncio.sleep(0.3)
+        await Stage.end_all()
+        await self.go_home(body)
+        await connection.leave()
+        left = await still_running(before)
+        for task in left:
+            task.cancel()
+        if left:
+            names = ", ".join(task.get_name() for task in left)
+            broken(expected="no task of the driver once it is disconnected", measured=f"these go on: {names}")
 
     async def test_an_aborted_speech_stops_at_a_word(self, body: Body) -> None:
         """Aborted, a voice says its word to the end, tells it, and is silent; it tells no word that it has not said.

@@ -3,7 +3,7 @@
 import asyncio
 import math
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import asynccontextmanager, suppress
 from typing import Any, ClassVar, NoReturn
 
 import pytest
@@ -18,7 +18,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds, Vector
 from engage_hri.services.control.body import Body, BodyState
 from engage_hri.services.control.testing.asked import BEHAVIORS, HOLDS, WORLD
-from engage_hri.services.control.testing.cases import Case, Connection
+from engage_hri.services.control.testing.cases import Case, Connection, still_running
 from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
@@ -78,15 +78,16 @@ class Suite:
         """The body of one test, connected and at home."""
         if not request.config.pluginmanager.has_plugin(PLUGIN):
             pytest.fail(f'the suite needs its plugin: pytest_plugins = ["{PLUGIN}"] in conftest.py', pytrace=False)
-        async for body in self.connected(self.make):
+        async with self.connected(self.make) as body:
             yield body
 
+    @asynccontextmanager
     async def connected(self, make: Callable[[], Body]) -> AsyncIterator[Body]:
-        """Make a body, connect it and bring it home; at the end disconnect. Raises LawBroken if it leaves tasks."""
+        """Make a body, connect it, and bring it home; at the end disconnect, and cancel what tasks it has left."""
         before = asyncio.all_tasks()
         body = make()
-        host = Connection(body)
-        await host.enter()
+        connection = Connection(body)
+        await connection.enter()
         try:
             body.see(self.world)
             with suppress(Exception):  # what is wrong with it is for the law of `home` to say
@@ -95,18 +96,11 @@ class Suite:
             yield body
         finally:
             await Stage.end_all()
-            await host.leave()
-        for _ in range(3):
-            await asyncio.sleep(0)
-        left = asyncio.all_tasks() - before - {asyncio.current_task()}
-        if names := sorted(task.get_name() for task in left if not task.done()):
+            await connection.leave()
+            left = await still_running(before)
             for task in left:
                 task.cancel()
-            broken(
-                expected="no task of the driver once it is disconnected",
-                measured=f"these go on: {', '.join(names)}",
-                advice="start tasks in `connected()`, and end them there",
-            )
+            await asyncio.gather(*left, return_exceptions=True)
 
     # -- what is there to judge ----------------------------------------------------------------------------------
 

@@ -136,13 +136,13 @@ class TruthLaws(Suite):
         if fault is None:
             does_not_apply("no faults are named (`faults` of the suite)")
         make, lies = self.faults()[fault], list[Finding]()
-        async for body in self.connected(make):
+        async with self.connected(make) as body:
             able = [each for each in self.behaviors if type_name(each) in body.capabilities.types]
         for behavior in able:
-            async for body in self.connected(make):
+            async with self.connected(make) as body:
                 lies += await self._with_fault(body, behavior)
         for name, makers in CROWDS.items():
-            async for body in self.connected(make):
+            async with self.connected(make) as body:
                 witness = await crowded(self, body, makers, Random(f"{fault} {name}"))
                 lies += await self._closed(witness) if witness else []
         if lies:
