@@ -1,5 +1,7 @@
 """Behaviors that the suite asks a body for, and the world in which their targets are. Pure."""
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
@@ -23,6 +25,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.world import Entity, World
 
+Aimed = Gaze | GazeShift | HeadDirectionShift | Pointing
 WORLD = World(
     entities=(
         Entity(id="human", kind="person", position=(1.3, 0.0, 1.2)),
@@ -48,6 +51,19 @@ BEHAVIORS: tuple[BlockBehavior, ...] = (
     Speech(id="speech", text="This piece, please.", marks=(Mark("m", 5),)),
     Wait(id="wait", duration=0.5),
 )
+
+
+def behaviors_in(world: World) -> tuple[BlockBehavior, ...]:
+    """Direct the behaviors of the suite to what there is in another world: to its first and to its last object.
+
+    world: at least one entity.
+    """
+    ids = [entity.id for entity in (*world.objects, *world.people, *world.entities)]
+    last = ids[max(1, len(world.objects) - 1) % len(ids)]
+    places = {"near-right": ids[0], "far-left": last}
+    return tuple(replace(each, target=places[each.target]) if isinstance(each, Aimed) else each for each in BEHAVIORS)
+
+
 HOLDS = {name: row.holds for name, row in TYPES.items() if row.holds}
 """Where each type can wait, as the realizer knows it."""
 ONE_INSTANT = {name: row.one_instant for name, row in TYPES.items() if row.one_instant}

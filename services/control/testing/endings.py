@@ -31,6 +31,8 @@ def is_overlay(behavior: BlockBehavior) -> bool:
 class EndingLaws(Suite):
     """Part of `BodyContract`."""
 
+    topic = "ends"
+
     async def test_an_aborted_behavior_ends_at_once_and_safe(self, body: Body) -> None:
         """Revoked on its way, a behavior ends within 3 s without `end`, and its parts go on to the safe pose.
 
@@ -69,7 +71,7 @@ class EndingLaws(Suite):
                 await self.check_rest(body, home, behavior, "after an aborted wait")
 
     async def test_a_dropped_stream_ends_safe(self, body: Body) -> None:
-        """If the task that performs a behavior is cancelled, `home` brings its parts to the safe pose.
+        """`home` brings parts to the safe pose also from a behavior whose task was cancelled.
 
         Usually the part still belongs to the behavior that is gone: give it back in a `finally`.
         """

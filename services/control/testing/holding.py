@@ -28,6 +28,8 @@ def is_movement(behavior: BlockBehavior) -> bool:
 class HoldingLaws(Suite):
     """Part of `BodyContract`."""
 
+    topic = "waiting"
+
     def moving(self, body: Body) -> list[BlockBehavior]:
         """List behaviors that can wait on their way."""
         return [each for each in self.able(body) if is_movement(each)]

@@ -21,6 +21,8 @@ PROMPT = 0.05
 class PointsLaws(Suite):
     """Part of `BodyContract`."""
 
+    topic = "sync points"
+
     async def test_can_do_something_of_each_type_that_it_has(self, body: Body) -> None:
         """Of each type in `capabilities.types` that the suite knows there is a behavior that the body can do.
 

@@ -29,6 +29,8 @@ def has_target(behavior: BlockBehavior) -> bool:
 class PredictionLaws(Suite):
     """Part of `BodyContract`."""
 
+    topic = "predictions"
+
     async def test_takes_the_time_that_it_predicted(self, body: Body) -> None:
         """From each sync point to the next it takes as long as its estimate said, within the stated `tolerance`.
 
@@ -121,7 +123,7 @@ class PredictionLaws(Suite):
                 )
 
     async def test_ends_where_it_said(self, body: Body) -> None:
-        """Once it has ended the joints of its parts are where `pose_end` said, if it says that.
+        """Joints of its parts are in the end where `pose_end` said, if it says that.
 
         Usually `pose_end` is the pose of rest, and a shift has changed to where the head goes back.
         """

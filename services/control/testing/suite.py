@@ -41,6 +41,7 @@ class Suite:
     seeds: number of random trials of each law that has some; None: many in virtual time, one in real time.
     """
 
+    topic: ClassVar[str] = ""
     pytestmark: ClassVar[Any] = [pytest.mark.asyncio]
     tolerance: Seconds = 1e-6
     noise: Radians = 0.0

@@ -18,6 +18,8 @@ from engage_hri.services.control.testing.suite import Suite, does_not_apply
 class TakeoverLaws(Suite):
     """Part of `BodyContract`."""
 
+    topic = "takeovers"
+
     async def test_a_later_behavior_takes_over_the_part(self, body: Body) -> None:
         """A later behavior gets the part of an earlier one at once: that ends as `taken_over`, and is not done.
 

@@ -29,6 +29,8 @@ PATIENCE_WITH_FAULTS: Seconds = 60.0
 class TruthLaws(Suite):
     """Part of `BodyContract`."""
 
+    topic = "truth"
+
     async def test_measures_all_its_joints_within_their_noise(self, body: Body) -> None:
         """`state()` has each joint of the capabilities, and at rest it scatters no more than the stated `noise`.
 
