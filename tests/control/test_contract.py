@@ -9,7 +9,7 @@ from engage_hri.services.control.body import Body, BodyState
 from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control.liars import Noisy
+from tests.control.liars_by_deed import Noisy
 
 FAULTS = {
     "a slow neck": Variability(slow=(Slow(part="head", factor=3.0),)),

@@ -11,7 +11,7 @@ from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.testing.laws import Finding, LawBroken
 from engage_hri.services.control.testing.witness import CROWDS
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control import liars
+from tests.control import liars, liars_by_deed
 
 LAWS = sorted(name.removeprefix("test_") for name in dir(BodyContract) if name.startswith("test_"))
 LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
@@ -20,13 +20,13 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars.Backdating, "reports_a_point_as_it_is_passed", "200 ms after it"),
     (liars.Hesitating, "never_stops_where_it_may_pass", "head NOD, stroke_start"),
     (liars.Splitting, "points_that_are_one_instant_are_reported_as_one", "they are 10 ms apart"),
-    (liars.Posing, "can_do_something_of_each_type_that_it_has", "no poses"),
-    (liars.Obliging, "refuses_what_it_cannot_do_before_anything_moves", "gaze at nothing"),
+    (liars_by_deed.Posing, "can_do_something_of_each_type_that_it_has", "no poses"),
+    (liars_by_deed.Obliging, "refuses_what_it_cannot_do_before_anything_moves", "gaze at nothing"),
     (liars.Counting, "a_speech_tells_its_words_in_order", "the word 'This'"),
     (liars.Prompter, "an_aborted_speech_stops_at_a_word", "one two three four five six seven"),
     (liars.Stammering, "a_held_voice_is_silent_from_the_next_gap_on", "is is"),
     (liars.Hasty, "waits_at_each_hold_point_until_it_may_pass", "gaze at near-right, stroke"),
-    (liars.Trembling, "stands_still_while_it_waits", "within 1 s"),
+    (liars_by_deed.Trembling, "stands_still_while_it_waits", "within 1 s"),
     (liars.Restless, "a_held_behavior_waits_at_the_next_hold_point_though_it_might_pass", "has waited at nothing"),
     (liars.Released, "an_authority_that_comes_while_it_is_held_counts_once_it_goes_on", "gaze at near-right, stroke"),
     (liars.Presuming, "going_on_does_not_give_authority", "gesture BEAT, stroke_start"),
@@ -35,36 +35,36 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars.Possessed, "a_held_behavior_can_be_aborted_and_taken_over", "it goes on"),
     (liars.Deaf, "an_aborted_behavior_ends_at_once_and_safe", "end"),
     (liars.Stubborn, "an_aborted_hold_ends_at_once_and_safe", "it goes on"),
-    (liars.Clinging, "a_dropped_stream_ends_safe", "after its task was cancelled"),
-    (liars.Homeless, "home_is_reached_from_anything", "the safe pose as `home` returns"),
-    (liars.Homeless, "leaves_no_task_once_it_is_disconnected", "these go on: way home"),
-    (liars.Abrupt, "brakes_within_the_limits_of_its_joints", "degrees/s^2"),
-    (liars.Understating, "keeps_its_limits_whatever_comes", "speed of torso_turn"),
+    (liars_by_deed.Clinging, "a_dropped_stream_ends_safe", "after its task was cancelled"),
+    (liars_by_deed.Homeless, "home_is_reached_from_anything", "the safe pose as `home` returns"),
+    (liars_by_deed.Homeless, "leaves_no_task_once_it_is_disconnected", "these go on: way home"),
+    (liars_by_deed.Abrupt, "brakes_within_the_limits_of_its_joints", "degrees/s^2"),
+    (liars_by_deed.Understating, "keeps_its_limits_whatever_comes", "speed of torso_turn"),
     (liars.Boaster, "a_later_behavior_takes_over_the_part", "taken_over"),
-    (liars.Greedy, "a_shift_takes_nothing_from_a_look_that_lies_over_it", "the look is taken_over"),
+    (liars_by_deed.Greedy, "a_shift_takes_nothing_from_a_look_that_lies_over_it", "the look is taken_over"),
     (liars.Forgetful, "a_look_that_comes_over_a_shift_on_its_way_goes_home_to_where_that_leads", "start"),
     (liars.Boaster, "a_shift_on_its_way_is_taken_over_by_another", "gazeShift"),
-    (liars.Optimistic, "takes_the_time_that_it_predicted", "gaze at near-right, stroke"),
-    (liars.Eager, "predicts_without_moving", "where it was before it was asked"),
-    (liars.Staying, "is_on_target_where_it_said", "neck_"),
-    (liars.Remaining, "ends_where_it_said", "neck_"),
-    (liars.Present, "predicts_from_where_another_look_leaves_it", "after gaze at human"),
-    (liars.Noisy, "measures_all_its_joints_within_their_noise", "noise = math.radians(0.3"),
-    (liars.Jointless, "measures_all_its_joints_within_their_noise", "none of neck_yaw"),
-    (liars.Unmoved, "says_that_it_moves_as_long_as_it_moves", "meanwhile"),
+    (liars_by_deed.Optimistic, "takes_the_time_that_it_predicted", "gaze at near-right, stroke"),
+    (liars_by_deed.Eager, "predicts_without_moving", "where it was before it was asked"),
+    (liars_by_deed.Staying, "is_on_target_where_it_said", "neck_"),
+    (liars_by_deed.Remaining, "ends_where_it_said", "neck_"),
+    (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at human"),
+    (liars_by_deed.Noisy, "measures_all_its_joints_within_their_noise", "noise = math.radians(0.3"),
+    (liars_by_deed.Jointless, "measures_all_its_joints_within_their_noise", "none of neck_yaw"),
+    (liars_by_deed.Unmoved, "says_that_it_moves_as_long_as_it_moves", "meanwhile"),
     (liars.Early, "each_point_is_where_the_joints_are", "eyes on near-right, within 1.0 degrees"),
-    (liars.Expressionless, "each_point_is_where_the_joints_are", "faceLexeme SMILE, stroke"),
-    (liars.Stiff, "each_point_is_where_the_joints_are", "a head that has moved"),
+    (liars_by_deed.Expressionless, "each_point_is_where_the_joints_are", "faceLexeme SMILE, stroke"),
+    (liars_by_deed.Stiff, "each_point_is_where_the_joints_are", "a head that has moved"),
     (liars.Boaster, "no_sync_point_that_the_joints_do_not_bear_out", ""),
     (liars.Early, "no_sync_point_that_the_joints_do_not_bear_out", "eyes on"),
-    (liars.Stiff, "no_sync_point_that_the_joints_do_not_bear_out", "0.00 degrees"),
+    (liars_by_deed.Stiff, "no_sync_point_that_the_joints_do_not_bear_out", "0.00 degrees"),
 )
 """Who breaks which law, and words of what is found."""
 WITH_FAULTS: tuple[tuple[type[SimulatedBody], str], ...] = (
-    (liars.Stalled, "beside it"),
-    (liars.Unnamed, "a fault with a reason"),
-    (liars.Raw, "ConnectionResetError: peer is gone at liars.py, line"),
-    (liars.Unending, "it goes on"),
+    (liars_by_deed.Stalled, "beside it"),
+    (liars_by_deed.Unnamed, "a fault with a reason"),
+    (liars_by_deed.Raw, "ConnectionResetError: peer is gone at liars.py, line"),
+    (liars_by_deed.Unending, "it goes on"),
 )
 FAULTS = "with_a_fault_it_passes_or_names_the_fault"
 

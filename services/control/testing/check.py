@@ -162,7 +162,7 @@ def _judging(suite: type[BodyContract]) -> Iterator[list[str]]:
 
 
 class _Tried:
-    """What came of the trials of one law so far."""
+    """Trials of one law, and what has come of them so far."""
 
     def __init__(self, law: Any, topic: str) -> None:
         says, _, usually = (getdoc(law) or "").partition("\n\n")
@@ -215,7 +215,7 @@ class _Collected:
         return report
 
     def laws(self) -> Iterator[CheckedLaw]:
-        """What was collected."""
+        """List the laws with what was found."""
         for name, tried in self._tried.items():
             yield CheckedLaw(
                 law=name, topic=tried.topic, says=tried.says, usually=tried.usually, trials=tried.trials,

@@ -190,7 +190,7 @@ class EndingLaws(Suite):
             )
 
     async def test_leaves_no_task_once_it_is_disconnected(self) -> None:
-        """Once `connected()` is left, no task of the driver goes on.
+        """No task of the driver goes on once `connected()` is left.
 
         Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`.
         """

@@ -17,6 +17,8 @@ from engage_hri.services.control.testing.motions import Recording, recorded
 from engage_hri.services.control.testing.stage import Stage, default, done, standing, times
 from engage_hri.services.control.testing.suite import STILL, Suite, does_not_apply, trials
 
+SETTLING: Seconds = 0.5
+"""Time for the last tenths of a degree, once the joints are near enough to say that they have arrived."""
 NOTHING = "nothing that can wait on its way"
 
 
@@ -91,6 +93,7 @@ class HoldingLaws(Suite):
                         expected="`moving` false where it waits",
                         measured="`moving` true",
                     )
+                await asyncio.sleep(SETTLING)
                 async with recorded(body, self.joints(body, behavior)) as recording:
                     await asyncio.sleep(1.0)
                 self._check_still(recording, behavior, listed(stage.waits_at))

@@ -24,7 +24,7 @@ class PointsLaws(Suite):
     topic = "sync points"
 
     async def test_can_do_something_of_each_type_that_it_has(self, body: Body) -> None:
-        """Of each type in `capabilities.types` that the suite knows there is a behavior that the body can do.
+        """A body can do some behavior of each type in `capabilities.types` that the suite knows.
 
         Usually the targets of the suite's `world` are out of this robot's range, or its lexemes have other names:
         set `world` and `behaviors` to what it can do.

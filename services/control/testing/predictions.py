@@ -32,7 +32,7 @@ class PredictionLaws(Suite):
     topic = "predictions"
 
     async def test_takes_the_time_that_it_predicted(self, body: Body) -> None:
-        """From each sync point to the next it takes as long as its estimate said, within the stated `tolerance`.
+        """Time from each sync point to the next is what its estimate said, within the stated `tolerance`.
 
         Usually the estimate is the time of the command, and the joints arrive later: measure how much, and add it. Or
         state a larger tolerance.
@@ -96,7 +96,7 @@ class PredictionLaws(Suite):
                     )
 
     async def test_is_on_target_where_it_said(self, body: Body) -> None:
-        """On target (from `stroke` to `relax`, of a shift at `end`) its joints are where `pose_after` said.
+        """Joints on target (from `stroke` to `relax`, of a shift at `end`) are where `pose_after` said.
 
         Usually `pose_after` is the goal, and the joints are short of it when the point is told: tell it from measured
         angles. What the next reference costs is counted from `pose_after`.

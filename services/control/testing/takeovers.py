@@ -84,6 +84,7 @@ class TakeoverLaws(Suite):
         look = Stage(body, Gaze(id="look", target=self._targets(body)[0]), "stroke")
         await look.holding()
         await standing(body)
+        await asyncio.sleep(self.dwell)
         before, there = body.state().gaze, self._targets(body)[1]
         shift = Stage(body, GazeShift(id="shift", target=there), "end")
         await shift.over()
