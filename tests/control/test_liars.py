@@ -63,7 +63,7 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
 WITH_FAULTS: tuple[tuple[type[SimulatedBody], str], ...] = (
     (liars_by_deed.Stalled, "beside it"),
     (liars_by_deed.Unnamed, "a fault with a reason"),
-    (liars_by_deed.Raw, "ConnectionResetError: peer is gone at liars.py, line"),
+    (liars_by_deed.Raw, "ConnectionResetError: peer is gone at liars_by_deed.py, line"),
     (liars_by_deed.Unending, "it goes on"),
 )
 FAULTS = "with_a_fault_it_passes_or_names_the_fault"

@@ -25,6 +25,7 @@ from engage_hri.schemas.body import Ray
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, BodyState, Progress, Reached
+from engage_hri.services.control.testing.cases import findings_of
 from engage_hri.services.control.testing.laws import Finding, angles, degrees, ms, named
 from engage_hri.services.control.testing.points import PROMPT
 from engage_hri.services.control.testing.rays import angle, aside, beside
@@ -211,6 +212,9 @@ class Witness:
                         "a fault with a reason" if may_fail else "that it can do this",
                         f"failed: {failed.fault}",
                     )
+            except Exception as error:
+                stage.is_over_early = True
+                self.lies += findings_of(error, named(stage.behavior)) or ()
         for stage in self.stages:
             self._check_end(stage)
         if not may_fail:
