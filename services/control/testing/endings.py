@@ -158,7 +158,8 @@ class EndingLaws(Suite):
     async def test_keeps_its_limits_whatever_comes(self, body: Body) -> None:
         """No joint leaves its range, its speed or its acceleration, whatever is begun, taken over and aborted.
 
-        Usually the limits in `capabilities` are those of the data sheet, and the motors are set to others.
+        Usually a new command starts as if the joints stood still, and the motors are asked to jump; or the limits in
+        `capabilities` are those of the data sheet, and the motors are set to others.
         """
         self._needs_limits(body)
         for case in self.cases(body):

@@ -64,6 +64,7 @@ def broken(
     behavior: BlockBehavior | str = "", sync: str = "", *, expected: str, measured: str, advice: str = ""
 ) -> NoReturn:
     """Raise LawBroken with this finding."""
+    __tracebackhide__ = True
     place = behavior if isinstance(behavior, str) else named(behavior)
     finding = Finding(behavior=place, sync=sync, expected=expected, measured=measured, advice=advice)
     raise LawBroken([finding])
@@ -104,7 +105,8 @@ def ms(seconds: Seconds) -> str:
 
 def degrees(angle: Radians) -> str:
     """Words for an angle: `1.2 degrees`."""
-    return f"{math.degrees(angle):.{2 if abs(angle) < math.radians(0.1) else 1}f} degrees"
+    size = abs(math.degrees(angle))
+    return f"{math.degrees(angle):.{2 if size < 0.1 else 1 if size < 100.0 else 0}f} degrees"
 
 
 def listed(names: Iterable[str]) -> str:

@@ -130,6 +130,7 @@ class Suite:
 
         Raises LawBroken after the last one, with all findings.
         """
+        __tracebackhide__ = True
         behaviors = [each for each in self.able(body) if which(each)]
         if not behaviors:
             does_not_apply(f"it has {lacks}")

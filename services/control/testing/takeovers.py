@@ -4,7 +4,7 @@ import asyncio
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import TYPES, sync_points
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Pointing
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.references import type_name
@@ -108,9 +108,9 @@ class TakeoverLaws(Suite):
         Usually the shift ends as taken over, and the look goes back to where the head was before both.
         """
         self._needs_looks(body)
-        first, there = self._targets(body)[:2]
+        there, first = self._targets(body)[:2]
         shift = Stage(body, GazeShift(id="shift", target=there), "end")
-        await asyncio.sleep(0.1)
+        await self._half_way(body, shift.behavior)
         look = Stage(body, Gaze(id="look", target=first), "end")
         await shift.over()
         await look.over()
@@ -129,7 +129,7 @@ class TakeoverLaws(Suite):
         if "gazeShift" not in body.capabilities.types or len(targets) < 2:
             does_not_apply("it has no two gazeShifts")
         one = Stage(body, GazeShift(id="one", target=targets[0]), "end")
-        await asyncio.sleep(0.1)
+        await self._half_way(body, one.behavior)
         other = Stage(body, GazeShift(id="other", target=targets[1]), "end")
         await one.over()
         await other.over()
@@ -149,13 +149,19 @@ class TakeoverLaws(Suite):
             does_not_apply("there are no two things that it can look at")
 
     def _targets(self, body: Body, kind: str = "gaze") -> list[str]:
-        """Ids of the entities that it can look at, those first that lie farthest apart."""
-        make = TYPES[kind].kind
-        return [
-            entity.id
-            for entity in self.world.entities
-            if body.estimate(make(id="any", target=entity.id), None, self.world).feasible  # type: ignore[call-arg, arg-type]
-        ]
+        """Ids of the entities that it can look at, that first to which it takes longest from here."""
+        times = {}
+        for entity in self.world.entities:
+            look = (Gaze if kind == "gaze" else GazeShift)(id="any", target=entity.id)
+            estimate = body.estimate(look, None, self.world)
+            if estimate.feasible:
+                times[entity.id] = sum(phase.natural for phase in estimate.phases)
+        return sorted(times, key=lambda each: -times[each])
+
+    async def _half_way(self, body: Body, behavior: BlockBehavior) -> None:
+        """Wait until a behavior that has just begun is on its way."""
+        estimate = body.estimate(behavior, None, self.world)
+        await asyncio.sleep(min(0.1, sum(phase.natural for phase in estimate.phases) / 2))
 
     def _check_looks(self, body: Body, target: str, behavior: BlockBehavior) -> None:
         gaze = self.observed(body).gaze
