@@ -15,7 +15,7 @@ import pytest_asyncio
 from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+from engage_hri.services.control.testing.plugin import virtual_loop
 
 pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generation.head_stories")
 
@@ -31,12 +31,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's backgro
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
     sys.dont_write_bytecode = False
 
-LONGEST_TEST = 24 * 3600.0
-"""Virtual seconds; then a test waits for something that never comes."""
-
-
-def virtual_loop() -> asyncio.AbstractEventLoop:
-    return VirtualTimeLoop(limit=LONGEST_TEST)
+pytest_plugins = ["engage_hri.services.control.testing.plugin"]
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -46,7 +41,6 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "real_time: runs on the wall clock (real sockets and processes)")
     config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
     config.addinivalue_line("markers", "each_bus: runs twice: virtual time (memory bus) and wall clock (Zenoh)")
 

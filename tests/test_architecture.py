@@ -47,7 +47,7 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
-    "services/control": "service > drivers > torso > composed ordinary voice > shown"
+    "services/control": "testing > service > drivers > torso > composed ordinary voice > shown"
     " > actions estimates refusals switching unheard waiting > live > body > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"
     " > block head > references turns > permits > config",
@@ -180,6 +180,7 @@ def _is_pure(place: PurePosixPath) -> bool:
         and len(place.parts) > 2
         and place.parts[1] not in COMPOSERS | SHARED
         and place.name != "service.py"
+        and "testing" not in place.parts  # tests that are installed
         and str(place) not in SHELLS
     )
 

@@ -1,4 +1,4 @@
-"""Command line: a command `X` is the file `X.py` beside this one, with its `Options` and its `main`.
+"""Command line: a command `X-Y` is the file `X_Y.py` beside this one, with its `Options` and its `main`.
 
 The file is loaded when its command is called. The list of all commands needs only the table here.
 """
@@ -35,6 +35,7 @@ COMMANDS = {
     "hostile": "Attack the whole robot, in memory and virtual time only. "
     "Exit 1 if anything came of it that should not have.",
     "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
+    "check-body": "Hold a body to the contract of bodies, and tell where it breaks which. Exit 1 if it breaks one.",
     "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
     "keys": "Make certificates for all that take part (init, add, renew, revoke), show when they expire (show), "
     "and print the rules of who may do what (acl).",
@@ -45,7 +46,7 @@ COMMANDS = {
 
 def command(name: str) -> Any:
     """Load a command from its file. Its own options come first, then the shared ones."""
-    module = import_module(f"engage_hri.services.commandline.{name}")
+    module = import_module(f"engage_hri.services.commandline.{name.replace('-', '_')}")
     taken = inspect.signature(module.Options).parameters
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
 

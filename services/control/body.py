@@ -1,7 +1,7 @@
 """The contract of a body: behaviors in, measured sync points out. Everything specific to a robot is behind it.
 
 The realizer knows sync points, not joints. A robot with an SDK joins by one class: `docs/control.md` walks through it
-and `tests/control/contract.py` is the suite that it has to pass.
+and `services/control/testing` is the suite that it has to pass.
 """
 
 import asyncio
@@ -316,7 +316,7 @@ class Body(ABC):
     def rehearse_in_steps(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
     ) -> Steps[Sequence[Estimate]]:
-        """Do what `rehearse` does, as a generator: at each `yield` other work may get its turn.
+        """Rehearse as a generator does: at each `yield` other work may get its turn.
 
         Not overridden, behaviors that are each by themselves are estimated one by one. A plan is one step, and so are
         all where `rehearse` is overridden.

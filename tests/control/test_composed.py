@@ -12,9 +12,10 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.control.body import BehaviorRefused, Body, MouthShape, MovementAuthority, Reached
 from engage_hri.services.control.composed import ComposedBody, Member, composed
+from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
+from engage_hri.services.control.testing.contract import BodyContract
+from engage_hri.services.control.testing.stage import performed
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control.contract import BodyContract
-from tests.control.suite import BEHAVIORS, WORLD, performed
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")
 

@@ -1,57 +1,89 @@
-"""Every body we ship, held to the contract; and bodies that lie, which the contract is to catch."""
+"""Every body we ship, held to the contract: healthy, by noisy encoders, with parts missing, and with each fault."""
 
-from collections.abc import AsyncGenerator
-from contextlib import aclosing
-from random import Random
+import math
+from collections.abc import Callable, Mapping
 
-import pytest
+from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze
-from engage_hri.services.control.body import Body, MovementAuthority, Progress, Reached
+from engage_hri.services.control.body import Body, BodyState
+from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
+from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control.contract import BodyContract
-from tests.control.contract_truth import CROWDS, witnessed
-from tests.control.suite import WORLD
+from tests.control.liars_by_deed import Noisy
+
+FAULTS = {
+    "a slow neck": Variability(slow=(Slow(part="head", factor=3.0),)),
+    "a slow arm": Variability(slow=(Slow(part="left_arm", factor=2.0),)),
+    "a neck that stalls": Variability(stall=(Stall(part="head", before="stroke"),)),
+    "a neck that stalls for a while": Variability(stall=(Stall(part="head", before="stroke", seconds=2.0),)),
+    "arms that stall": Variability(
+        stall=(Stall(part="left_arm", before="ready"), Stall(part="right_arm", before="stroke"))
+    ),
+    "a trunk that stalls": Variability(stall=(Stall(part="torso", before="end"),)),
+    "a neck elsewhere than it believes": Variability(displaced=(Displaced(joint="neck_yaw", angle=25.0),)),
+    "overheated motors": Variability(overheated=("head", "left_arm", "face")),
+    "a mute voice that knows it": Variability(mute="refuse"),
+    "a mute voice": Variability(mute="silent"),
+    "times that scatter": Variability(noise=0.3),
+}
 
 
 class TestSimulatedBody(BodyContract):
     def make(self) -> Body:
         return SimulatedBody()
 
-
-class Boaster(SimulatedBody):
-    """Says of what is taken over that it was made."""
-
-    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        passed = set()
-        async with aclosing(super().perform(behavior, authority)) as stream:
-            async for progress in stream:
-                passed |= {progress.sync} if isinstance(progress, Reached) else set()
-                yield progress
-        if authority.revoked == "taken_over":
-            now = self._loop.time()
-            for sync in (each for each in authority.points if each not in passed):
-                yield Reached(sync, now, now)
+    def faults(self) -> Mapping[str, Callable[[], Body]]:
+        return {name: lambda each=each: SimulatedBody(deviations=each) for name, each in FAULTS.items()}  # type: ignore[misc]
 
 
-class Early(SimulatedBody):
-    """Says that it looks as soon as it begins to turn."""
+class TestNoisyEncoders(BodyContract):
+    noise = math.radians(0.3)
 
-    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        async with aclosing(super().perform(behavior, authority)) as stream:
-            async for progress in stream:
-                yield progress
-                if isinstance(behavior, Gaze) and isinstance(progress, Reached) and progress.sync == "stroke_start":
-                    yield Reached("stroke", progress.at, progress.at)
+    def make(self) -> Body:
+        return Noisy()
 
 
-@pytest.mark.parametrize(
-    ("liar", "crowd"), [(Boaster, "looks"), (Boaster, "arms"), (Boaster, "nods"), (Early, "looks")]
-)
-async def test_a_body_that_lies_about_its_joints_is_caught(liar: type[SimulatedBody], crowd: str) -> None:
-    body = liar()
-    body.see(WORLD)
-    witness = await witnessed(body, WORLD, CROWDS[crowd], Random(crowd))
+class Partial(SimulatedBody):
+    """A torso that lacks parts."""
 
-    assert witness is not None
-    assert witness.lies
+    parts: tuple[str, ...] = ()
+    types: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        super().__init__()
+        joints = tuple(each for each in self.capabilities.joints if each.part in self.parts)
+        self.capabilities = replace(self.capabilities, types=self.types, parts=self.parts, joints=joints)
+
+    def state(self) -> BodyState:
+        state, has_arms = super().state(), "right_arm" in self.parts
+        return replace(
+            state, gaze=state.gaze if "head" in self.parts else None,
+            left_arm=state.left_arm if has_arms else None, right_arm=state.right_arm if has_arms else None,
+        )  # fmt: skip
+
+
+class Voice(Partial):
+    parts, types = ("voice",), ("speech", "wait")
+
+
+class Arms(Partial):
+    parts, types = ("left_arm", "right_arm"), ("pointing", "gesture")
+
+
+class HeadAlone(Partial):
+    parts, types = ("head", "face"), ("gaze", "gazeShift", "head", "faceLexeme")
+
+
+class TestVoice(BodyContract):
+    def make(self) -> Body:
+        return Voice()
+
+
+class TestArms(BodyContract):
+    def make(self) -> Body:
+        return Arms()
+
+
+class TestHeadAlone(BodyContract):
+    def make(self) -> Body:
+        return HeadAlone()

@@ -10,10 +10,10 @@ from unittest.mock import patch
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.services.control.body import Body
+from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import JointMotion, Leg, resting
 from engage_hri.services.control.torso.path import Path as Way
-from tests.control.contract import BodyContract
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 

@@ -25,11 +25,14 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
+from engage_hri.services.control.testing.asked import WORLD
+from engage_hri.services.control.testing.motions import STEP, recorded, violations
+from engage_hri.services.control.testing.rays import aside, beside
+from engage_hri.services.control.testing.stage import Stage, performed, times
+from engage_hri.services.control.testing.suite import ON_AXIS
+from engage_hri.services.control.testing.witness import arms
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
-from tests.control.contract_truth import arms, beside
-from tests.control.motions import STEP, recorded, violations
-from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed, times
 
 TARGETS = ("human", "near-right", "far-left")
 HANDS: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")

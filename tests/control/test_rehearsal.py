@@ -9,8 +9,8 @@ import pytest
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Pointing, Posture, PostureShift
 from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.body import BehaviorRefused, MovementAuthority, Reached
+from engage_hri.services.control.testing.asked import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control.suite import WORLD
 
 EXACT = 0.002
 """Seconds by which a phase may be other than rehearsed."""

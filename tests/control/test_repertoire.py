@@ -23,11 +23,12 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.testing.asked import WORLD
+from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.stage import Stage, performed, times
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire
-from tests.control.motions import recorded, stops, violations
-from tests.control.suite import WORLD, Stage, performed, times
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 LEXEMES: list[BlockBehavior] = [

@@ -24,11 +24,11 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
+from engage_hri.services.control.testing.asked import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.service import running
 from tests.control.directing import robot
-from tests.control.suite import WORLD
 
 ZONE = NoPointZone(center=(0.45, -0.25, 0.73), radius=0.1)
 POINT, SPEECH = Pointing(id="p", target="near-right"), Speech(id="s", text="hello")

@@ -28,11 +28,12 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import Arrived, BehaviorRefused, MovementAuthority
+from engage_hri.services.control.testing.asked import WORLD
+from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.stage import Stage, default, performed, times
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.control.motions import recorded, stops, violations
-from tests.control.suite import WORLD, Stage, default, performed, times
 
 ARMS = ("LEFT_HAND", "RIGHT_HAND")
 
@@ -345,9 +346,8 @@ def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[B
         for stage in stages:
             stage.authority.extend("end")
             progress = await stage.over()
-            points = sync_points(stage._behavior)
             passed = default(stage.passed)
-            assert passed == points[: len(passed)]
+            assert passed == sync_points(stage.behavior)[: len(passed)]
             assert len([item for item in progress if isinstance(item, Arrived)]) <= 2
 
         assert violations(recording, body.capabilities.joints) == []

@@ -15,11 +15,11 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
+from engage_hri.services.control.testing.asked import WORLD
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.service import running
-from tests.control.suite import WORLD
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage, together
 from tests.realizer.steering import interrupt

@@ -1,0 +1,239 @@
+"""Running the contract suite on a body in this process, by pytest, and collecting what every law found.
+
+Nothing of the folder and the environment takes part: no configuration, no conftest.py, no other plugin.
+"""
+
+import asyncio
+import os
+import sys
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from inspect import getdoc
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.references import type_name
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD, behaviors_in
+from engage_hri.services.control.testing.cases import Connection, findings_of
+from engage_hri.services.control.testing.contract import BodyContract
+from engage_hri.services.control.testing.laws import Finding, named
+from engage_hri.services.control.testing.plugin import virtual_loop
+from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
+from engage_hri.services.control.testing.suite import PLUGIN, Suite, unchecked
+from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
+
+Make = Callable[[], Body]
+Progress = Callable[[str, int, int], None]
+"""Called with the law that is tried, and the numbers of trials done and in all."""
+LOOKS = 20
+"""Estimates whose time is taken."""
+_judged: list[type[BodyContract]] = []
+"""The class that the file of the running check takes."""
+
+
+def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: Progress | None = None) -> BodyReport:
+    """Check a body against the contract.
+
+    make: makes it, in a running event loop. driver: its name, for the report. law: only laws whose names have these
+    words; empty: all. progress: see `Progress`.
+
+    Raises InputRefused if there is no such law, EngageError if the body cannot be had, KeyboardInterrupt.
+    """
+    since = time.monotonic()
+    report = _described(make, stated, driver)
+    collected = _Collected(law.lower().replace("`", ""), progress)
+    with _judging(_suite(make, stated)) as arguments:
+        code = pytest.main(arguments, plugins=[collected])
+    if code == pytest.ExitCode.INTERRUPTED:
+        raise KeyboardInterrupt
+    if code == pytest.ExitCode.NO_TESTS_COLLECTED:
+        raise InputRefused(Fault(reason=f"no law has {law!r} in its name", advice="without it all names are printed"))
+    if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+        raise RuntimeError(f"pytest ended with {code!r}")
+    return replace(report, laws=tuple(collected.laws()), seconds=time.monotonic() - since)
+
+
+def judged() -> type[BodyContract]:
+    """The suite of the running check."""
+    return _judged[-1]
+
+
+def _suite(make: Make, stated: Stated) -> type[BodyContract]:
+    settings = {
+        "make": lambda self: make(),
+        "tolerance": stated.tolerance,
+        "noise": stated.noise,
+        "accuracy": stated.accuracy,
+        "world": stated.world or WORLD,
+        "behaviors": _behaviors(stated),
+    }
+    suite = type("TestBody", (BodyContract,), settings)
+    return pytest.mark.real_time(suite) if stated.real_time else suite
+
+
+def _behaviors(stated: Stated) -> tuple[BlockBehavior, ...]:
+    return BEHAVIORS if stated.world is None else behaviors_in(stated.world)
+
+
+# -- what it is ---------------------------------------------------------------------------------------------------
+
+
+def _described(make: Make, stated: Stated, driver: str) -> BodyReport:
+    """Connect the body once, and say what it is."""
+    with asyncio.Runner(loop_factory=None if stated.real_time else virtual_loop) as runner:
+        try:
+            return runner.run(_describe(make, stated, driver))
+        except (Deadlock, TimeRanOut, TimeoutError) as error:
+            advice = "a body with a clock of its own (hardware, a daemon, a socket) is checked with --real-time"
+            reason = f"it waits for what never comes: {error}"
+            raise InputRefused(Fault(reason=reason, where=f"body {driver}", advice=advice)) from error
+
+
+async def _describe(make: Make, stated: Stated, driver: str) -> BodyReport:
+    body, world = make(), stated.world or WORLD
+    connection = Connection(body)
+    await connection.enter()
+    try:
+        body.see(world)
+        asked, not_asked = [], []
+        behaviors = _behaviors(stated)
+        for behavior in behaviors:
+            if type_name(behavior) not in body.capabilities.types:
+                continue
+            estimate = body.estimate(behavior, None, world)
+            if estimate.feasible:
+                asked.append(behavior)
+            else:
+                not_asked.append(f"{named(behavior)}: {estimate.fault.reason if estimate.fault else 'not feasible'}")
+        times = []
+        for number in range(LOOKS if asked else 0):
+            since = time.perf_counter()
+            body.estimate(asked[number % len(asked)], None, world)
+            times.append(time.perf_counter() - since)
+        return BodyReport(
+            driver=driver, capabilities=body.capabilities, stated=stated, asked=tuple(map(named, asked)),
+            not_asked=tuple(not_asked), unknown=tuple(unchecked(body.capabilities, behaviors)),
+            estimate=median(times) if times else 0.0,
+        )  # fmt: skip
+    finally:
+        await connection.leave()
+
+
+# -- how pytest runs it -------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _judging(suite: type[BodyContract]) -> Iterator[list[str]]:
+    """Lay a test file in a folder of its own, and give the arguments by which pytest runs it and nothing else."""
+    kept = {name: os.environ.pop(name, None) for name in ("PYTEST_ADDOPTS", "PYTEST_PLUGINS")}
+    kept["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = os.environ.get("PYTEST_DISABLE_PLUGIN_AUTOLOAD")
+    os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+    written = sys.dont_write_bytecode
+    _judged.append(suite)
+    try:
+        with TemporaryDirectory(prefix="engage-check-body-") as folder:
+            name = Path(folder).name.replace("-", "_")  # another one each time: Python keeps modules by their names
+            file, settings = Path(folder) / f"test_{name}.py", Path(folder) / "pytest.ini"
+            file.write_text(f"from {__name__} import judged\n\nTestBody = judged()\n", encoding="utf-8")
+            settings.write_text("[pytest]\nasyncio_default_fixture_loop_scope = function\n", encoding="utf-8")
+            without = [
+                f"no:{plugin}" for plugin in ("cacheprovider", "terminal", "logging", "faulthandler", "warnings")
+            ]
+            loaded = ["pytest_asyncio.plugin", PLUGIN]
+            options = [option for name in (*without, *loaded) for option in ("-p", name)]
+            yield [str(file), "-c", str(settings), "--rootdir", folder, "--import-mode=importlib", *options]
+    finally:
+        _judged.pop()
+        sys.dont_write_bytecode = written
+        for name, value in kept.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+class _Tried:
+    """Trials of one law, and what has come of them so far."""
+
+    def __init__(self, law: Any, topic: str) -> None:
+        says, _, usually = (getdoc(law) or "").partition("\n\n")
+        self.says, self.usually = " ".join(says.split()), " ".join(usually.removeprefix("Usually ").split())
+        self.topic = topic
+        self.trials = self.passed = 0
+        self.seconds = 0.0
+        self.findings: dict[Finding, None] = {}
+        self.reasons: dict[str, None] = {}
+
+
+class _Collected:
+    """A plugin of pytest that keeps what each law found."""
+
+    def __init__(self, words: str, progress: Progress | None) -> None:
+        self._words = words
+        self._progress = progress
+        self._tried: dict[str, _Tried] = {}
+        self._done = self._count = 0
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Keep the laws that were asked for, by topic and in the order in which they are written."""
+        kept = [item for item in items if self._words in _words(item)]
+        order = {topic: number for number, topic in enumerate(TOPICS)}
+        items[:] = sorted(kept, key=lambda item: order[_topic(item)])
+        self._count = len(items)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(
+        self, item: pytest.Function, call: pytest.CallInfo[None]
+    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """Take the findings from the exception itself."""
+        report = yield
+        tried = self._tried.setdefault(_words(item), _Tried(item.function, _topic(item)))
+        tried.seconds += report.duration
+        if call.excinfo is not None and report.skipped:
+            tried.reasons[str(call.excinfo.value)] = None
+        elif call.excinfo is not None:
+            found = findings_of(call.excinfo.value) or [
+                Finding(expected="no error", measured=str(call.excinfo.value))
+            ]
+            tried.findings |= dict.fromkeys(found)
+        if call.when == "call":
+            tried.passed += report.passed
+        if call.when == "teardown":
+            tried.trials += 1
+            self._done += 1
+            if self._progress is not None:
+                self._progress(_words(item), self._done, self._count)
+        return report
+
+    def laws(self) -> Iterator[CheckedLaw]:
+        """List the laws with what was found."""
+        for name, tried in self._tried.items():
+            yield CheckedLaw(
+                law=name, topic=tried.topic, says=tried.says, usually=tried.usually, trials=tried.trials,
+                verdict=verdict(tried.findings, tried.passed), findings=tuple(tried.findings),
+                reasons=tuple(tried.reasons), seconds=tried.seconds,
+            )  # fmt: skip
+
+
+TOPICS = tuple(base.topic for base in BodyContract.__mro__ if issubclass(base, Suite) and "topic" in vars(base))
+"""Topics of the laws, in the order in which the contract names them."""
+
+
+def _words(item: pytest.Item) -> str:
+    """Name of a law, in words."""
+    name = getattr(item, "originalname", None) or item.name
+    return name.removeprefix("test_").replace("_", " ")
+
+
+def _topic(item: pytest.Item) -> str:
+    name = getattr(item, "originalname", "")
+    return next(base.topic for base in BodyContract.__mro__ if issubclass(base, Suite) and name in vars(base))

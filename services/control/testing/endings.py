@@ -1,0 +1,239 @@
+"""Laws of ends: aborted, dropped, or called home, a body brakes within its limits and comes to its safe pose."""
+
+import asyncio
+from random import Random
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import AbortMode, Body, Spoke
+from engage_hri.services.control.testing.cases import Connection, still_running
+from engage_hri.services.control.testing.holding import NOTHING, is_movement
+from engage_hri.services.control.testing.laws import broken, degrees, listed, ms
+from engage_hri.services.control.testing.motions import Recording, recorded, violations
+from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
+from engage_hri.services.control.testing.suite import Suite, does_not_apply, trials
+
+AT_ONCE: Seconds = 3.0
+"""Time within which a behavior ends that is aborted: it may brake, and freeze for a moment."""
+WORD: Seconds = 1.0
+"""Time that a voice has for saying its word to the end."""
+HOWS: tuple[AbortMode, ...] = ("relax", "freeze")
+
+
+def is_overlay(behavior: BlockBehavior) -> bool:
+    """True for what goes back to rest by itself; a shift stays, wherever it was cut."""
+    return not type_name(behavior).endswith("Shift") and type_name(behavior) != "pose"
+
+
+class EndingLaws(Suite):
+    """Part of `BodyContract`."""
+
+    topic = "ends"
+
+    async def test_an_aborted_behavior_ends_at_once_and_safe(self, body: Body) -> None:
+        """Revoked on its way, a behavior ends within 3 s without `end`, and its parts go on to the safe pose.
+
+        Usually `perform` waits for a motion to be over before it looks at the authority, or nobody commands the way
+        home once the behavior has ended: do it in a `finally`.
+        """
+        home = await self.pose(body)
+        for case in self.cases(body, is_overlay, "nothing that goes back to rest by itself"):
+            async with case as behavior:
+                for how in HOWS:
+                    stage = Stage(body, behavior, "end")
+                    await asyncio.sleep(0.35)
+                    stage.authority.revoke(how)
+                    await stage.over(AT_ONCE)
+                    if "end" in stage.passed:
+                        broken(
+                            behavior,
+                            "end",
+                            expected="no `end` of what was aborted after 350 ms",
+                            measured=f"passed {listed(stage.passed)}",
+                        )
+                    await self.check_rest(body, home, behavior, f"after an abort ({how})")
+
+    async def test_an_aborted_hold_ends_at_once_and_safe(self, body: Body) -> None:
+        """Revoked where it waits, a behavior ends within 3 s, and its parts go on to the safe pose.
+
+        Usually it waits for a point that never comes: `await authority.granted(...)` raises `Revoked`.
+        """
+        home = await self.pose(body)
+        for case in self.cases(body, is_movement, NOTHING):
+            async with case as behavior:
+                stage = Stage(body, behavior)
+                await stage.holding()
+                stage.authority.revoke()
+                await stage.over(AT_ONCE)
+                await self.check_rest(body, home, behavior, "after an aborted wait")
+
+    async def test_a_dropped_stream_ends_safe(self, body: Body) -> None:
+        """`home` brings parts to the safe pose also from a behavior whose task was cancelled.
+
+        Usually the part still belongs to the behavior that is gone: give it back in a `finally`.
+        """
+        home = await self.pose(body)
+        for case in self.cases(body):
+            async with case as behavior:
+                stage = Stage(body, behavior, "end")
+                await asyncio.sleep(0.35)
+                stage.task.cancel()
+                await asyncio.gather(stage.task, return_exceptions=True)
+                await self.go_home(body)
+                await self.check_rest(body, home, behavior, "after its task was cancelled")
+
+    async def test_home_is_reached_from_anything(self, body: Body) -> None:
+        """`home` returns when the body is at its safe pose, whatever it was doing; those behaviors end as aborted.
+
+        Usually `home` returns as the command is sent, or a behavior that was under way commands its next goal after
+        it.
+        """
+        home = await self.pose(body)
+        stages = [Stage(body, each, "end") for each in self.able(body) if not isinstance(each, Wait)]
+        if not stages:
+            does_not_apply("it only waits")
+        await asyncio.sleep(0.45)
+        under_way = [stage for stage in stages if not stage.task.done()]
+        await self.go_home(body)
+        joints = self.joints(body)
+        self.check_pose(
+            await self.pose(body), home, joints, stages[0].behavior, what="the safe pose as `home` returns"
+        )
+        if not await standing(body, WORD) or body.state().speaking:
+            broken(
+                expected=f"`moving` false and silence {ms(WORD)} after `home` has returned",
+                measured=f"moving {body.state().moving}, speaking {body.state().speaking!r}",
+            )
+        await asyncio.wait([stage.task for stage in stages], timeout=AT_ONCE)
+        for stage in under_way:
+            if not stage.task.done() or "end" in stage.passed:
+                broken(
+                    stage.behavior,
+                    expected="that it ends as `home` takes its parts, without `end`",
+                    measured=f"passed {listed(stage.passed)}"
+                    + ("" if stage.task.done() else f"; it goes on {ms(AT_ONCE)} later"),
+                )
+            if stage.authority.revoked is None:
+                broken(stage.behavior, expected="that `home` revokes its authority", measured="it is not revoked")
+        await asyncio.sleep(self.dwell)
+        self.check_pose(await self.pose(body), home, joints, stages[0].behavior, what="the safe pose some time later")
+
+    async def go_home(self, body: Body) -> None:
+        """Call the body home. Raises LawBroken if it does not get there."""
+        try:
+            async with asyncio.timeout(PATIENCE):
+                await body.home()
+        except TimeoutError:
+            broken(expected=f"that `home` returns within {ms(PATIENCE)}", measured="it does not")
+
+    @trials(3)
+    async def test_brakes_within_the_limits_of_its_joints(self, body: Body, seed: int) -> None:
+        """Held and aborted at any instant on its way, no joint exceeds its speed or acceleration.
+
+        Usually a stop is a command to be where the joint is now. Brake with the acceleration that `capabilities`
+        names, or name the one that the motors have.
+        """
+        self._needs_limits(body)
+        chance = Random(seed)
+        for case in self.cases(body, is_movement, NOTHING):
+            async with case as behavior:
+                async with recorded(body) as recording:
+                    stage = Stage(body, behavior, "end")
+                    for _ in range(4):
+                        await asyncio.sleep(chance.uniform(0.0, 0.4))
+                        stage.authority.hold()
+                        await asyncio.sleep(chance.choice((0.02, 0.1, 1.0)))
+                        stage.authority.go_on()
+                    await stage.over()
+                    stage = Stage(body, behavior, "end")
+                    await asyncio.sleep(chance.uniform(0.1, 0.5))
+                    stage.authority.revoke(chance.choice(HOWS))
+                    await stage.over()
+                    await self.go_home(body)
+                self.check_limits(body, recording, behavior)
+
+    async def test_keeps_its_limits_whatever_comes(self, body: Body) -> None:
+        """No joint leaves its range, its speed or its acceleration, whatever is begun, taken over and aborted.
+
+        Usually a new command starts as if the joints stood still, and the motors are asked to jump; or the limits in
+        `capabilities` are those of the data sheet, and the motors are set to others.
+        """
+        self._needs_limits(body)
+        for case in self.cases(body):
+            async with case as behavior:
+                async with recorded(body) as recording:
+                    stage = Stage(body, behavior)
+                    await asyncio.sleep(0.3)
+                    stage.authority.extend("end")
+                    other = Stage(body, replace(behavior, id="other"), "end")
+                    await asyncio.sleep(0.25)
+                    other.authority.revoke()
+                    await asyncio.gather(stage.task, other.task, return_exceptions=True)
+                    await self.go_home(body)
+                self.check_limits(body, recording, behavior)
+
+    def _needs_limits(self, body: Body) -> None:
+        if not body.capabilities.joints:
+            does_not_apply("its capabilities name no joints")
+
+    def check_limits(self, body: Body, recording: Recording, behavior: BlockBehavior) -> None:
+        """Judge what was recorded. Raises LawBroken with the first limit that was left."""
+        for each in violations(recording, body.capabilities.joints, self.noise):
+            unit = each.unit.removeprefix("degrees")
+            when = each.at - recording.times[0]
+            broken(
+                behavior,
+                expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{unit}",
+                measured=f"{degrees(each.measured)}{unit}, {ms(when)} after it was asked for",
+            )
+
+    async def test_leaves_no_task_once_it_is_disconnected(self) -> None:
+        """No task of the driver goes on once `connected()` is left.
+
+        Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`.
+        """
+        before = asyncio.all_tasks()
+        body = self.make()
+        connection = Connection(body)
+        await connection.enter()
+        body.see(self.world)
+        for behavior in self.able(body):
+            Stage(body, behavior, "end")
+        await asyncio.sleep(0.3)
+        await Stage.end_all()
+        await self.go_home(body)
+        await connection.leave()
+        left = await still_running(before)
+        for task in left:
+            task.cancel()
+        if left:
+            names = ", ".join(task.get_name() for task in left)
+            broken(expected="no task of the driver once it is disconnected", measured=f"these go on: {names}")
+
+    async def test_an_aborted_speech_stops_at_a_word(self, body: Body) -> None:
+        """Aborted, a voice says its word to the end, tells it, and is silent; it tells no word that it has not said.
+
+        Usually all words are told as the synthesiser returns, before the sound is played.
+        """
+        if "speech" not in body.capabilities.types:
+            does_not_apply("it has no voice")
+        words = ["one", "two", "three", "four", "five", "six", "seven"]
+        speech = Speech(id="long", text=" ".join(words))
+        stage = Stage(body, speech, "end")
+        await asyncio.sleep(0.8)
+        if not body.state().speaking:
+            broken(speech, expected="its text in `speaking` while it speaks", measured="an empty `speaking`")
+        stage.authority.revoke()
+        progress = await stage.over(AT_ONCE)
+        said = [each.word for each in progress if isinstance(each, Spoke)]
+        if not 0 < len(said) < len(words) or said != words[: len(said)] or "end" in stage.passed:
+            broken(
+                speech,
+                expected="some of its words in order, and no `end`, 800 ms after it began",
+                measured=f"{' '.join(said)!r}; passed {listed(stage.passed)}",
+            )
+        if saying := body.state().speaking:
+            broken(speech, expected="silence once it has ended", measured=f"`speaking` is {saying!r}")

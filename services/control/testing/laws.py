@@ -1,0 +1,119 @@
+"""Words for a law that a body has broken: what was expected, what was measured, and where. Pure.
+
+Angles are in degrees and times in milliseconds: these words are for people who stand beside a robot.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NoReturn
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    Face,
+    FaceFacs,
+    FaceLexeme,
+    FaceShift,
+    Gaze,
+    Gesture,
+    Head,
+    Pointing,
+    Pose,
+    Posture,
+    PostureShift,
+    Speech,
+    Wait,
+    expressed,
+    posed,
+)
+from engage_hri.schemas.body import BodyPose
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Radians, Seconds
+
+
+class Finding(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One way in which a law was broken.
+
+    behavior: what was performed; empty: it concerns none. sync: the sync point in question; empty: none.
+    advice: what to do about this one; empty: what the law says of itself.
+    """
+
+    expected: str
+    measured: str
+    behavior: str = ""
+    sync: str = ""
+    advice: str = ""
+
+    def __str__(self) -> str:
+        place = ", ".join(filter(None, (self.behavior, self.sync)))
+        text = f"expected {self.expected}; measured {self.measured}"
+        text = f"{place}: {text}" if place else text
+        return f"{text} ({self.advice})" if self.advice else text
+
+
+class LawBroken(AssertionError):
+    """A body has broken a law of the contract. findings: at least one."""
+
+    def __init__(self, findings: Sequence[Finding]) -> None:
+        self.findings = tuple(findings)
+        super().__init__("\n".join(map(str, self.findings)))
+
+
+def broken(
+    behavior: BlockBehavior | str = "", sync: str = "", *, expected: str, measured: str, advice: str = ""
+) -> NoReturn:
+    """Raise LawBroken with this finding."""
+    __tracebackhide__ = True
+    place = behavior if isinstance(behavior, str) else named(behavior)
+    finding = Finding(behavior=place, sync=sync, expected=expected, measured=measured, advice=advice)
+    raise LawBroken([finding])
+
+
+# -- words --------------------------------------------------------------------------------------------------------
+
+
+def named(behavior: BlockBehavior) -> str:
+    """Words for a behavior: `gaze at near-right`, `head NOD 3 times`."""
+    kind = type_name(behavior)
+    match behavior:
+        case Pointing(target=target, mode=mode) if mode:
+            return f"{kind} at {target} with {mode}"
+        case Gesture(lexeme=lexeme, mode=mode):
+            return f"{kind} {lexeme} with {mode}" if mode else f"{kind} {lexeme}"
+        case Head(lexeme=lexeme, repetition=repetition):
+            return f"{kind} {lexeme} {repetition} times" if repetition > 1 else f"{kind} {lexeme}"
+        case Speech(text=text):
+            return f"{kind} {text!r}"
+        case Wait(duration=duration):
+            return f"{kind} {duration} s"
+        case Face() | FaceLexeme() | FaceFacs() | FaceShift():
+            shown = (each.lexeme or f"AU{each.au}" for each in expressed(behavior))
+            return f"{kind} {' '.join(shown)}"
+        case Posture() | PostureShift() | Pose():
+            stance = "" if isinstance(behavior, Pose) else behavior.stance
+            return " ".join(filter(None, (kind, stance, *(each.lexeme for each in posed(behavior)))))
+    target = getattr(behavior, "target", "")
+    preposition = "at" if isinstance(behavior, Gaze | Pointing) else "to"
+    return f"{kind} {preposition} {target}" if target else kind
+
+
+def ms(seconds: Seconds) -> str:
+    """Words for a duration: `350 ms`."""
+    return f"{seconds * 1000:.0f} ms" if abs(seconds) < 10.0 else f"{seconds:.1f} s"
+
+
+def degrees(angle: Radians) -> str:
+    """Words for an angle: `1.2 degrees`."""
+    size = abs(math.degrees(angle))
+    return f"{math.degrees(angle):.{2 if size < 0.1 else 1 if size < 100.0 else 0}f} degrees"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Words for names of points, or for none."""
+    return ", ".join(names) or "nothing"
+
+
+def angles(pose: BodyPose) -> dict[str, Radians]:
+    """The angle of each joint, by its name."""
+    return {each.joint: each.angle for each in pose.joints}

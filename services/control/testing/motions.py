@@ -1,0 +1,188 @@
+"""Watching a body move: samples of its joints, what they say about limits, and stops that nothing required.
+
+Limits are judged by differences over several spans of time. A joint that keeps its speed keeps it over every span,
+and the longer the span, the less the noise of an encoder counts in it.
+"""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from engage_hri.schemas.body import JointLimit
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.testing.laws import angles
+
+STEP: Seconds = 0.004
+"""Time between two samples."""
+LONGEST_SPAN: Seconds = 0.3
+DEVIATIONS = 6.0
+"""Standard deviations of noise that no difference is ever blamed for."""
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Violation(Struct, frozen=True, kw_only=True):
+    """A joint that has left one of its limits.
+
+    what: `range`, `speed` or `acceleration`. measured, limit: radians, per second, per second squared. at: seconds.
+    """
+
+    joint: str
+    what: str
+    measured: float
+    limit: float
+    at: Seconds
+
+    @property
+    def unit(self) -> str:
+        """Unit of the two numbers in words, once they are in degrees."""
+        return {"range": "degrees", "speed": "degrees/s", "acceleration": "degrees/s^2"}[self.what]
+
+    def __str__(self) -> str:
+        measured, limit = math.degrees(self.measured), math.degrees(self.limit)
+        return f"{self.joint}: {self.what} {measured:.1f} {self.unit}, its limit is {limit:.1f}"
+
+
+class Recording:
+    """Joint angles of a body over time, sampled at a steady rate."""
+
+    def __init__(self, joints: Iterable[str]) -> None:
+        self.joints = tuple(joints)
+        self.times: list[Seconds] = []
+        self.samples: list[list[Radians]] = []
+
+    def take(self, body: Body) -> None:
+        """Take a sample now."""
+        now, measured = asyncio.get_running_loop().time(), angles(body.state().pose)
+        if self.times and now <= self.times[-1]:
+            return
+        self.times.append(now)
+        self.samples.append([measured[joint] for joint in self.joints])
+
+    @property
+    def angles(self) -> Array:
+        """Angles of shape (samples, joints), radians."""
+        return np.array(self.samples)
+
+    @property
+    def speeds(self) -> Array:
+        """Speeds from sample to sample, radians per second."""
+        return np.asarray(np.diff(self.angles, axis=0) / np.diff(self.times)[:, None])
+
+    def at(self, time: Seconds) -> dict[str, Radians]:
+        """Angle of each joint at an instant, between the two samples about it."""
+        columns = self.angles.T if self.samples else np.empty((0, 0))
+        return {
+            joint: float(np.interp(time, self.times, column))
+            for joint, column in zip(self.joints, columns, strict=True)
+        }
+
+
+@asynccontextmanager
+async def recorded(body: Body, joints: Iterable[str] = ()) -> AsyncIterator[Recording]:
+    """Record everything that `body` does inside the `async with`; by default of all its joints."""
+    recording = Recording(joints or (limit.joint for limit in body.capabilities.joints))
+
+    async def sample() -> None:
+        while True:
+            recording.take(body)
+            await asyncio.sleep(STEP)
+
+    sampling = asyncio.create_task(sample(), name="recording")
+    try:
+        yield recording
+    finally:
+        sampling.cancel()
+        (ended,) = await asyncio.gather(sampling, return_exceptions=True)
+        if isinstance(ended, Exception):
+            raise ended
+
+
+def violations(recording: Recording, limits: Iterable[JointLimit], noise: Radians = 0.0) -> list[Violation]:
+    """List joints that leave their range, their speed or their acceleration.
+
+    noise: standard deviation of one reading.
+    """
+    found: list[Violation] = []
+    times, samples, late = _readings(recording)
+    for limit in limits:
+        if limit.joint not in recording.joints or len(times) < 3:
+            continue
+        column = samples[:, recording.joints.index(limit.joint)]
+        found += _out_of_range(limit, times, column, noise)
+        found += _too_fast(limit, times, column, noise, late)
+    return found
+
+
+def _readings(recording: Recording) -> tuple[Array, Array, Seconds]:
+    """Samples that are new readings, and by how much their times may be off.
+
+    Drivers often hand out the last message of their hardware: a reading that comes again in motion is old.
+    """
+    times, samples = np.array(recording.times), recording.angles
+    if len(times) < 3:
+        return times, samples, 0.0
+    fresh = np.flatnonzero(np.any(np.diff(samples, axis=0) != 0.0, axis=1)) + 1
+    gaps = np.diff(times[fresh])
+    gaps = gaps[gaps < LONGEST_SPAN]  # longer: the body stands
+    step = float(np.median(np.diff(times)))
+    if len(gaps) < 3 or float(np.median(gaps)) < 1.5 * step:
+        return times, samples, 0.0
+    return times[fresh], samples[fresh], step
+
+
+def _out_of_range(limit: JointLimit, times: Array, column: Array, noise: Radians) -> Iterable[Violation]:
+    slack = DEVIATIONS * noise + 1e-6
+    for index, bound in ((int(column.argmin()), limit.low), (int(column.argmax()), limit.high)):
+        if not limit.low - slack <= column[index] <= limit.high + slack:
+            yield Violation(
+                joint=limit.joint, what="range", measured=float(column[index]), limit=bound, at=float(times[index])
+            )
+
+
+def _too_fast(limit: JointLimit, times: Array, column: Array, noise: Radians, late: Seconds) -> Iterable[Violation]:
+    """Compare divided differences with the limits: each is one that the joint has really had."""
+    worst: dict[str, Violation] = {}
+    step = float(np.median(np.diff(times)))
+    span = 1
+    while span == 1 or span * step <= LONGEST_SPAN:
+        if 2 * span >= len(times):
+            break
+        between = times[span:] - times[:-span]
+        speed = (column[span:] - column[:-span]) / between
+        slack = (DEVIATIONS * math.sqrt(2.0) * noise + 2.0 * limit.speed * late) / between
+        _note(worst, limit.joint, "speed", np.abs(speed) - slack, limit.speed, times[:-span], speed)
+        around = (between[:-span] + between[span:]) / 2.0
+        change = (speed[span:] - speed[:-span]) / around
+        shortest = np.minimum(between[:-span], between[span:])
+        slack = (DEVIATIONS * math.sqrt(6.0) * noise + 4.0 * limit.speed * late) / shortest**2
+        _note(
+            worst, limit.joint, "acceleration", np.abs(change) - slack, limit.acceleration, times[: -2 * span], change
+        )
+        span *= 2
+    return worst.values()
+
+
+def _note(
+    worst: dict[str, Violation], joint: str, what: str, sure: Array, limit: float, times: Array, measured: Array
+) -> None:
+    index = int(sure.argmax())
+    value = abs(float(measured[index]))
+    if sure[index] > limit * (1 + 1e-6) and (what not in worst or value > worst[what].measured):
+        worst[what] = Violation(joint=joint, what=what, measured=value, limit=limit, at=float(times[index]))
+
+
+def stops(recording: Recording, start: Seconds, end: Seconds) -> int:
+    """Count how often the joints' speed falls under 1 % of its peak between `start` and `end`, once it was above."""
+    times = np.array(recording.times[1:])
+    inside = (times > start) & (times <= end)
+    speed = np.linalg.norm(recording.speeds[inside], axis=1)
+    moving = speed >= 0.01 * speed.max()
+    # The last samples before the end are the end of the motion, not a stop in it.
+    first, last = int(np.argmax(moving)), len(moving) - int(np.argmax(moving[::-1]))
+    return int(np.sum(np.diff(moving[first:last].astype(int)) == -1))

@@ -1,0 +1,146 @@
+"""The report for people. Pure: a report in, text out, as wide as the terminal."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from engage_hri.services.control.testing.laws import Finding, degrees, ms
+from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Verdict
+
+SHOWN = 4
+"""Findings of one law that are shown; the JSON has all."""
+MARKS: dict[Verdict, tuple[str, str]] = {
+    "holds": ("holds", "green"), "broken": ("BROKEN", "bold red"), "does not apply": ("--", "dim"),
+}  # fmt: skip
+NEVER = ("goes on", "for ever", "never comes", "nothing", "stays true", "does not return")
+"""Words of findings that a body with a clock of its own has in virtual time."""
+
+
+def rendered(report: BodyReport) -> RenderableType:
+    """Draw the report: what the body is, law by law what was found, and what came of it."""
+    parts: list[RenderableType] = [_head(report), Text(), _body(report), Text()]
+    if report.capabilities.joints:
+        parts += [_joints(report), Text()]
+    for topic in dict.fromkeys(each.topic for each in report.laws):
+        parts += [Text(topic, style="bold"), *_laws([each for each in report.laws if each.topic == topic]), Text()]
+    return Group(*parts, *_end(report))
+
+
+# -- what the body is ---------------------------------------------------------------------------------------------
+
+
+def _head(report: BodyReport) -> Text:
+    name = report.capabilities.body or "a body without a name"
+    clock = "in real time" if report.stated.real_time else "in virtual time"
+    return Text.assemble((name, "bold"), f" ({report.driver}), held to the contract of bodies {clock}")
+
+
+def _body(report: BodyReport) -> Table:
+    stated, able = report.stated, report.capabilities
+    table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    table.add_row("types", ", ".join(able.types) or "none")
+    table.add_row("parts", ", ".join(able.parts) or "none")
+    table.add_row("asked for", ", ".join(report.asked) or "nothing")
+    if report.not_asked:
+        table.add_row("it cannot do", "; ".join(report.not_asked))
+    if report.unknown:
+        table.add_row("not checked", f"{', '.join(report.unknown)}: the suite has no such behavior")
+    table.add_row(
+        "stated", f"estimates within {ms(stated.tolerance)}; encoders scatter by {degrees(stated.noise)}; on target "
+        f"within {degrees(stated.accuracy)}",
+    )  # fmt: skip
+    if report.estimate:
+        table.add_row("an estimate", f"takes {report.estimate * 1000:.2f} ms")
+    return table
+
+
+def _joints(report: BodyReport) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("joint", header_style="dim")
+    table.add_column("part", header_style="dim")
+    for unit in ("from", "to degrees", "degrees/s", "degrees/s²"):
+        table.add_column(unit, header_style="dim", justify="right")
+    for joint in report.capabilities.joints:
+        numbers = (joint.low, joint.high, joint.speed, joint.acceleration)
+        table.add_row(joint.joint, joint.part, *(f"{math.degrees(number):.0f}" for number in numbers))
+    return table
+
+
+# -- what was found -----------------------------------------------------------------------------------------------
+
+
+def _laws(laws: Sequence[CheckedLaw]) -> Iterator[RenderableType]:
+    table: Table | None = None
+    for law in laws:
+        if table is None:
+            table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+            table.add_column(width=6)
+            table.add_column(overflow="fold")
+        mark, style = MARKS[law.verdict]
+        why = f": {'; '.join(law.reasons)}" if law.verdict == "does not apply" else ""
+        table.add_row(Text(mark, style=style), Text(law.law + why, style="dim" if why else ""))
+        if law.verdict == "broken":
+            yield table
+            yield Padding(Group(*_broken(law)), (0, 0, 1, 8))
+            table = None
+    if table is not None:
+        yield table
+
+
+def _broken(law: CheckedLaw) -> Iterator[Text]:
+    yield Text(law.says, style="italic")
+    for finding in law.findings[:SHOWN]:
+        yield _finding(finding)
+    if len(law.findings) > SHOWN:
+        yield Text(f"and {len(law.findings) - SHOWN} more; --json has all", style="dim")
+    yield Text.assemble(("usually: ", "yellow"), law.usually)
+
+
+def _finding(finding: Finding) -> Text:
+    place = ", ".join(filter(None, (finding.behavior, finding.sync)))
+    text = Text.assemble(
+        "- ", (f"{place}: " if place else ""), "expected: ", (finding.expected, "green"), "; measured: ",
+        (finding.measured, "red"),
+    )  # fmt: skip
+    return text.append(f" ({finding.advice})" if finding.advice else "")
+
+
+# -- what came of it ----------------------------------------------------------------------------------------------
+
+
+def _end(report: BodyReport) -> Iterator[Text]:
+    holds, broken, other = (len(report.of(each)) for each in MARKS)
+    took = f"It took {report.seconds:.1f} s."
+    rest = f"{_laws_that(other, 'does', 'do')} not apply. {took}"
+    if not holds and not broken:
+        yield Text(f"Nothing could be checked: {rest}", style="bold red")
+    elif broken:
+        style = "bold red"
+        yield Text(
+            f"{_laws_that(broken, 'is', 'are')} broken, {_laws_that(holds, 'holds', 'hold')}, {rest}", style=style
+        )
+    else:
+        yield Text(f"{_laws_that(holds, 'holds', 'hold')}, none is broken, {rest}", style="bold green")
+    if any("faults" in reason for law in report.of("does not apply") for reason in law.reasons):
+        yield Text("No fault was played: a test of your own can name some (`faults`, docs/control.md).", style="dim")
+    if _looks_like_another_clock(report):
+        yield Text(
+            "Much of it never came. A body with a clock of its own (hardware, a daemon, a thread) is checked with "
+            "--real-time.", style="yellow",
+        )  # fmt: skip
+
+
+def _laws_that(count: int, does: str, do: str) -> str:
+    return f"1 law {does}" if count == 1 else f"{count} laws {do}"
+
+
+def _looks_like_another_clock(report: BodyReport) -> bool:
+    findings = [each for law in report.of("broken") for each in law.findings]
+    waits = [each for each in findings if any(words in each.measured for words in NEVER)]
+    return not report.stated.real_time and len(report.of("broken")) > 9 and 2 * len(waits) > len(findings)

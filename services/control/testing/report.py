@@ -1,0 +1,86 @@
+"""Report of a body that was checked: what it is, and law by law whether it holds. Pure."""
+
+from collections.abc import Iterable
+from typing import Literal
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control.testing.laws import Finding
+
+Verdict = Literal["holds", "broken", "does not apply"]
+
+
+class Stated(Struct, frozen=True, kw_only=True):
+    """Exactness that is stated of a body, and how it is to be checked.
+
+    tolerance: error of its estimates from point to point. noise: standard deviation of a reading of a joint.
+    accuracy: how near joints and eyes come to where they are to be. real_time: it has a clock of its own.
+    world: where targets are; None: the suite's.
+    """
+
+    tolerance: Seconds
+    noise: Radians
+    accuracy: Radians
+    real_time: bool = False
+    world: World | None = None
+
+
+class CheckedLaw(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One law and what came of it.
+
+    law: its name, in words. topic: what it is about. says: what holds. usually: what it is if it does not hold.
+    trials: how often it was tried; each is one seed, crowd or fault. reasons: why it, or some of its trials, do not
+    apply. seconds: time that it took on the wall clock.
+    """
+
+    law: str
+    topic: str
+    says: str
+    usually: str
+    verdict: Verdict
+    trials: int
+    findings: tuple[Finding, ...] = ()
+    reasons: tuple[str, ...] = ()
+    seconds: Seconds = 0.0
+
+
+class BodyReport(Struct, frozen=True, kw_only=True):
+    """Everything that a check has found.
+
+    driver: the name that it was asked for by. asked: behaviors that it was asked for, in words. not_asked: those that
+    it cannot do, with the reason. unknown: types that it has, and the suite has no behavior of. estimate: median time
+    that one estimate took. seconds: time of the whole check on the wall clock.
+    """
+
+    driver: str
+    capabilities: Capabilities
+    stated: Stated
+    asked: tuple[str, ...]
+    not_asked: tuple[str, ...]
+    unknown: tuple[str, ...]
+    estimate: Seconds
+    laws: tuple[CheckedLaw, ...] = ()
+    seconds: Seconds = 0.0
+
+    @property
+    def is_good(self) -> bool:
+        """True if some law holds, and none is broken."""
+        return bool(self.of("holds")) and not self.of("broken")
+
+    def of(self, verdict: Verdict) -> list[CheckedLaw]:
+        """List the laws of which this is true."""
+        return [each for each in self.laws if each.verdict == verdict]
+
+
+def as_json(report: BodyReport) -> str:
+    """Write it as one JSON object."""
+    return msgspec.json.encode({"good": report.is_good, **msgspec.to_builtins(report)}).decode()
+
+
+def verdict(findings: Iterable[Finding], passed: int) -> Verdict:
+    """Judge a law by what was found in all of its trials, and how many of them passed."""
+    return "broken" if tuple(findings) else "holds" if passed else "does not apply"

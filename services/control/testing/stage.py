@@ -1,0 +1,140 @@
+"""A behavior under way, with the authority in the hand of the suite; and the waiting that goes with it."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
+from engage_hri.services.control.testing.laws import broken, listed, ms
+
+PATIENCE: Seconds = 30.0
+"""Time within which any behavior comes to its next hold point, or to its end."""
+LOOK_EVERY: Seconds = 0.02
+
+
+def default(points: Sequence[str]) -> tuple[str, ...]:
+    """Leave out `stroke:2` and on, which a body may tell of or not."""
+    return tuple(sync for sync in points if not sync.startswith("stroke:"))
+
+
+def times(progress: Sequence[Progress]) -> dict[str, Seconds]:
+    """Loop time at which each sync point was passed."""
+    return {item.sync: item.at for item in progress if isinstance(item, Reached)}
+
+
+async def performed(body: Body, behavior: BlockBehavior, through: str = "end") -> list[Progress]:
+    """Perform a behavior in this task, and return what the body told."""
+    authority = MovementAuthority(behavior, through)
+    return [progress async for progress in body.perform(behavior, authority)]
+
+
+async def done(body: Body, behavior: BlockBehavior) -> list[Progress]:
+    """Perform a behavior with all authority, and return what the body told. Raises LawBroken if it never ends."""
+    return await Stage(body, behavior, "end").over()
+
+
+class Stage:
+    """A behavior under way.
+
+    progress: what the body has told. heard: when it told each of these, loop time.
+    """
+
+    live: ClassVar["list[Stage]"] = []
+    """Stages that were begun since `end_all`."""
+
+    def __init__(self, body: Body, behavior: BlockBehavior, through: str = "start") -> None:
+        self.authority = MovementAuthority(behavior, through)
+        self.behavior = behavior
+        self.progress: list[Progress] = []
+        self.heard: list[Seconds] = []
+        self.began = asyncio.get_running_loop().time()
+        self._body = body
+        self._news = asyncio.Event()
+        self.task = asyncio.create_task(self._perform(), name=f"stage {behavior.id}")
+        self.task.add_done_callback(lambda _: self._news.set())
+        Stage.live.append(self)
+
+    async def _perform(self) -> None:
+        async for progress in self._body.perform(self.behavior, self.authority):
+            self.progress.append(progress)
+            self.heard.append(asyncio.get_running_loop().time())
+            self.hear(progress)
+            self._news.set()
+
+    def hear(self, progress: Progress) -> None:
+        """Take note of what the body tells, at the instant at which it tells it. By default nothing."""
+
+    @property
+    def passed(self) -> list[str]:
+        """Sync points that the body has said it has passed."""
+        return [item.sync for item in self.progress if isinstance(item, Reached)]
+
+    @property
+    def waits_at(self) -> list[str]:
+        """Hold points at which the body has said it waits, also those that it has left."""
+        return [item.sync for item in self.progress if isinstance(item, Arrived)]
+
+    async def until(self, condition: Callable[[], bool], patience: Seconds = PATIENCE) -> None:
+        """Wait until a condition holds that the body's telling brings about, or the behavior has ended."""
+        try:
+            async with asyncio.timeout(patience):
+                while not condition() and not self.task.done():
+                    self._news.clear()
+                    await self._news.wait()
+        except TimeoutError:
+            pass
+
+    async def holding(self, count: int = 1) -> None:
+        """Wait until the body waits for the `count`-th time. If it never does, what was told so far says so."""
+        await self.until(lambda: len(self.waits_at) >= count)
+
+    async def over(self, patience: Seconds = PATIENCE) -> list[Progress]:
+        """Wait for the end. Raises LawBroken if it does not come, and what the body raises."""
+        await asyncio.wait([self.task], timeout=patience)
+        if not self.task.done():
+            broken(
+                self.behavior,
+                self.next_point,
+                expected=f"an end within {ms(patience)}{self._cut}",
+                measured=f"it goes on; passed: {listed(self.passed)}; has waited at: {listed(self.waits_at)}",
+                advice="does `perform` look at the authority while it moves and waits (`watch`, `granted`)?",
+            )
+        self.task.result()
+        return self.progress
+
+    @property
+    def next_point(self) -> str:
+        """The sync point that comes next; empty: none."""
+        return next((sync for sync in self.authority.points if sync not in self.passed), "")
+
+    @property
+    def _cut(self) -> str:
+        ended: dict[Revocation, str] = {
+            "relax": " of its abort",
+            "freeze": " of its abort",
+            "taken_over": " of its being taken over",
+        }
+        return ended[self.authority.revoked] if self.authority.revoked else ""
+
+    @classmethod
+    async def end_all(cls) -> None:
+        """Cancel what is left of all stages of this loop, and forget them."""
+        loop = asyncio.get_running_loop()
+        tasks = [stage.task for stage in cls.live if stage.task.get_loop() is loop]
+        cls.live.clear()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def standing(body: Body, patience: Seconds = PATIENCE) -> bool:
+    """Wait until the body says that nothing moves. Returns False if it never does."""
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + patience
+    while body.state().moving:
+        if loop.time() > deadline:
+            return False
+        await asyncio.sleep(LOOK_EVERY)
+    return True

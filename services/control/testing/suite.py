@@ -1,0 +1,246 @@
+"""Base of the contract suite: a world, behaviors, tolerances, and how a body is made, connected and left."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from typing import Any, ClassVar, NoReturn
+
+import pytest
+import pytest_asyncio
+
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    Speech,
+)
+from engage_hri.schemas.body import BodyPose, Capabilities
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Radians, Seconds, Vector
+from engage_hri.services.control.body import Body, BodyState
+from engage_hri.services.control.testing.asked import BEHAVIORS, HOLDS, WORLD
+from engage_hri.services.control.testing.cases import Case, Connection, still_running
+from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
+from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+
+ON_AXIS: Radians = math.radians(1.0)
+STILL: Radians = math.radians(0.1)
+"""What a joint that stands still may move all the same."""
+READINGS = 9
+"""Readings of which a pose at rest is the middle one, where encoders are noisy."""
+PLUGIN = "engage_hri.services.control.testing.plugin"
+
+
+class Suite:
+    """Base of the contract suite. A subclass says in `make` how to make the body, and states how exact it is.
+
+    tolerance: stated error of its estimates, seconds from each sync point to the next.
+    noise: standard deviation of a reading of its encoders, radians.
+    accuracy: how near the joints come to where they are to be, and the eyes to a target, radians.
+    behaviors: what it is asked to do; of each type that it has at least one. world: where their targets are.
+    seeds: number of random trials of each law that has some; None: many in virtual time, one in real time.
+    """
+
+    topic: ClassVar[str] = ""
+    pytestmark: ClassVar[Any] = [pytest.mark.asyncio]
+    tolerance: Seconds = 1e-6
+    noise: Radians = 0.0
+    accuracy: Radians = ON_AXIS
+    behaviors: tuple[BlockBehavior, ...] = BEHAVIORS
+    world = WORLD
+    seeds: int | None = None
+
+    def make(self) -> Body:
+        """Make the body, in the running event loop, not connected."""
+        raise NotImplementedError
+
+    def faults(self) -> Mapping[str, Callable[[], Body]]:
+        """Name faults, and say how to make the body that has each: a motor that stalls, a connection that is lost."""
+        return {}
+
+    def observed(self, body: Body) -> BodyState:
+        """Measure the body as a bystander would; by default it is believed."""
+        return body.state()
+
+    # -- how pytest runs it --------------------------------------------------------------------------------------
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of each random trial and of each fault."""
+        if "seed" in metafunc.fixturenames:
+            most = int(getattr(metafunc.function, "trials", 1))
+            is_real = metafunc.definition.get_closest_marker("real_time") is not None
+            count = self.seeds if self.seeds is not None else 1 if is_real else most
+            metafunc.parametrize("seed", range(min(count, most)))
+        if "fault" in metafunc.fixturenames:
+            metafunc.parametrize("fault", sorted(self.faults()) or [None])
+
+    @pytest_asyncio.fixture
+    async def body(self, request: pytest.FixtureRequest) -> AsyncIterator[Body]:
+        """The body of one test, connected and at home."""
+        if not request.config.pluginmanager.has_plugin(PLUGIN):
+            pytest.fail(f'the suite needs its plugin: pytest_plugins = ["{PLUGIN}"] in conftest.py', pytrace=False)
+        async with self.connected(self.make) as body:
+            yield body
+
+    @asynccontextmanager
+    async def connected(self, make: Callable[[], Body]) -> AsyncIterator[Body]:
+        """Make a body, connect it, and bring it home; at the end disconnect, and cancel what tasks it has left."""
+        before = asyncio.all_tasks()
+        body = make()
+        connection = Connection(body)
+        await connection.enter()
+        try:
+            body.see(self.world)
+            with suppress(Exception):  # what is wrong with it is for the law of `home` to say
+                async with asyncio.timeout(PATIENCE):
+                    await body.home()
+            yield body
+        finally:
+            await Stage.end_all()
+            await connection.leave()
+            left = await still_running(before)
+            for task in left:
+                task.cancel()
+            await asyncio.gather(*left, return_exceptions=True)
+
+    # -- what is there to judge ----------------------------------------------------------------------------------
+
+    def able(self, body: Body) -> list[BlockBehavior]:
+        """List the suite's behaviors that the body says it can do."""
+        able = [
+            each
+            for each in self.behaviors
+            if type_name(each) in body.capabilities.types and body.estimate(each, None, self.world).feasible
+        ]
+        if not able:
+            broken(
+                expected="at least one behavior that the suite can ask for",
+                measured=f"it can do none of those that it is asked for; its types are "
+                f"{', '.join(body.capabilities.types) or 'none'}",
+                advice="set `behaviors` and `world` of the suite to what this robot can do where it stands",
+            )
+        return able
+
+    def cases(
+        self, body: Body, which: Callable[[BlockBehavior], bool] = lambda _: True, lacks: str = "no such behavior"
+    ) -> "Iterator[Case]":
+        """Judge behaviors one after the other, so that what one of them breaks does not hide the others.
+
+        which: those that the law is about. lacks: what a body has not got if there are none.
+
+        Raises LawBroken after the last one, with all findings.
+        """
+        __tracebackhide__ = True
+        behaviors = [each for each in self.able(body) if which(each)]
+        if not behaviors:
+            does_not_apply(f"it has {lacks}")
+        findings: list[Finding] = []
+        for behavior in behaviors:
+            yield Case(body, behavior, findings)
+        if findings:
+            raise LawBroken(findings)
+
+    def holds(self, body: Body, behavior: BlockBehavior) -> tuple[str, ...]:
+        """List where it can wait; in a speech where the body says so, at marks between two words."""
+        if not isinstance(behavior, Speech):
+            return HOLDS.get(type_name(behavior), ())
+        return tuple(phase.to for phase in body.estimate(behavior, None, self.world).phases if phase.hold)
+
+    def joints(self, body: Body, *behaviors: BlockBehavior) -> set[str]:
+        """Names of the joints of the parts that behaviors move; of none: of all parts that any of them moves."""
+        parts: set[str] = set()
+        for behavior in behaviors or self.able(body):
+            parts |= set(body.estimate(behavior, None, self.world).parts)
+        return {limit.joint for limit in body.capabilities.joints if limit.part in parts}
+
+    def position(self, entity: str) -> Vector:
+        """Look up where an entity of the world is, metres."""
+        found = self.world.entity(entity)
+        assert found is not None
+        return found.position
+
+    # -- measuring -----------------------------------------------------------------------------------------------
+
+    @property
+    def slack(self) -> Radians:
+        """Angle by which two single readings of one joint may differ by noise alone."""
+        return 6.0 * math.sqrt(2.0) * self.noise
+
+    @property
+    def gaze_slack(self) -> Radians:
+        """Angle by which a reading of a gaze or forearm, through three or four joints, may be off by noise alone."""
+        return 12.0 * self.noise
+
+    @property
+    def dwell(self) -> Seconds:
+        """Time for which something is watched that is not to happen."""
+        return 5.0 if isinstance(asyncio.get_running_loop(), VirtualTimeLoop) else 0.5
+
+    async def pose(self, body: Body) -> dict[str, Radians]:
+        """Measure the joints of a body that stands: with noisy encoders the median of some readings."""
+        if not self.noise:
+            return angles(body.state().pose)
+        readings = []
+        for _ in range(READINGS):
+            readings.append(angles(body.state().pose))
+            await asyncio.sleep(0.02)
+        return {joint: sorted(each[joint] for each in readings)[READINGS // 2] for joint in readings[0]}
+
+    def check_pose(
+        self,
+        seen: Mapping[str, Radians],
+        wanted: Mapping[str, Radians],
+        joints: Iterable[str],
+        behavior: BlockBehavior,
+        sync: str = "",
+        *,
+        what: str,
+        margin: Radians = 0.0,
+        advice: str = "",
+    ) -> None:
+        """Compare two poses. Raises LawBroken with the joint that is farthest off, and `what` was due."""
+        off = {joint: abs(seen[joint] - wanted[joint]) for joint in joints if joint in seen and joint in wanted}
+        limit = self.accuracy + self.slack + margin
+        if off and off[worst := max(off, key=lambda joint: off[joint])] > limit:
+            broken(
+                behavior,
+                sync,
+                advice=advice,
+                expected=f"{what}: {worst} at {degrees(wanted[worst])}, within {degrees(limit)}",
+                measured=f"{worst} at {degrees(seen[worst])}",
+            )
+
+    async def check_rest(self, body: Body, home: Mapping[str, Radians], behavior: BlockBehavior, what: str) -> None:
+        """See that a body comes to stand, at home and silent. Raises LawBroken."""
+        if not await standing(body):
+            broken(behavior, expected=f"that it stands {what}", measured=f"`moving` after {PATIENCE:.0f} s")
+        seen = await self.pose(body)
+        self.check_pose(seen, home, self.joints(body, behavior), behavior, what=f"the safe pose {what}")
+        if saying := body.state().speaking:
+            broken(behavior, expected=f"silence {what}", measured=f"`speaking` is {saying!r}")
+
+
+def does_not_apply(why: str) -> NoReturn:
+    """End a test: its law cannot be judged by this body."""
+    pytest.skip(why)
+
+
+def trials(count: int) -> Callable[[Any], Any]:
+    """Say how often a law with a `seed` is tried in virtual time."""
+
+    def mark(law: Any) -> Any:
+        law.trials = count
+        return law
+
+    return mark
+
+
+def pose_angles(pose: BodyPose | None) -> dict[str, Radians]:
+    """The angle of each joint of a pose; of none: nothing."""
+    return {} if pose is None else angles(pose)
+
+
+def unchecked(capabilities: Capabilities, behaviors: Iterable[BlockBehavior]) -> list[str]:
+    """Types of behaviors that a body has and the suite cannot ask for."""
+    known = {type_name(each) for each in behaviors}
+    return [kind for kind in capabilities.types if kind not in known]

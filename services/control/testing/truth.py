@@ -1,0 +1,167 @@
+"""Laws of truth: no sync point that the joints do not bear out, alone, in a crowd, and with a fault."""
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from random import Random
+
+import numpy as np
+import pytest
+
+from engage_hri.schemas.behavior_types import sync_points
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
+from engage_hri.services.control.testing.motions import Recording, recorded
+from engage_hri.services.control.testing.predictions import has_joints
+from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, done, times
+from engage_hri.services.control.testing.suite import STILL, Suite, does_not_apply, trials
+from engage_hri.services.control.testing.witness import CROWDS, Witness, crowded
+
+TRIMMED = 6
+"""Samples at both ends of a stand that are not judged: a measurement of motion comes late."""
+PATIENCE_WITH_FAULTS: Seconds = 60.0
+"""Time after which a behavior that a fault keeps from its next point is aborted."""
+
+
+class TruthLaws(Suite):
+    """Part of `BodyContract`."""
+
+    topic = "truth"
+
+    async def test_measures_all_its_joints_within_their_noise(self, body: Body) -> None:
+        """`state()` has each joint of the capabilities, and at rest it scatters no more than the stated `noise`.
+
+        Usually the encoders are noisier than it was said: state what is measured here, or filter them. All other laws
+        allow for the noise that is stated.
+        """
+        named_joints = {limit.joint for limit in body.capabilities.joints}
+        if not named_joints:
+            does_not_apply("its capabilities name no joints")
+        if missing := sorted(named_joints - set(angles(body.state().pose))):
+            broken(expected="an angle of each joint in `state().pose`", measured=f"none of {', '.join(missing)}")
+        async with recorded(body, self.joints(body)) as recording:
+            await asyncio.sleep(1.0)
+        if not recording.joints:
+            does_not_apply("its behaviors move no joints")
+        scatter = recording.angles.std(axis=0)
+        worst, most = int(scatter.argmax()), 1.5 * self.noise + STILL / 5
+        if scatter[worst] > most:
+            broken(
+                expected=f"readings at rest that scatter by {degrees(most)} at most (standard deviation)",
+                measured=f"{recording.joints[worst]} scatters by {degrees(float(scatter[worst]))}",
+                advice=f"state it: `noise = math.radians({float(scatter[worst]) * 57.2958:.2f})`, or --noise",
+            )
+
+    async def test_says_that_it_moves_as_long_as_it_moves(self, body: Body) -> None:
+        """While `moving` is false the joints stand still, within the noise of their encoders.
+
+        Usually `moving` is false once the planned time is over: it is for the measured joints to say.
+        """
+        for case in self.cases(body, has_joints, "no joints"):
+            async with case as behavior:
+                recording, stands = Recording(self.joints(body, behavior)), []
+                stage = Stage(body, behavior, "end")
+                while not stage.task.done() or body.state().moving:
+                    stands.append(not body.state().moving)
+                    recording.take(body)
+                    await asyncio.sleep(LOOK_EVERY)
+                await stage.over()
+                for first, last in _runs(stands):
+                    samples = recording.angles[first + TRIMMED : max(first, last - TRIMMED)]
+                    moved = samples.max(axis=0) - samples.min(axis=0) if samples.size else np.zeros(1)
+                    if moved.max() > STILL + 2.0 * self.slack:
+                        broken(
+                            behavior,
+                            expected="joints that stand still while `moving` is false",
+                            measured=f"{recording.joints[int(moved.argmax())]} moves by "
+                            f"{degrees(float(moved.max()))} meanwhile",
+                        )
+
+    async def test_each_point_is_where_the_joints_are(self, body: Body) -> None:
+        """Alone, and waiting at each hold point: as each point is told, eyes, forearms and joints are where it says.
+
+        Usually a point is told when the planned time is over, or when the vendor's "finished" comes: tell it when the
+        measured angles are there. A movement that takes time has moved a joint by its stroke.
+        """
+        for case in self.cases(body):
+            async with case as behavior:
+                estimate, joints = body.estimate(behavior, None, self.world), self.joints(body, behavior)
+                before = angles(self.observed(body).pose)
+                witness = Witness(self, body)
+                stage = witness.begin(behavior, "start")
+                for number, hold in enumerate(self.holds(body, behavior), 1):
+                    await stage.holding(number)
+                    stage.authority.extend(hold)
+                if lies := await witness.close():
+                    raise LawBroken(lies)
+                sync = "stroke" if "stroke" in sync_points(behavior) else "end"
+                points = [phase.to for phase in estimate.phases]
+                takes = sum(phase.natural for phase in estimate.phases[: points.index(sync) + 1])
+                if not joints or not has_joints(behavior) or takes < 0.05:
+                    continue
+                await body.home()
+                async with recorded(body, joints) as recording:
+                    at = times(await done(body, behavior))[sync]
+                there = recording.at(at)
+                moved = max((abs(there[joint] - before[joint]) for joint in joints if joint in before), default=0.0)
+                if moved < 5 * STILL:
+                    broken(
+                        behavior,
+                        sync,
+                        expected=f"a joint that has moved by {degrees(5 * STILL)} at least",
+                        measured=degrees(moved),
+                    )
+
+    @trials(12)
+    @pytest.mark.parametrize("crowd", CROWDS)
+    async def test_no_sync_point_that_the_joints_do_not_bear_out(self, body: Body, crowd: str, seed: int) -> None:
+        """Begun, extended, held, released and aborted at random, no behavior tells a point that is not so.
+
+        Usually what was taken over or cut goes on to tell its points. As each is told, the eyes are on the target,
+        the forearm points at it, the head has nodded; in the end all is back where it belongs.
+        """
+        witness = await crowded(self, body, CROWDS[crowd], Random(f"{crowd} {seed}"))
+        if witness is None:
+            does_not_apply(f"it has nothing for the crowd of {crowd}")
+        if lies := await witness.close():
+            raise LawBroken(lies)
+
+    async def test_with_a_fault_it_passes_or_names_the_fault(self, fault: str | None) -> None:
+        """With a fault a behavior is done, fails with a reason, or stays short of a point: it tells nothing untrue.
+
+        Usually points are told by the clock, so that nothing notices a stall; or the error of the SDK comes out:
+        catch it, and raise BodyFailed with a reason and an advice.
+        """
+        if fault is None:
+            does_not_apply("no faults are named (`faults` of the suite)")
+        make, lies = self.faults()[fault], list[Finding]()
+        async with self.connected(make) as body:
+            able = [each for each in self.behaviors if type_name(each) in body.capabilities.types]
+        for behavior in able:
+            async with self.connected(make) as body:
+                lies += await self._with_fault(body, behavior)
+        for name, makers in CROWDS.items():
+            async with self.connected(make) as body:
+                witness = await crowded(self, body, makers, Random(f"{fault} {name}"))
+                if witness is not None:
+                    lies += await witness.close(may_fail=True, patience=PATIENCE_WITH_FAULTS)
+        if lies:
+            raise LawBroken(lies)
+
+    async def _with_fault(self, body: Body, behavior: BlockBehavior) -> Sequence[Finding]:
+        witness = Witness(self, body)
+        witness.begin(behavior, "end")
+        return await witness.close(may_fail=True, patience=PATIENCE_WITH_FAULTS)
+
+
+def _runs(flags: Sequence[bool]) -> Iterator[tuple[int, int]]:
+    """First and last index of each run of true ones."""
+    first = None
+    for index, flag in enumerate((*flags, False)):
+        if flag and first is None:
+            first = index
+        elif not flag and first is not None:
+            yield first, index
+            first = None

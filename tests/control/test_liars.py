@@ -1,0 +1,123 @@
+"""Mutations of a body: for each law of the contract a body that breaks it, and is caught. An honest one is not."""
+
+from collections.abc import Callable, Mapping
+from inspect import signature
+from itertools import product
+
+import pytest
+
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.testing import BodyContract
+from engage_hri.services.control.testing.laws import Finding, LawBroken
+from engage_hri.services.control.testing.witness import CROWDS
+from engage_hri.services.control.torso.body import SimulatedBody
+from tests.control import liars, liars_by_deed
+
+LAWS = sorted(name.removeprefix("test_") for name in dir(BodyContract) if name.startswith("test_"))
+LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
+    (liars.Omitting, "reports_every_sync_point_once_and_in_order", "gaze at near-right"),
+    (liars.Repeating, "reports_every_sync_point_once_and_in_order", "pointing at far-left"),
+    (liars.Backdating, "reports_a_point_as_it_is_passed", "200 ms after it"),
+    (liars.Hesitating, "never_stops_where_it_may_pass", "head NOD, stroke_start"),
+    (liars.Splitting, "points_that_are_one_instant_are_reported_as_one", "they are 10 ms apart"),
+    (liars_by_deed.Posing, "can_do_something_of_each_type_that_it_has", "no poses"),
+    (liars_by_deed.Obliging, "refuses_what_it_cannot_do_before_anything_moves", "gaze at nothing"),
+    (liars.Counting, "a_speech_tells_its_words_in_order", "the word 'This'"),
+    (liars.Prompter, "an_aborted_speech_stops_at_a_word", "one two three four five six seven"),
+    (liars.Stammering, "a_held_voice_is_silent_from_the_next_gap_on", "is is"),
+    (liars.Hasty, "waits_at_each_hold_point_until_it_may_pass", "gaze at near-right, stroke"),
+    (liars_by_deed.Trembling, "stands_still_while_it_waits", "within 1 s"),
+    (liars.Restless, "a_held_behavior_waits_at_the_next_hold_point_though_it_might_pass", "has waited at nothing"),
+    (liars.Released, "an_authority_that_comes_while_it_is_held_counts_once_it_goes_on", "gaze at near-right, stroke"),
+    (liars.Presuming, "going_on_does_not_give_authority", "gesture BEAT, stroke_start"),
+    (liars.Pacing, "a_pace_takes_nothing_from_a_hold", "that it waits there"),
+    (liars.Inattentive, "whenever_it_is_held_it_waits_or_ends_by_itself", "after it was held"),
+    (liars.Possessed, "a_held_behavior_can_be_aborted_and_taken_over", "it goes on"),
+    (liars.Deaf, "an_aborted_behavior_ends_at_once_and_safe", "end"),
+    (liars.Stubborn, "an_aborted_hold_ends_at_once_and_safe", "it goes on"),
+    (liars_by_deed.Clinging, "a_dropped_stream_ends_safe", "after its task was cancelled"),
+    (liars_by_deed.Homeless, "home_is_reached_from_anything", "the safe pose as `home` returns"),
+    (liars_by_deed.Homeless, "leaves_no_task_once_it_is_disconnected", "these go on: way home"),
+    (liars_by_deed.Abrupt, "brakes_within_the_limits_of_its_joints", "degrees/s^2"),
+    (liars_by_deed.Understating, "keeps_its_limits_whatever_comes", "speed of torso_turn"),
+    (liars.Boaster, "a_later_behavior_takes_over_the_part", "taken_over"),
+    (liars_by_deed.Greedy, "a_shift_takes_nothing_from_a_look_that_lies_over_it", "the look is taken_over"),
+    (liars.Forgetful, "a_look_that_comes_over_a_shift_on_its_way_goes_home_to_where_that_leads", "start"),
+    (liars.Boaster, "a_shift_on_its_way_is_taken_over_by_another", "gazeShift"),
+    (liars_by_deed.Optimistic, "takes_the_time_that_it_predicted", "gaze at near-right, stroke"),
+    (liars_by_deed.Eager, "predicts_without_moving", "where it was before it was asked"),
+    (liars_by_deed.Staying, "is_on_target_where_it_said", "neck_"),
+    (liars_by_deed.Remaining, "ends_where_it_said", "neck_"),
+    (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at human"),
+    (liars_by_deed.Noisy, "measures_all_its_joints_within_their_noise", "noise = math.radians(0.3"),
+    (liars_by_deed.Jointless, "measures_all_its_joints_within_their_noise", "none of neck_yaw"),
+    (liars_by_deed.Unmoved, "says_that_it_moves_as_long_as_it_moves", "meanwhile"),
+    (liars.Early, "each_point_is_where_the_joints_are", "eyes on near-right, within 1.0 degrees"),
+    (liars_by_deed.Expressionless, "each_point_is_where_the_joints_are", "faceLexeme SMILE, stroke"),
+    (liars_by_deed.Stiff, "each_point_is_where_the_joints_are", "a head that has moved"),
+    (liars.Boaster, "no_sync_point_that_the_joints_do_not_bear_out", ""),
+    (liars.Early, "no_sync_point_that_the_joints_do_not_bear_out", "eyes on"),
+    (liars_by_deed.Stiff, "no_sync_point_that_the_joints_do_not_bear_out", "0.00 degrees"),
+)
+"""Who breaks which law, and words of what is found."""
+WITH_FAULTS: tuple[tuple[type[SimulatedBody], str], ...] = (
+    (liars_by_deed.Stalled, "beside it"),
+    (liars_by_deed.Unnamed, "a fault with a reason"),
+    (liars_by_deed.Raw, "ConnectionResetError: peer is gone at liars_by_deed.py, line"),
+    (liars_by_deed.Unending, "it goes on"),
+)
+FAULTS = "with_a_fault_it_passes_or_names_the_fault"
+
+
+class Judge(BodyContract):
+    """A suite that is asked one law at a time."""
+
+    def __init__(self, make: Callable[[], Body], faults: Mapping[str, Callable[[], Body]] | None = None) -> None:
+        self.make = make  # type: ignore[method-assign]
+        self._faults = faults or {}
+
+    def faults(self) -> Mapping[str, Callable[[], Body]]:
+        return self._faults
+
+    async def findings(self, law: str) -> list[Finding]:
+        """What it finds in all trials of one law."""
+        judge, found = getattr(self, f"test_{law}"), []
+        given = {"seed": range(getattr(judge, "trials", 1)), "crowd": CROWDS, "fault": self._faults}
+        asked = {name: values for name, values in given.items() if name in signature(judge).parameters}
+        for values in product(*asked.values()):
+            trial = dict(zip(asked, values, strict=True))
+            try:
+                if "body" in signature(judge).parameters:
+                    async with self.connected(self.make) as body:
+                        await judge(body, **trial)
+                else:
+                    await judge(**trial)
+            except LawBroken as broken:
+                found += broken.findings
+        return found
+
+
+@pytest.mark.parametrize(("liar", "law", "words"), LIARS, ids=lambda each: getattr(each, "__name__", None))
+async def test_who_breaks_a_law_is_caught_by_it(liar: type[SimulatedBody], law: str, words: str) -> None:
+    found = await Judge(liar).findings(law)
+
+    assert any(words in str(finding) for finding in found), "\n".join(map(str, found)) or "nothing is found"
+
+
+@pytest.mark.parametrize(("liar", "words"), WITH_FAULTS, ids=lambda each: getattr(each, "__name__", None))
+async def test_who_hides_a_fault_is_caught(liar: type[SimulatedBody], words: str) -> None:
+    found = await Judge(SimulatedBody, {"a fault": liar}).findings(FAULTS)
+
+    assert any(words in str(finding) for finding in found), "\n".join(map(str, found)) or "nothing is found"
+
+
+def test_each_law_has_a_body_that_breaks_it() -> None:
+    assert sorted({law for _, law, _ in LIARS} | {FAULTS}) == LAWS
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_each_law_says_what_it_is_and_what_it_usually_is_if_it_is_broken(law: str) -> None:
+    words, _, usual = (getattr(BodyContract, f"test_{law}").__doc__ or "").partition("\n\n")
+
+    assert words.strip().endswith(".")
+    assert usual.strip().startswith("Usually ")
