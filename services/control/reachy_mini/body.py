@@ -308,7 +308,8 @@ class ReachyMini(Body):
         return self._moves.off(name, now, track.going)
 
     def _is_home(self, name: str) -> bool:
-        return self._loop.time() >= self._moves.tracks[name].motion.end and self._off_home(name).share <= 1.0
+        comes = self._moves.tracks[name].motion.end + self._settings.lag
+        return self._loop.time() >= comes and self._off_home(name).share <= 1.0
 
     def _is_moving(self) -> bool:
         """True while a plan moves, or joints have not come along yet."""

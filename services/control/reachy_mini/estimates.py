@@ -43,27 +43,25 @@ def motion_estimate(
 
 def _times(course: Course, path: Path, around: Circumstances, moves: Moves, lag: Seconds) -> dict[str, Seconds]:
     """When each sync point is measured, in seconds from the beginning."""
-    if course.is_swing:
-        return {sync: s + lag if s > 0.0 else 0.0 for sync, s in path.marks.items()}
-    times = {sync: s + _settling(course, path, lag) if s > 0.0 else 0.0 for sync, s in path.marks.items()}
-    if not course.stays:
+    times = {sync: s + _settling(course, path, s, lag) for sync, s in path.marks.items()}
+    if not course.is_swing and not course.stays:
         back = moves.way(course.track, resting(course.goal), around.base[course.track])
-        times["end"] = times["relax"] + back.length + _settling(course, back, lag)
+        times["end"] = times["relax"] + back.length + _settling(course, back, back.length, lag)
     return times
 
 
-def _settling(course: Course, path: Path, lag: Seconds) -> Seconds:
-    """Time from when the plan is at the end of a path until the joints are measured near it."""
-    if not path.length:
+def _settling(course: Course, path: Path, mark: Seconds, lag: Seconds) -> Seconds:
+    """Time from when the plan is at a place of a path until the joints are measured near it."""
+    if mark <= 0.0:
         return 0.0
     names = [limit.joint for limit in joints.TRACKS[course.track]]
-    goal = path.at(path.length).q
-    for step in range(9):
-        behind = lag * step / 8
-        off = abs(path.at(path.length - behind).q - goal)
+    goal, steps = path.at(mark).q, 16
+    for step in range(1, steps + 1):
+        behind = min(mark, lag * step / steps)
+        off = abs(path.at(mark - behind).q - goal)
         if any(each > NEAR[name] for name, each in zip(names, off.tolist(), strict=True)):
-            return lag - behind + FRAME
-    return FRAME
+            return lag * (1.0 - (step - 1) / steps) + FRAME / 2
+    return FRAME / 2
 
 
 def _phases(instants: tuple[Instant, ...], times: dict[str, Seconds]) -> tuple[Phase, ...]:

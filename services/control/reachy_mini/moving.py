@@ -34,8 +34,8 @@ FOLLOWING: Seconds = 0.3
 ASTRAY = radians(6.0)
 """Joints that are further than this from where they were sent have been moved by somebody else."""
 NEAR = {
-    "head_pitch": radians(0.8), "head_yaw": radians(0.8), "body_follow": radians(2.0), "nod_yaw": radians(2.0),
-    "nod_pitch": radians(2.0), "nod_roll": radians(2.0), "body_turn": radians(1.0), "body_lean": radians(0.5),
+    "head_pitch": radians(0.8), "head_yaw": radians(0.8), "body_follow": radians(2.0), "nod_yaw": radians(1.0),
+    "nod_pitch": radians(1.0), "nod_roll": radians(1.0), "body_turn": radians(1.0), "body_lean": radians(0.5),
     "right_antenna": radians(4.0), "left_antenna": radians(4.0),
 }  # fmt: skip
 """How far a joint of a track may be from a sync point. An antenna is a long lever on a small motor."""
@@ -338,35 +338,36 @@ class Moves:
         A look is on its target by the gaze axis: the joints are compared with what looks there from where the eyes are.
         """
         track = run.course.track
-        if track == "head" and not run.is_homeward and isinstance(run.behavior, courses.Looks):
-            return self.off_target(run.behavior, now)
+        if track == "head":
+            look = self.look if run.is_homeward else run.behavior
+            return self.off_target(look if isinstance(look, courses.Looks) else None, now)
         path, s = run.motion.path, run.motion.s(now)
         mark = path.marks[instant.syncs[0]]
         places = np.linspace(mark, s, SAMPLES).tolist() if s - mark > 1e-6 else [mark]
-        added = np.array([*self._added(self.planned_raw(now)), 0.0]) if track == "head" else 0.0
-        offs = [self.off(track, now, (path.at(place).q + added).tolist()) for place in places]
+        offs = [self.off(track, now, path.at(place).q.tolist()) for place in places]
         return min(offs, key=lambda off: off.share)
 
-    def off_target(self, look: courses.Looks, now: Seconds) -> Off:
-        """How far the measured gaze axis is off the target of a look."""
+    def off_target(self, look: courses.Looks | None, now: Seconds) -> Off:
+        """How far the measured gaze axis is off the target of a look; None: off where the head comes to rest."""
         there, here = self._on_target(look), self._of_track("head", now)
         allowed = self._near["head_yaw"]
-        if (entity := self.world.entity(look.target)) is not None:
+        if look is not None and (entity := self.world.entity(look.target)) is not None:
             away = math.dist(entity.position, geometry.gaze(self.measured, self.mounting).origin)
             allowed += FOLLOWING * self._speeds.get(entity.id, 0.0) / max(away, 0.1)
-        aside = (there[0] - here[0]) * math.cos(here[1])
-        off = math.hypot(aside, there[1] - here[1])
-        worst = 0 if abs(aside) > abs(there[1] - here[1]) else 1
-        return Off(("head_yaw", "head_pitch")[worst], off / allowed, here[worst], there[worst])
+        aside, up = (there[0] - here[0]) * math.cos(here[1]), there[1] - here[1]
+        worst = 0 if abs(aside) > abs(up) else 1
+        return Off(("head_yaw", "head_pitch")[worst], math.hypot(aside, up) / allowed, here[worst], there[worst])
 
-    def _on_target(self, look: courses.Looks) -> tuple[Radians, Radians]:
-        tracks = {**self.planned_raw(inf), "torso": (self.measured["body_yaw"], self.measured["body_lean"])}
-        tracks["head"] = (0.0, 0.0, 0.0)
-        around = Circumstances(tracks, {}, self.world, self.mounting)
+    def _on_target(self, look: courses.Looks | None) -> tuple[Radians, Radians]:
+        track = self.tracks["head"]
+        yaw, pitch, _ = track.going
+        if look is None:
+            return yaw, pitch
+        body = (self.measured["body_yaw"], self.measured["body_lean"])
+        around = Circumstances({**joints.HOME, "torso": body}, {}, self.world, self.mounting)
         try:
-            return courses.look_at(look, tracks, around)
+            return courses.look_at(look, around.tracks, around)
         except Impossible:  # it has vanished: what counts is where it was
-            yaw, pitch, _ = self.tracks["head"].going
             return yaw, pitch
 
     def is_astray(self, now: Seconds) -> bool:
