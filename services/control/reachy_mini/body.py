@@ -295,7 +295,7 @@ class ReachyMini(Body):
     def _check(self, watch: Watch, off: Off, where: str, sync: str) -> None:
         """Raise BodyFailed if joints that are not where they should be make no way any more."""
         if (waited := watch.stuck(abs(off.there - off.here), self._loop.time())) is not None:
-            here, there = degrees(off.here), degrees(off.there)
+            here, there = round(degrees(off.here), 1) + 0.0, degrees(off.there)
             reason = (
                 f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be for its "
                 f"{sync}, and has made no way for {waited:.1f} s"

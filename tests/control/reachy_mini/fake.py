@@ -37,6 +37,8 @@ class FakeDaemon:
         self.mode = "enabled"
         self.is_running = True
         self.garbage = ""
+        self.is_upside_down = False
+        """What it computes of the head from its motors, as the real one may after a jump."""
         self.commands: list[tuple[float, dict[str, float]]] = []
         """Everything that has been carried out, with its time."""
         self._queue: list[str] = []
@@ -48,6 +50,7 @@ class FakeDaemon:
 
     def _begin(self) -> None:
         self._pose = {**ASLEEP, "body_yaw": 0.0, "right": FOLDED[0], "left": FOLDED[1]}
+        self._target: dict[str, float] | None = None
         self._coming: list[tuple[float, dict[str, float]]] = []
         self._moved_at = asyncio.get_running_loop().time()
 
@@ -66,12 +69,15 @@ class FakeDaemon:
     def start(self) -> None:
         """Start again, folded down."""
         self.is_running = True
+        self.is_upside_down = False
         self._begin()
 
     def move_by_hand(self, **angles: float) -> None:
         """Have another app put the joints elsewhere."""
+        self._advance(asyncio.get_running_loop().time())
         self._coming = []
         self._pose |= angles
+        self._target = dict(self._pose)
 
     # -- as a connection ----------------------------------------------------------------------------------------
 
@@ -130,31 +136,35 @@ class FakeDaemon:
         head = {name: pose[name] for name in ("yaw", "pitch", "roll")} | {
             name: self._pose[name] for name in ("x", "y", "z")
         }
+        if self.is_upside_down:
+            head |= {"yaw": math.pi - 0.1, "z": -0.056}
         return json.dumps(
             {"control_mode": self.mode, "head_pose": head, "body_yaw": pose["body_yaw"],
              "antennas_position": [pose["right"], pose["left"]], "timestamp": "2026-11-24T09:35:20.051659Z"}
         )  # fmt: skip
 
     def _advance(self, now: float) -> None:
+        """Let the joints go after their targets, tick by tick."""
         while self._coming and self._coming[0][0] <= now:
             at, target = self._coming.pop(0)
-            self._move(target, at)
-        self._moved_at = now
+            self._go(at)
+            self._target = target
+            self._go(at + 1e-6)
+        self._go(now)
 
-    def _move(self, target: dict[str, float], at: float) -> None:
-        if self.mode != "enabled":
+    def _go(self, now: float) -> None:
+        since, self._moved_at = max(0.0, now - self._moved_at), now
+        if self.mode != "enabled" or self._target is None:
             return
-        target = {**target, "pitch": target["pitch"] + self.sag}
+        target = {**self._target, "pitch": self._target["pitch"] + self.sag}
         aside = math.remainder(target["yaw"] - target["body_yaw"], math.tau)
         if abs(aside) > math.radians(65.0):  # it takes the body along
             target["body_yaw"] = target["yaw"] - math.copysign(math.radians(65.0), aside)
-        farthest = self.slow * max(at - self._moved_at, TICK)
         for name, angle in target.items():
             if name not in self.stuck:
                 way = angle - self._pose[name]
-                limit = farthest if name in ("yaw", "pitch", "roll") else math.inf
+                limit = self.slow * since if name in ("yaw", "pitch", "roll") and self.slow < math.inf else math.inf
                 self._pose[name] += max(-limit, min(limit, way))
-        self._moved_at = at
 
 
 class _Connection:
