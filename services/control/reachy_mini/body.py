@@ -35,9 +35,10 @@ from engage_hri.services.control.reachy_mini.courses import Instant
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
 from engage_hri.services.control.reachy_mini.link import Daemon, Link
 from engage_hri.services.control.reachy_mini.messages import Measured
-from engage_hri.services.control.reachy_mini.moving import Moves, Off
+from engage_hri.services.control.reachy_mini.moving import Moves
 from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.reachy_mini.tracks import Off
 from engage_hri.services.control.reachy_mini.watching import Watch
 from engage_hri.services.control.torso.course import Impossible
 from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
@@ -55,12 +56,15 @@ Connect = Callable[[ReachyMiniSettings], AbstractAsyncContextManager[Daemon]]
 
 
 class ReachyMini(Body):
-    """Reachy Mini through its daemon. Without `connected()` it answers for a robot at rest, as `engage plan` needs."""
+    """Reachy Mini through its daemon. Without `connected()` it answers for a robot at rest: `engage plan` asks so."""
 
     Settings: ClassVar[type[Struct]] = ReachyMiniSettings
 
     def __init__(self, settings: ReachyMiniSettings | None = None, connect: Connect | None = None) -> None:
-        """settings: of `control.drivers.reachy_mini`. connect: opens the connection to a daemon; by default the one at `settings.url`."""
+        """Make the body; `connected()` then finds the robot.
+
+        settings: of `control.drivers.reachy_mini`. connect: opens a connection; by default to `settings.url`.
+        """
         self._settings = settings or ReachyMiniSettings()
         self._connect = connect
         types = (*courses.TYPES_OF_BEHAVIORS, Wait)
@@ -115,8 +119,9 @@ class ReachyMini(Body):
         self._last_frame = now
         for bell in list(self._bells):
             bell.ring()
-        if self._rests_since == (end := self._moves.end):
+        if not self._moves.correct(now) and self._rests_since == self._moves.end:
             return None
+        end = self._moves.end
         self._rests_since = end if now >= end else -inf
         text = messages.target(self._moves.commanded(now))
         self._sent, before = text, self._sent
@@ -245,7 +250,7 @@ class ReachyMini(Body):
                 yield Reached(sync, at, came)
 
     async def _come(self, run: Run, instant: Instant) -> Seconds:
-        """Wait until the plan has come to an instant, and the joints too. Returns when. Raises Revoked or BodyFailed."""
+        """Wait until plan and joints have come to an instant. Returns when. Raises Revoked or BodyFailed."""
         watch = Watch(self._settings.patience)
         while not run.is_beneath:
             now = self._loop.time()

@@ -98,7 +98,7 @@ async def _be_ready(session: aiohttp.ClientSession, settings: ReachyMiniSettings
         reason = f"the daemon at {settings.url} is {state}" + (f": {why}" if why else "")
         raise Lost(Fault(reason=reason, advice="is the robot switched on, and its cable in? restart the daemon"))
     async with asyncio.timeout(GREETING):
-        while (await _asked(session, "POST", "api/move/set_target", {})).get("status") == "ignored":
+        while (await _asked(session, "POST", "api/move/set_target", {})).get("status") == "ignored":  # noqa: ASYNC110
             await asyncio.sleep(0.1)
     if settings.enable_motors and (await _asked(session, "GET", "api/motors/status")).get("mode") != "enabled":
         await _asked(session, "POST", "api/motors/set_mode/enabled")

@@ -48,7 +48,8 @@ TYPES_OF_BEHAVIORS: tuple[type[BlockBehavior], ...] = (
 LEAST = {"head": radians(0.3), "nod": 0.0, "torso": radians(0.4), "face": radians(1.5)}
 """A track that has less to go stays."""
 ANTENNAS: Mapping[str, tuple[float, float]] = {
-    "brow": (-10.0, 45.0), "lid": (-8.0, 70.0), "mouth_corner": (18.0, 60.0), "lips": (-6.0, -6.0), "jaw": (-4.0, -4.0),
+    "brow": (-10.0, 45.0), "lid": (-8.0, 70.0), "mouth_corner": (18.0, 60.0), "lips": (-6.0, -6.0),
+    "jaw": (-4.0, -4.0),
 }  # fmt: skip
 """Degrees outwards that an antenna turns for what a face would do: by the full way up or open, and down or closed."""
 DROOP, RAISED = 130.0, -15.0
@@ -151,7 +152,7 @@ def seconds(track: str, here: Sequence[float], goal: Sequence[float]) -> Seconds
 
 
 def antennas(face: Angles) -> tuple[float, float]:
-    """Angles of the right and left antenna that stand for a face: raised for surprise, apart for joy, hanging in grief.
+    """Angles of the right and left antenna that stand for a face: raised in surprise, apart in joy, hanging in grief.
 
     face: shares of the way of the joints of the simulated torso's face, -1 to 1; a lid is 1 when it is shut.
     """
@@ -174,7 +175,8 @@ def _situation(now: Circumstances) -> Situation:
 
 
 def _out(
-    behavior: BlockBehavior, track: str, goal: tuple[float, ...], now: Circumstances, *, entity: str = "", note: str = ""
+    behavior: BlockBehavior, track: str, goal: tuple[float, ...], now: Circumstances, *, entity: str = "",
+    note: str = "",
 ) -> Course:  # fmt: skip
     """The way to a goal, at which it may be held, and from which it goes home, or stays."""
     points = instants(behavior)

@@ -1,7 +1,7 @@
 """Frames of Reachy Mini: joint angles, the gaze axis in the robot's frame, and the daemon's poses of the head. Pure.
 
-Angles are Engage's: positive to the left, up, tilted to the left, leaning forward. The daemon tells the head's pose in
-the frame of the foot, whatever the body's turn: x ahead, y to the left, z up; its pitch is positive down.
+Angles are Engage's: positive to the left, up, tilted to the left, leaning forward. The daemon tells the head's pose
+in the frame of the foot, whatever the body's turn: x ahead, y to the left, z up; its pitch is positive down.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Joints of Reachy Mini, what they are trusted with, and the tracks along which they move. Pure.
 
 Ranges come from the daemon's inverse kinematics with the motors' limits of its `hardware_config.yaml`: with the head
-within 30 degrees of the body's direction, every sum of gaze, nod and lean below is within them. Speeds are those of the
-vendor's own greeting: 20 degrees of roll in 0.2 s.
+within 30 degrees of the body's direction, every sum of gaze, nod and lean below is within them, to a degree or two at
+the corners. Speeds are those of the vendor's own greeting: 20 degrees of roll in 0.2 s.
 """
 
 import math
@@ -52,7 +52,7 @@ TRACKS: Mapping[str, tuple[JointLimit, ...]] = {
     "torso": (_TURN, _LEAN),
     "face": _ANTENNAS,
 }
-"""Joints of each track. What the head and a nod do adds up, and so do the body's turn and what it follows the head."""
+"""Joints of each track. The head's and a nod's add up, and so do the body's own turn and that after the head."""
 HOME: Mapping[str, tuple[float, ...]] = {
     "head": (0.0, 0.0, 0.0), "nod": (0.0, 0.0, 0.0), "torso": (0.0, 0.0), "face": (-UPRIGHT, UPRIGHT)
 }  # fmt: skip

@@ -40,8 +40,8 @@ Connect = Callable[[], AbstractAsyncContextManager[Daemon]]
 class Link:
     """The connection, kept. trouble: why the robot cannot be moved now; None: it can.
 
-    on_measured: gets each measurement, and returns the command that answers it. on_trouble: gets trouble as it begins.
-    on_back: called with the first measurement after the last trouble.
+    on_measured: gets each measurement, and returns the command that answers it. on_trouble: gets trouble as it
+    begins. on_back: gets the first measurement after the last trouble.
     """
 
     def __init__(

@@ -6,10 +6,9 @@ Nothing waits here, and nothing is sent. Time is that of a clock.
 import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from math import inf, radians
+from math import radians
 
 import numpy as np
-from msgspec import Struct
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Radians, Seconds, Vector
@@ -20,11 +19,12 @@ from engage_hri.services.control.reachy_mini.courses import Circumstances, Cours
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
 from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.reachy_mini.tracks import NEAR, Aim, Off, Track, Tracks, farthest
+from engage_hri.services.control.reachy_mini.trim import Trim
 from engage_hri.services.control.torso.course import Impossible
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
-Tracks = dict[str, tuple[float, ...]]
 NOTICEABLE = radians(0.3)
 """A target that moves less does not move the head."""
 SHORTEST: Seconds = 0.1
@@ -33,45 +33,8 @@ FOLLOWING: Seconds = 0.3
 """A look on a target that moves may be so far behind it."""
 ASTRAY = radians(6.0)
 """Joints that are further than this from where they were sent have been moved by somebody else."""
-NEAR = {
-    "head_pitch": radians(0.8), "head_yaw": radians(0.8), "body_follow": radians(2.0), "nod_yaw": radians(1.0),
-    "nod_pitch": radians(1.0), "nod_roll": radians(1.0), "body_turn": radians(1.0), "body_lean": radians(0.5),
-    "right_antenna": radians(4.0), "left_antenna": radians(4.0),
-}  # fmt: skip
-"""How far a joint of a track may be from a sync point. An antenna is a long lever on a small motor."""
 SAMPLES = 6
 """Places of a path between a sync point and where the plan is, at which the joints may be to have come there."""
-
-
-class Off(Struct, frozen=True):
-    """The joint that is farthest off, by the share of what is allowed. here, there: its angle, and where it should be."""
-
-    joint: str
-    share: float
-    here: Radians
-    there: Radians
-
-
-class Aim(Struct, frozen=True):
-    """A look of the head: on what, and the turn and lean of the body for which its path was laid."""
-
-    look: courses.Looks
-    body: tuple[float, ...]
-
-
-class Track:
-    """The motion of a few joints. base: angles to which they go home. aim: what the head is on, or on its way to."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.base = joints.HOME[name]
-        self.aim: Aim | None = None
-        self.motion = Motion(Path(resting(self.base), (), joints.TRACKS[name]), 0.0)
-
-    @property
-    def going(self) -> tuple[float, ...]:
-        """Where it comes to rest."""
-        return tuple(self.motion.at(inf).q.tolist())
 
 
 class Moves:
@@ -86,10 +49,11 @@ class Moves:
         self.tracks = {name: Track(name) for name in joints.TRACKS}
         self.runs: dict[str, Run] = {}
         self.look: courses.Looks | None = None
-        self.measured: Angles = self.commanded(0.0)
         self._limits = joints.limits(settings.pace)
         self._lag = settings.lag
+        self.trim = Trim(radians(settings.correction), radians(settings.on_target))
         self._near = {**NEAR, **dict.fromkeys(("head_yaw", "head_pitch"), radians(settings.on_target))}
+        self.measured: Angles = joints.summed(joints.HOME)
         self._base_of: MovementAuthority | None = None
         """Authority of the shift that has set where the head belongs."""
         self._speeds: dict[str, float] = {}
@@ -107,8 +71,22 @@ class Moves:
         return planned
 
     def commanded(self, t: Seconds) -> dict[str, float]:
-        """Angle of each joint at an instant."""
-        return joints.summed(self.planned(t))
+        """Angle that each joint is told at an instant: with what it needs to hold the head where it is to be."""
+        pose = joints.summed(self.planned(t))
+        yaw, pitch = self.trim.angles
+        return {**pose, "head_yaw": pose["head_yaw"] + yaw, "head_pitch": pose["head_pitch"] + pitch}
+
+    def correct(self, now: Seconds) -> bool:
+        """Correct the head while it stands. True if that changes what its motors are told."""
+        if now < max(self.tracks[name].motion.end for name in ("head", "nod", "torso")) + self._lag:
+            self.trim.rest()
+            return False
+        there, here = self.planned(now)["head"], self._of_track("head", now)
+        yaw, pitch = there[0] - here[0], there[1] - here[1]
+        if max(abs(yaw), abs(pitch)) > ASTRAY:  # it is no weight that holds the head there
+            self.trim.rest()
+            return False
+        return self.trim.see((yaw, pitch))
 
     @property
     def end(self) -> Seconds:
@@ -129,7 +107,7 @@ class Moves:
     # -- planning -----------------------------------------------------------------------------------------------
 
     def circumstances(self, now: Seconds, world: World, pose: Angles | None = None) -> Circumstances:
-        """What a behavior begins from: where the plan has the tracks, with the joints of `pose` in place of its own."""
+        """What a behavior begins from: where the plan has the tracks, or the joints of `pose`."""
         tracks = self.planned(now)
         torso = self.tracks["torso"]
         tracks["torso"] = torso.going
@@ -222,7 +200,7 @@ class Moves:
             del self.runs[run.course.track]
 
     def abandon(self, run: Run, now: Seconds) -> None:
-        """Send a track home whose behavior has ended early. A shift of the head that is broken off stays where it stops."""
+        """Send a track home whose behavior has ended early. A shift of the head stays where it stops."""
         track = self.tracks[run.course.track]
         if is_shift(run.behavior):
             run.motion.brake(now)
@@ -330,12 +308,12 @@ class Moves:
 
     def off(self, name: str, now: Seconds, there: Sequence[float]) -> Off:
         """How far the measured joints of a track are off some angles."""
-        return _farthest(name, self._of_track(name, now), there, self._near)
+        return farthest(name, self._of_track(name, now), there, self._near)
 
     def off_run(self, run: Run, instant: Instant, now: Seconds) -> Off:
         """How far the measured joints are off a sync point, or off the nearest place on the way behind it.
 
-        A look is on its target by the gaze axis: the joints are compared with what looks there from where the eyes are.
+        A look is on its target by the gaze axis: what counts are the angles that look there from where the eyes are.
         """
         track = run.course.track
         if track == "head":
@@ -374,11 +352,12 @@ class Moves:
         """True if nothing moves, and the joints are not where they were sent: somebody else has moved them."""
         if now < self.end + 1.0:
             return False
-        sent = self.commanded(now)
+        sent = joints.summed(self.planned(now))
         return any(abs(self.measured[name] - sent[name]) > ASTRAY for name in ("head_yaw", "head_pitch", "body_yaw"))
 
     def settle(self, now: Seconds) -> None:
         """Begin anew from where the joints are measured, at rest. Where tracks go home to stays."""
+        self.trim.clear()
         turn = max(joints.TRACKS["torso"][0].low, min(joints.TRACKS["torso"][0].high, self.measured["body_yaw"]))
         tracks: Tracks = {"nod": joints.HOME["nod"], "torso": (turn, self.measured["body_lean"])}
         tracks["head"] = (self.measured["head_yaw"], self.measured["head_pitch"], self.measured["body_yaw"] - turn)
@@ -414,10 +393,3 @@ def is_shift(behavior: BlockBehavior) -> bool:
 def _goal(look: courses.Looks, around: Circumstances) -> tuple[float, ...]:
     """Angles of the head's track on the target of a look. Raises Impossible."""
     return courses.course(look, around).goal
-
-
-def _farthest(name: str, here: Sequence[float], there: Sequence[float], near: Angles) -> Off:
-    """The joint of a track that is off by the greatest share of what is allowed."""
-    names = [limit.joint for limit in joints.TRACKS[name]]
-    offs = [Off(joint, abs(b - a) / near[joint], a, b) for joint, a, b in zip(names, here, there, strict=True)]
-    return max(offs, key=lambda off: off.share)

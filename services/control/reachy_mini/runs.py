@@ -1,4 +1,4 @@
-"""A behavior under way on Reachy Mini: its motion, the sync points to come, and how far it may go. Pure but for its bell."""
+"""A behavior under way on Reachy Mini: its motion, the sync points to come, and how far it may go."""
 
 from math import inf
 
@@ -14,8 +14,8 @@ from engage_hri.services.control.waiting import Bell
 class Run:
     """A behavior that is being performed. bell: rings when its authority, its joints or its target have news.
 
-    pending: instants that it has not passed. is_beneath: a shift that a look lies over moves no more. waits: it stands
-    at a hold point until it may go on.
+    pending: instants that it has not passed. is_beneath: a shift that a look lies over moves no more. waits: it
+    stands at a hold point until it may go on.
     """
 
     def __init__(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
@@ -58,7 +58,7 @@ class Run:
         return None if mark is None else self.motion.crossing(mark)
 
     def regulate(self, now: Seconds) -> None:
-        """Let the motion go as far as the authority permits. While it is held it stops at the next place where it can."""
+        """Let the motion go as far as the authority permits. Held, it stops at the next place where it can."""
         is_news, self._is_held = self.authority.held and not self._is_held, self.authority.held
         if not self._is_held:
             self._missed = frozenset()

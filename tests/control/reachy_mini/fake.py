@@ -1,7 +1,7 @@
 """A daemon of a Reachy Mini on loop time, no better than the real one: `test_real.py` holds them against each other.
 
-The real mock-up takes a target at the end of a tick of 20 ms, and is there at the end of the next one. It goes where it
-is told at once, however far; it tells its joints 43 times a second when 50 are asked for; it begins folded down.
+The real mock-up takes a target at the end of a tick of 20 ms, and is there at the end of the next one. It goes where
+it is told at once, however far; it tells its joints 43 times a second when 50 are asked for; it begins folded down.
 """
 
 import asyncio
@@ -179,5 +179,6 @@ class _Connection:
 
 
 HOME = {
-    "yaw": 0.0, "pitch": 0.0, "roll": 0.0, "body_yaw": 0.0, "right": joints.HOME["face"][0], "left": joints.HOME["face"][1]
+    "yaw": 0.0, "pitch": 0.0, "roll": 0.0, "body_yaw": 0.0, "right": joints.HOME["face"][0],
+    "left": joints.HOME["face"][1],
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""The driver of Reachy Mini on the real daemon with its mock-up: the contract in real time, and outages that are real.
+"""The driver of Reachy Mini on the real daemon with its mock-up: the contract in real time, and real outages.
 
 All of the contract takes minutes, so that it runs on request: REACHY_MINI_FULL=1.
 """

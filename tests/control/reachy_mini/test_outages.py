@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from itertools import pairwise
 
 import pytest
 
@@ -159,7 +160,7 @@ async def test_after_a_hiccup_the_head_goes_on_from_where_it_stood():
         assert made.faults == []
         # No command jumps: the greatest step is what the speed permits in one period, not what the plan had gone on.
         yaws = [pose["yaw"] for _, pose in made.daemon.commands]
-        steps = [abs(b - a) for a, b in zip(yaws, yaws[1:], strict=False)]
+        steps = [abs(b - a) for a, b in pairwise(yaws)]
         assert max(steps) < made.body.capabilities.joints[0].speed * 0.03
 
 
@@ -192,19 +193,24 @@ async def test_late_is_late():
         await stage.over()
 
 
-async def test_a_head_that_sags_is_never_on_target_unless_that_is_near_enough():
-    for allowed, is_there in ((0.8, False), (3.0, True)):
-        async with robot(on_target=allowed) as made:
-            made.daemon.sag = math.radians(2.0)
-            stage = Stage(made.body, GAZE, "stroke_start")
-            await asyncio.sleep(4.0)
+@pytest.mark.parametrize(
+    ("settings", "is_there"),
+    [({"correction": 0.0}, False), ({"correction": 0.0, "on_target": 3.0}, True), ({}, True)],
+)
+async def test_a_head_that_sags_is_on_target_once_it_is_corrected_or_that_is_near_enough(settings, is_there):
+    made = Robot(ReachyMiniSettings(**settings))
+    async with made.body.connected():
+        made.daemon.sag = math.radians(2.0)
+        stage = Stage(made.body, GAZE, "stroke_start")
+        await asyncio.sleep(4.0)
 
-            assert (stage.waits_at == ["stroke"]) is is_there
-            if is_there:
-                stage.authority.extend("end")
-                await stage.over()
-            else:
-                assert "2.0 from where it should be" in (await failure(stage)).reason
+        assert (stage.waits_at == ["stroke"]) is is_there
+        if is_there:
+            assert made.off() < math.radians(settings.get("on_target", 0.8))
+            stage.authority.extend("end")
+            await stage.over()
+        else:
+            assert "2.0 from where it should be" in (await failure(stage)).reason
 
 
 async def test_noise_of_the_encoders_changes_nothing_but_when():
