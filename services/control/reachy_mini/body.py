@@ -260,14 +260,18 @@ class ReachyMini(Body):
                 raise Revoked
             run.regulate(now)
             due = run.due(instant)
-            if due is not None and run.bell.is_past(due):
+            is_due = due is not None and run.bell.is_past(due)
+            if not is_due and run.course.arrival in instant.syncs and self._moves.follows(run, now):
+                if self._moves.off_run(run, instant, now).share <= 1.0:
+                    return now
+            elif is_due:
                 if not run.motion.path.marks[instant.syncs[0]] and instant is run.course.instants[0]:
                     return now  # it begins: nothing has to be anywhere
                 off = self._moves.off_run(run, instant, now)
                 if off.share <= 1.0:
                     return now
                 self._check(watch, off, run.behavior.id, instant.syncs[-1])
-            await run.bell.wait(due if due is not None and not run.bell.is_past(due) else inf)
+            await run.bell.wait(inf if due is None or is_due else due)
         return self._loop.time()
 
     async def _wait_to_go_on(self, run: Run, instant: Instant) -> None:
@@ -334,7 +338,7 @@ class ReachyMini(Body):
         entity = getattr(look, "target", "")
         if run is not None and not run.is_homeward:
             look, entity = run.behavior, run.course.entity
-        if now < moves.tracks["head"].motion.end and not (run is not None and run.has_arrived):
+        if now < moves.tracks["head"].motion.end and not (run is not None and (run.waits or run.has_arrived)):
             return ""
         if not entity or not isinstance(look, courses.Looks) or moves.world.entity(entity) is None:
             return ""

@@ -11,7 +11,7 @@ from math import radians
 import numpy as np
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
-from engage_hri.schemas.units import Radians, Seconds, Vector
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.reachy_mini import courses, geometry, joints
@@ -19,6 +19,7 @@ from engage_hri.services.control.reachy_mini.courses import Circumstances, Cours
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
 from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.reachy_mini.speeds import Speeds
 from engage_hri.services.control.reachy_mini.tracks import NEAR, Aim, Off, Track, Tracks, farthest
 from engage_hri.services.control.reachy_mini.trim import Trim
 from engage_hri.services.control.torso.course import Impossible
@@ -56,9 +57,7 @@ class Moves:
         self.measured: Angles = joints.summed(joints.HOME)
         self._base_of: MovementAuthority | None = None
         """Authority of the shift that has set where the head belongs."""
-        self._speeds: dict[str, float] = {}
-        """How fast entities move, metres per second."""
-        self._seen: dict[str, tuple[Vector, Seconds]] = {}
+        self._speeds = Speeds()
 
     # -- where the plan is --------------------------------------------------------------------------------------
 
@@ -252,12 +251,7 @@ class Moves:
 
     def see(self, world: World, now: Seconds) -> None:
         """Take note of a changed world, and follow what is looked at."""
-        for entity in world.entities:
-            before, since = self._seen.get(entity.id, (entity.position, now - 1.0))
-            if now - since > 1e-3:
-                speed = math.dist(before, entity.position) / (now - since)
-                self._speeds[entity.id] = max(speed, 0.5 * self._speeds.get(entity.id, 0.0) if speed else 0.0)
-                self._seen[entity.id] = (entity.position, now)
+        self._speeds.see(world, now)
         self.world = world
         self.follow(now)
 
@@ -331,10 +325,14 @@ class Moves:
         allowed = self._near["head_yaw"]
         if look is not None and (entity := self.world.entity(look.target)) is not None:
             away = math.dist(entity.position, geometry.gaze(self.measured, self.mounting).origin)
-            allowed += FOLLOWING * self._speeds.get(entity.id, 0.0) / max(away, 0.1)
+            allowed += FOLLOWING * self._speeds.of(entity.id, now) / max(away, 0.1)
         aside, up = (there[0] - here[0]) * math.cos(here[1]), there[1] - here[1]
         worst = 0 if abs(aside) > abs(up) else 1
         return Off(("head_yaw", "head_pitch")[worst], math.hypot(aside, up) / allowed, here[worst], there[worst])
+
+    def follows(self, run: Run, now: Seconds) -> bool:
+        """True if what a look is on its way to moves: then its plan is laid anew again and again, and has no end."""
+        return run.course.track == "head" and self._speeds.of(getattr(run.behavior, "target", ""), now) > 0.0
 
     def _on_target(self, look: courses.Looks | None) -> tuple[Radians, Radians]:
         track = self.tracks["head"]
@@ -349,7 +347,7 @@ class Moves:
             return yaw, pitch
 
     def is_astray(self, now: Seconds) -> bool:
-        """True if nothing moves, and the joints are not where they were sent: somebody else has moved them."""
+        """True if nothing moves, and joints are not where they were sent: somebody else has moved them."""
         if now < self.end + 1.0:
             return False
         sent = joints.summed(self.planned(now))
