@@ -80,8 +80,10 @@ class Mockup:
             self._process.wait()
             self._process = None
 
-    def ask(self, method: str, path: str) -> None:
-        urllib.request.urlopen(urllib.request.Request(f"{self.url}{path}", method=method), timeout=5.0).close()
+    def ask(self, method: str, path: str) -> bytes:
+        request = urllib.request.Request(f"{self.url}{path}", method=method)
+        with urllib.request.urlopen(request, timeout=5.0) as answer:
+            return bytes(answer.read())
 
 
 @contextmanager
