@@ -1,4 +1,4 @@
-"""What each behavior is on Reachy Mini: the track that it takes, its way, and where its sync points are. Pure.
+"""Course of each behavior on Reachy Mini: the track that it takes, its way, and its sync points. Pure.
 
 Nods, faces and postures are those of the simulated torso's repertoire, in the size of this robot. It has no face, so
 what a face would do its antennas do.
@@ -99,7 +99,7 @@ def instants(behavior: BlockBehavior, strokes: Sequence[str] = ()) -> tuple[Inst
 
 
 class Circumstances(Struct, frozen=True):
-    """What a behavior begins from. tracks: their angles. base: angles that each goes home to."""
+    """Circumstances that a behavior begins from. tracks: their angles. base: angles that each goes home to."""
 
     tracks: Mapping[str, tuple[float, ...]]
     base: Mapping[str, tuple[float, ...]]
@@ -207,7 +207,7 @@ def _look(behavior: Looks, now: Circumstances) -> Course:
 
 
 def _looked_note(behavior: Looks) -> str:
-    """What this head does otherwise than a gaze asks."""
+    """Note what this head does otherwise than a gaze asks."""
     if isinstance(behavior, HeadDirectionShift):
         return ""
     notes = []

@@ -43,7 +43,7 @@ def motion_estimate(
 
 
 def _times(course: Course, path: Path, around: Circumstances, moves: Moves, lag: Seconds) -> dict[str, Seconds]:
-    """When each sync point is measured, in seconds from the beginning."""
+    """Times at which sync points are measured, in seconds from the beginning."""
     times = {sync: s + _settling(course, path, s, lag) for sync, s in path.marks.items()}
     if not course.is_swing and not course.stays:
         back = moves.way(course.track, resting(course.goal), around.base[course.track])

@@ -105,7 +105,7 @@ def of_track(track: str, pose: Angles, others: Mapping[str, tuple[float, ...]]) 
 
 
 def follow(yaw: float, turn: float) -> float:
-    """How far the body turns after a head that looks there, with the body turned already."""
+    """Angle by which the body turns after a head that looks there, with the body turned already."""
     beyond = max(0.0, abs(yaw - turn) - ASIDE)
     return math.copysign(beyond, yaw - turn)
 

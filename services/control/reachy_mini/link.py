@@ -117,7 +117,7 @@ def silent(seconds: Seconds) -> Fault:
 
 
 def _trouble_of(measured: Measured) -> Fault | None:
-    """What a measurement says against moving the robot; None: nothing."""
+    """Trouble that a measurement tells of; None: the robot can be moved."""
     if measured.mode != messages.ENABLED:
         advice = (
             "switch them on, in the vendor's app or by POST /api/motors/set_mode/enabled; the robot then goes home"

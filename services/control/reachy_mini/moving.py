@@ -89,7 +89,7 @@ class Moves:
 
     @property
     def end(self) -> Seconds:
-        """When the plan of the last track comes to rest."""
+        """Instant at which the plan of the last track comes to rest."""
         return max(track.motion.end for track in self.tracks.values())
 
     def _added(self, planned: Tracks) -> tuple[float, float]:
@@ -106,7 +106,7 @@ class Moves:
     # -- planning -----------------------------------------------------------------------------------------------
 
     def circumstances(self, now: Seconds, world: World, pose: Angles | None = None) -> Circumstances:
-        """What a behavior begins from: where the plan has the tracks, or the joints of `pose`."""
+        """Describe what a behavior begins from: where the plan has the tracks, or the joints of `pose`."""
         tracks = self.planned(now)
         torso = self.tracks["torso"]
         tracks["torso"] = torso.going
@@ -301,11 +301,11 @@ class Moves:
         return joints.of_track(name, self.measured, self.planned(now - self._lag))
 
     def off(self, name: str, now: Seconds, there: Sequence[float]) -> Off:
-        """How far the measured joints of a track are off some angles."""
+        """Tell how far the measured joints of a track are off some angles."""
         return farthest(name, self._of_track(name, now), there, self._near)
 
     def off_run(self, run: Run, instant: Instant, now: Seconds) -> Off:
-        """How far the measured joints are off a sync point, or off the nearest place on the way behind it.
+        """Tell how far the measured joints are off a sync point, or off the nearest place on the way behind it.
 
         A look is on its target by the gaze axis: what counts are the angles that look there from where the eyes are.
         """
@@ -320,7 +320,7 @@ class Moves:
         return min(offs, key=lambda off: off.share)
 
     def off_target(self, look: courses.Looks | None, now: Seconds) -> Off:
-        """How far the measured gaze axis is off the target of a look; None: off where the head comes to rest."""
+        """Tell how far the measured gaze axis is off the target of a look; None: off where the head will rest."""
         there, here = self._on_target(look), self._of_track("head", now)
         allowed = self._near["head_yaw"]
         if look is not None and (entity := self.world.entity(look.target)) is not None:

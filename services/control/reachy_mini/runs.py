@@ -53,7 +53,7 @@ class Run:
         return inf
 
     def due(self, instant: Instant) -> Seconds | None:
-        """When the plan is at an instant; None: it does not go so far yet."""
+        """Time at which the plan is at an instant; None: it does not go so far yet."""
         mark = self.motion.path.marks.get(instant.syncs[0])
         return None if mark is None else self.motion.crossing(mark)
 

@@ -1,4 +1,4 @@
-"""What an owner of a Reachy Mini may set: the section `control.drivers.reachy_mini`."""
+"""Settings of the driver of Reachy Mini: the section `control.drivers.reachy_mini`."""
 
 from urllib.parse import urlsplit
 
@@ -8,7 +8,7 @@ from engage_hri.schemas.units import Degrees, Seconds, Vector
 
 
 class ReachyMiniSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the robot is, and how it moves.
+    """Settings of a Reachy Mini: where it is, and how it moves.
 
     url: address of its daemon. position: of the middle of its foot, metres in the robot's frame; by default a table.
     facing: of its foot, counted to its left from straight ahead.

@@ -1,4 +1,4 @@
-"""How fast the entities of the world move, from where they were seen. Pure."""
+"""Speeds of the entities of the world, from where they were seen. Pure."""
 
 import math
 
@@ -26,6 +26,6 @@ class Speeds:
                 self._seen[entity.id] = (entity.position, now)
 
     def of(self, entity: str, now: Seconds) -> float:
-        """How fast an entity moves; 0: it stands, or nobody knows of it."""
+        """Speed of an entity; 0: it stands, or nobody knows of it."""
         _, since = self._seen.get(entity, ((0.0, 0.0, 0.0), -math.inf))
         return self._speeds.get(entity, 0.0) if now - since < FORGOTTEN else 0.0

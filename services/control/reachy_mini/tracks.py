@@ -47,7 +47,7 @@ class Track:
 
     @property
     def going(self) -> tuple[float, ...]:
-        """Where it comes to rest."""
+        """Angles at which it comes to rest."""
         return tuple(self.motion.at(inf).q.tolist())
 
 

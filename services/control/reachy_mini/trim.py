@@ -16,7 +16,7 @@ LONGEST = math.radians(0.35)
 
 
 class Trim:
-    """What is added to yaw and pitch of the head. most: the greatest correction. enough: half of this error stays."""
+    """Angles that are added to yaw and pitch. most: the greatest correction. enough: half of this error stays."""
 
     def __init__(self, most: Radians, enough: Radians) -> None:
         self.angles: tuple[Radians, Radians] = (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Whether joints that are not where they should be still make way. Pure."""
+"""Patience with joints that are not where they should be, as long as they make way. Pure."""
 
 import math
 

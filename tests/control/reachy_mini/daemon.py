@@ -13,7 +13,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -56,9 +56,10 @@ class Mockup:
                 return
             except OSError:
                 assert self._process is not None
-                assert self._process.poll() is None, (self._folder / "daemon.log").read_text()[-2000:]
                 assert time.monotonic() < deadline, "the daemon does not answer"
-            time.sleep(0.1)
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(0.1)
+                raise AssertionError((self._folder / "daemon.log").read_text()[-2000:])
 
     def begin(self) -> None:
         """Start it, and do not wait."""

@@ -13,9 +13,9 @@ from collections.abc import AsyncIterator, Callable, Iterator
 import numpy as np
 import pytest
 
-from engage_hri.schemas.behaviors import Gaze, PostureShift
+from engage_hri.schemas.behaviors import Gaze, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
-from engage_hri.services.control.body import Body, BodyFailed
+from engage_hri.services.control.body import Arrived, Body, BodyFailed
 from engage_hri.services.control.reachy_mini import messages
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.connection import connected
@@ -69,6 +69,22 @@ class TestClaims:
             await claim(suite, body)
 
 
+class Held(Stage):
+    """A behavior that can be awaited at a hold point."""
+
+    async def _perform(self) -> None:
+        self.is_held = asyncio.Event()
+        async for progress in self._body.perform(self._behavior, self.authority):
+            self.progress.append(progress)
+            if isinstance(progress, Arrived):
+                self.is_held.set()
+
+    async def wait(self) -> None:
+        await asyncio.sleep(0)
+        async with asyncio.timeout(20.0):
+            await self.is_held.wait()
+
+
 # -- outages ------------------------------------------------------------------------------------------------------
 
 
@@ -100,8 +116,8 @@ async def test_an_outage_is_told_at_once_and_the_robot_works_again_after_it(mock
     body.on_fault = faults.append
     look = Gaze(id="look", target="near-right")
     async with body.connected():
-        held = Stage(body, look, "stroke_start")
-        await _held(held)
+        held = Held(body, look, "stroke_start")
+        await held.wait()
         since = asyncio.get_running_loop().time()
         outage(mockup)
         with pytest.raises(BodyFailed) as failed:
@@ -130,13 +146,6 @@ async def test_without_a_daemon_it_says_where_it_looked_and_how_to_start_one() -
     assert "--set control.drivers.reachy_mini.url=" in failed.value.fault.advice
 
 
-async def _held(stage: Stage) -> None:
-    """Wait until a behavior has come to a hold point."""
-    async with asyncio.timeout(20.0):
-        while not stage.waits_at:  # noqa: ASYNC110
-            await asyncio.sleep(0.02)
-
-
 # -- the truth of measurements ------------------------------------------------------------------------------------
 
 
@@ -145,9 +154,9 @@ async def test_the_gaze_axis_is_what_the_daemon_s_matrix_of_the_head_says(mockup
     body.see(WORLD)
     async with body.connected():
         await performed(body, PostureShift(id="lean", lexeme="LEAN_FORWARD"))
-        stage = Stage(body, Gaze(id="look", target="far-left"), "stroke_start")
-        await _held(stage)
-        await asyncio.sleep(0.5)
+        stage = Held(body, Gaze(id="look", target="far-left"), "stroke_start")
+        await stage.wait()
+        await performed(body, Wait(id="settle", duration=0.5))
         told = mockup.ask("GET", "/api/state/full?use_pose_matrix=true")
         matrix = np.array(json.loads(told)["head_pose"]["m"]).reshape(4, 4)
         gaze, target = body.state().gaze, WORLD.entity("far-left")
