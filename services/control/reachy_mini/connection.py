@@ -43,7 +43,13 @@ async def connected(settings: ReachyMiniSettings) -> AsyncIterator[Daemon]:
                 _opened(session, STATE, closing) as state,
                 _opened(session, TARGET, closing) as targets,
             ):
-                yield _Connection(settings.url, state, targets)
+                connection = _Connection(settings.url, state, targets)
+                listening = asyncio.create_task(connection.listen(), name="answers of reachy mini")
+                try:
+                    yield connection
+                finally:
+                    listening.cancel()
+                    await asyncio.gather(listening, return_exceptions=True)
     except (aiohttp.ClientError, OSError, TimeoutError) as error:
         raise Lost(_unreachable(settings.url, error)) from error
 
@@ -53,6 +59,13 @@ class _Connection:
         self, url: str, state: aiohttp.ClientWebSocketResponse, targets: aiohttp.ClientWebSocketResponse
     ) -> None:
         self._url, self._state, self._targets = url, state, targets
+        self._refusal = ""
+
+    async def listen(self) -> None:
+        """Read what comes back for targets: refusals, and the pings that the daemon wants answered every 20 s."""
+        async for message in self._targets:
+            if message.type is aiohttp.WSMsgType.TEXT:
+                self._refusal = " ".join(str(message.data).split())[:200]
 
     async def measurement(self) -> str:
         message = await self._state.receive()
@@ -61,6 +74,8 @@ class _Connection:
         return str(message.data)
 
     async def command(self, text: str) -> None:
+        if self._refusal:
+            raise Lost(Fault(reason=f"the daemon refuses a target: {self._refusal}", advice=VERSION))
         try:
             await self._targets.send_str(text)
         except (aiohttp.ClientError, OSError) as error:

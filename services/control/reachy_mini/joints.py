@@ -41,12 +41,12 @@ _ANTENNAS = (
 TRACKS: Mapping[str, tuple[JointLimit, ...]] = {
     "head": (
         _joint("head_yaw", "head", -150, 150, 170, 1700),
-        _joint("head_pitch", "head", -28, 30, 170, 1700),
+        _joint("head_pitch", "head", -33, 30, 170, 1700),
         _joint("body_follow", "head", -120, 120, 110, 800),
     ),
     "nod": (
-        _joint("nod_yaw", "head", -10, 10, 110, 1500),
-        _joint("nod_pitch", "head", -10, 10, 110, 1500),
+        _joint("nod_yaw", "head", -8, 8, 110, 1500),
+        _joint("nod_pitch", "head", -8, 8, 110, 1500),
         _joint("nod_roll", "head", -12, 12, 110, 1500),
     ),
     "torso": (_TURN, _LEAN),
@@ -60,7 +60,7 @@ PARTS: Mapping[str, str] = {"head": "head", "nod": "head", "torso": "torso", "fa
 """The part of the body that a track moves."""
 LIMITS = (
     _joint("head_yaw", "head", -160, 160, 280, 3200),
-    _joint("head_pitch", "head", -38, 40, 280, 3200),
+    _joint("head_pitch", "head", -41, 40, 280, 3200),
     _joint("head_roll", "head", -12, 12, 110, 1500),
     _joint("body_yaw", "torso", -145, 145, 170, 1100),
     _LEAN,

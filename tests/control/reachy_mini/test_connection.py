@@ -1,5 +1,6 @@
 """What the driver of Reachy Mini makes of answers of a daemon: a small server of HTTP and WebSockets, on loopback."""
 
+import asyncio
 import json
 from collections.abc import AsyncIterator, Callable
 from typing import Any
@@ -12,7 +13,7 @@ from aiohttp import WSMsgType, web
 
 from engage_hri.services.control.reachy_mini import messages
 from engage_hri.services.control.reachy_mini.connection import connected
-from engage_hri.services.control.reachy_mini.link import Lost
+from engage_hri.services.control.reachy_mini.link import Daemon, Lost
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
 pytestmark = pytest.mark.real_time
@@ -33,6 +34,8 @@ class Server:
         self.answer = 200
         self.asked: list[str] = []
         self.targets: list[Any] = []
+        self.refusal = ""
+        self.pongs = asyncio.Event()
         self.url = ""
 
     def app(self) -> web.Application:
@@ -72,11 +75,16 @@ class Server:
         return socket
 
     async def _take(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse()
+        socket = web.WebSocketResponse(autoping=False)
         await socket.prepare(request)
+        await socket.ping()
         async for message in socket:
             if message.type is WSMsgType.TEXT:
                 self.targets.append(json.loads(message.data))
+                if self.refusal:
+                    await socket.send_str(self.refusal)
+            elif message.type is WSMsgType.PONG:
+                self.pongs.set()
         return socket
 
 
@@ -110,6 +118,27 @@ async def test_it_reads_measurements_and_writes_targets_in_the_daemon_s_frame(se
         }
     ]
     assert server.asked == ["/api/state/ws/full?frequency=50"]
+
+
+async def test_it_answers_the_pings_of_the_daemon_without_which_that_hangs_up(server: Server):
+    async with connected(ReachyMiniSettings(url=server.url)), asyncio.timeout(5.0):
+        await server.pongs.wait()
+
+
+async def insist(daemon: Daemon) -> None:
+    """Send targets until that fails."""
+    async with asyncio.timeout(5.0):
+        while True:
+            await daemon.command("{}")
+            await asyncio.sleep(0)
+
+
+async def test_a_target_that_is_refused_is_told_with_the_daemon_s_words(server: Server):
+    server.refusal = '{"status": "error", "detail": "1 validation error"}'
+    async with connected(ReachyMiniSettings(url=server.url)) as daemon:
+        await daemon.measurement()
+        with pytest.raises(Lost, match=r"refuses a target: .*1 validation error"):
+            await insist(daemon)
 
 
 async def test_it_waits_for_a_move_of_the_daemon_s_own_and_switches_the_motors_on(server: Server):
