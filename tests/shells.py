@@ -23,6 +23,9 @@ SHELLS = {
     "services/control/ordinary.py",  # a body that moves on the loop's clock
     "services/control/composed.py",  # takes several bodies home at once
     "services/control/torso/body.py",  # a body that moves on the loop's clock
+    "services/control/reachy_mini/body.py",  # a body that moves on the loop's clock
+    "services/control/reachy_mini/link.py",  # keeps the connection to the robot
+    "services/control/reachy_mini/connection.py",  # HTTP and WebSockets
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once
     "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer

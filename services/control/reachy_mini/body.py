@@ -1,0 +1,372 @@
+"""Reachy Mini as a body: a head that looks and nods, a base that turns, and antennas in place of a face.
+
+Its plan is laid here and sent through the daemon, a target for each measurement. A sync point is reported when the
+plan has come there *and* the daemon measures the joints there: never because a planned time is over.
+"""
+
+import asyncio
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager
+from math import degrees, inf
+from typing import ClassVar
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Wait
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import (
+    Arrived,
+    BehaviorRefused,
+    Body,
+    BodyFailed,
+    BodyState,
+    MovementAuthority,
+    Progress,
+    Reached,
+    Revoked,
+)
+from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
+from engage_hri.services.control.reachy_mini.courses import Instant
+from engage_hri.services.control.reachy_mini.estimates import motion_estimate
+from engage_hri.services.control.reachy_mini.link import Daemon, Link
+from engage_hri.services.control.reachy_mini.messages import Measured
+from engage_hri.services.control.reachy_mini.moving import Moves
+from engage_hri.services.control.reachy_mini.runs import Run
+from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.reachy_mini.tracks import Off
+from engage_hri.services.control.reachy_mini.watching import Watch
+from engage_hri.services.control.torso.course import Impossible
+from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
+from engage_hri.services.control.voice import speaking
+from engage_hri.services.control.waiting import Bell
+
+FREEZE: Seconds = 0.5
+"""Seconds that a track stands still when it is told to freeze, before it goes home."""
+GAP: Seconds = 0.15
+"""Seconds without a measurement, and so without a command, after which the plan goes on from where it was."""
+RESTS_ON = 2.0
+"""The eyes rest on what they look at within this many times the angle that counts as on target."""
+
+Connect = Callable[[ReachyMiniSettings], AbstractAsyncContextManager[Daemon]]
+
+
+class ReachyMini(Body):
+    """Reachy Mini through its daemon. Without `connected()` it answers for a robot at rest: `engage plan` asks so."""
+
+    Settings: ClassVar[type[Struct]] = ReachyMiniSettings
+
+    def __init__(self, settings: ReachyMiniSettings | None = None, connect: Connect | None = None) -> None:
+        """Make the body; `connected()` then finds the robot.
+
+        settings: of `control.drivers.reachy_mini`. connect: opens a connection; by default to `settings.url`.
+        """
+        self._settings = settings or ReachyMiniSettings()
+        self._connect = connect
+        types = (*courses.TYPES_OF_BEHAVIORS, Wait)
+        self.capabilities = Capabilities(
+            body="reachy_mini", types=tuple(map(type_name, types)), parts=("head", "torso", "face"),
+            joints=joints.LIMITS,
+        )  # fmt: skip
+        self._loop = asyncio.get_running_loop()
+        self._moves = Moves(self._settings)
+        self._link: Link | None = None
+        self._bells: set[Bell] = set()
+        """Of everything that waits for measurements."""
+        self._sent = ""
+        self._last_frame: Seconds = -inf
+        self._rests_since: Seconds = -inf
+        """End of the plan whose last command has been sent; -inf: it is under way."""
+
+    # -- connection ---------------------------------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        connect = self._connect or _over_the_network
+        link = Link(
+            lambda: connect(self._settings), self._settings.silence, on_measured=self._answer,
+            on_trouble=self._be_lost, on_back=self._be_back,
+        )  # fmt: skip
+        keeping = asyncio.create_task(link.keep(), name="link to reachy mini")
+        keeping.add_done_callback(lambda task: link.has_news.set())
+        try:
+            await link.has_news.wait()
+            if keeping.done():
+                keeping.result()
+            if link.trouble is not None:
+                raise RunFailed(link.trouble)
+            self._link = link
+            try:
+                await self.home()
+            except BodyFailed as failed:
+                raise RunFailed(failed.fault) from failed
+            yield
+        finally:
+            self._link = None
+            keeping.cancel()
+            await asyncio.gather(keeping, return_exceptions=True)
+
+    def _answer(self, measured: Measured) -> str | None:
+        """Take a measurement, and answer it with where the joints are to be now; None: where they were sent."""
+        now = self._loop.time()
+        self._moves.measured = measured.pose
+        if now - self._last_frame > GAP:
+            self._moves.stand(self._last_frame, now)
+        self._last_frame = now
+        for bell in list(self._bells):
+            bell.ring()
+        if not self._moves.correct(now) and self._rests_since == self._moves.end:
+            return None
+        end = self._moves.end
+        self._rests_since = end if now >= end else -inf
+        text = messages.target(self._moves.commanded(now))
+        self._sent, before = text, self._sent
+        return text if text != before else None
+
+    def _be_lost(self, fault: Fault) -> None:
+        if self._link is not None:
+            self.on_fault(fault)
+        for bell in list(self._bells):
+            bell.ring()
+
+    def _be_back(self, measured: Measured) -> None:
+        """Begin anew from where the joints are, and go home from there."""
+        now = self._loop.time()
+        self._moves.measured = measured.pose
+        self._last_frame, self._sent, self._rests_since = now, "", -inf
+        for run in list(self._moves.runs.values()):  # it has failed, and is just about to say so
+            self._moves.release(run)
+        self._moves.rebase(joints.TRACKS)
+        self._moves.settle(now)
+        self._moves.relax(joints.TRACKS, now)
+
+    @property
+    def _trouble(self) -> Fault | None:
+        return self._link.trouble if self._link is not None else None
+
+    # -- the contract -------------------------------------------------------------------------------------------
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        now = self._loop.time()
+        given = {each.joint: each.angle for each in pose.joints} if pose is not None else None
+        around = self._moves.circumstances(now, world, given)
+        if isinstance(behavior, Wait):
+            here = joints.message(joints.summed(around.tracks))
+            return wait_estimate(behavior, behavior.duration or 0.0, here)
+        try:
+            if (trouble := self._trouble) is not None:
+                raise Impossible("CANNOT_CREATE_BEHAVIOR", trouble.reason, trouble.advice)
+            course = courses.course(behavior, around)
+            start = None if given is None else around.tracks[course.track]
+            path = self._moves.path(course, now, start)
+            return motion_estimate(behavior, course, path, around, self._moves, self._settings.lag)
+        except Impossible as impossible:
+            return infeasible(behavior, impossible)
+
+    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self._move(behavior, authority)
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        names = [name for name, part in joints.PARTS.items() if not parts or part in parts]
+        for run in [self._moves.runs[name] for name in names if name in self._moves.runs]:
+            self._moves.release(run)
+            run.authority.revoke()
+        self._moves.rebase(names)
+        self._moves.relax(names, self._loop.time())
+        watches = {name: Watch(self._settings.patience) for name in names}
+        with self._bell() as bell:
+            while going := [name for name in names if name not in self._moves.runs and not self._is_home(name)]:
+                await bell.wait(inf if self._link is not None else self._loop.time())
+                if self._link is None:
+                    return
+                if self._trouble is not None:  # it goes home by itself once it is back
+                    watches = {name: Watch(self._settings.patience) for name in names}
+                    continue
+                for name in going:
+                    self._check(watches[name], self._off_home(name), "home", name)
+
+    def state(self) -> BodyState:
+        pose = self._moves.measured
+        return BodyState(
+            pose=joints.message(pose), gaze=geometry.gaze(pose, self._moves.mounting), moving=self._is_moving(),
+            looking_at=self._looking_at(),
+        )  # fmt: skip
+
+    def see(self, world: World) -> None:
+        self._moves.see(world, self._loop.time())
+
+    # -- behaviors ----------------------------------------------------------------------------------------------
+
+    async def _move(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        if (trouble := self._trouble) is not None:
+            raise BehaviorRefused(replace(trouble, where=behavior.id))
+        now = self._loop.time()
+        try:
+            run = Run(
+                behavior, courses.course(behavior, self._moves.circumstances(now, self._moves.world)), authority
+            )
+            if run.course.stays and run.course.track == "head" and self._moves.is_overlaid():
+                run.is_beneath = True
+                self._moves.set_base(run)
+                self._moves.follow(now)
+            else:
+                self._moves.take_over(run, now)
+        except Impossible as impossible:
+            raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
+        unwatch = authority.watch(run.bell.ring)
+        self._bells.add(run.bell)
+        try:
+            async with aclosing(self._pass_points(run)) as points:
+                async for progress in points:
+                    yield progress
+        except Revoked:
+            if authority.revoked == "freeze" and self._moves.owns(run):
+                await self._freeze(run)
+        finally:
+            unwatch()
+            self._bells.discard(run.bell)
+            self._moves.end_shift(authority)
+            if self._moves.owns(run):
+                self._moves.release(run)
+                if run.pending:
+                    self._moves.abandon(run, self._loop.time())
+
+    async def _pass_points(self, run: Run) -> AsyncGenerator[Progress, None]:
+        """Report the sync points of `run` as its joints pass them. Raises Revoked or BodyFailed."""
+        for instant in run.course.instants:
+            at = came = await self._come(run, instant)
+            if not run.may_pass(instant.hold):
+                run.waits = True
+                yield Arrived(instant.hold, came)
+                await self._wait_to_go_on(run, instant)
+                at = self._loop.time()
+            self._moves.leave(run, instant, self._loop.time())
+            run.waits = False
+            for sync in instant.syncs:
+                yield Reached(sync, at, came)
+
+    async def _come(self, run: Run, instant: Instant) -> Seconds:
+        """Wait until plan and joints have come to an instant. Returns when. Raises Revoked or BodyFailed."""
+        watch = Watch(self._settings.patience)
+        while not run.is_beneath:
+            now = self._loop.time()
+            if run.authority.revoked is None or not self._moves.owns(run):
+                self._raise_trouble(run)
+            if run.authority.revoked is not None:
+                raise Revoked
+            run.regulate(now)
+            due = run.due(instant)
+            is_due = due is not None and run.bell.is_past(due)
+            if not is_due and run.course.arrival in instant.syncs and self._moves.follows(run, now):
+                if self._moves.off_run(run, instant, now).share <= 1.0:
+                    return now
+            elif is_due:
+                if not run.motion.path.marks[instant.syncs[0]] and instant is run.course.instants[0]:
+                    return now  # it begins: nothing has to be anywhere
+                off = self._moves.off_run(run, instant, now)
+                if off.share <= 1.0:
+                    return now
+                self._check(watch, off, run.behavior.id, instant.syncs[-1])
+            await run.bell.wait(inf if due is None or is_due else due)
+        return self._loop.time()
+
+    async def _wait_to_go_on(self, run: Run, instant: Instant) -> None:
+        """Wait at a hold point. Raises Revoked or BodyFailed; taken over just as it might pass, it passes."""
+        watch = Watch(self._settings.patience)
+        while run.authority.revoked is None:
+            self._raise_trouble(run)
+            run.regulate(now := self._loop.time())
+            if run.may_pass(instant.hold):
+                off = self._moves.off_run(run, instant, now)
+                if off.share <= 1.0:
+                    return
+                self._check(watch, off, run.behavior.id, instant.hold)
+            await run.bell.wait(inf)
+        if not (run.authority.revoked == "taken_over" and run.authority.covers(instant.hold)):
+            raise Revoked
+
+    async def _freeze(self, run: Run) -> None:
+        run.motion.brake(self._loop.time())
+        until = run.motion.end + FREEZE
+        while self._moves.owns(run) and not run.bell.is_past(until) and self._trouble is None:
+            await run.bell.wait(until)
+
+    def _raise_trouble(self, run: Run) -> None:
+        if (trouble := self._trouble) is not None:
+            raise BodyFailed(replace(trouble, where=run.behavior.id))
+
+    # -- measured joints ----------------------------------------------------------------------------------------
+
+    def _check(self, watch: Watch, off: Off, where: str, sync: str) -> None:
+        """Raise BodyFailed if joints that are not where they should be make no way any more."""
+        if (waited := watch.stuck(abs(off.there - off.here), self._loop.time())) is not None:
+            here, there = round(degrees(off.here), 1) + 0.0, degrees(off.there)
+            reason = (
+                f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be for its "
+                f"{sync}, and has made no way for {waited:.1f} s"
+            )
+            advice = "is it free, are its motors on, and does no other app move the robot?"
+            raise BodyFailed(Fault(reason=reason, where=where, advice=advice, service="control"))
+
+    def _off_home(self, name: str) -> Off:
+        track, now = self._moves.tracks[name], self._loop.time()
+        return self._moves.off(name, now, track.going)
+
+    def _is_home(self, name: str) -> bool:
+        comes = self._moves.tracks[name].motion.end + self._settings.lag
+        return self._loop.time() >= comes and self._off_home(name).share <= 1.0
+
+    def _is_moving(self) -> bool:
+        """True while a plan moves, or joints have not come along yet."""
+        now = self._loop.time()
+        for name, track in self._moves.tracks.items():
+            if now < track.motion.end + self._settings.lag:
+                return True
+            if now < track.motion.end + self._settings.patience and self._off_home(name).share > 1.0:
+                return True
+        return False
+
+    def _looking_at(self) -> str:
+        """The entity on the measured gaze axis that the head has come to look at."""
+        moves, now = self._moves, self._loop.time()
+        run = moves.runs.get("head")
+        look: BlockBehavior | None = moves.look
+        entity = getattr(look, "target", "")
+        if run is not None and not run.is_homeward:
+            look, entity = run.behavior, run.course.entity
+        if now < moves.tracks["head"].motion.end and not (run is not None and (run.waits or run.has_arrived)):
+            return ""
+        if not entity or not isinstance(look, courses.Looks) or moves.world.entity(entity) is None:
+            return ""
+        return entity if moves.off_target(look, now).share <= RESTS_ON else ""
+
+    def _bell(self) -> "_Listening":
+        return _Listening(self._bells)
+
+
+class _Listening:
+    """A bell that measurements ring, for the body of `with`."""
+
+    def __init__(self, bells: set[Bell]) -> None:
+        self._bells, self._bell = bells, Bell()
+
+    def __enter__(self) -> Bell:
+        self._bells.add(self._bell)
+        return self._bell
+
+    def __exit__(self, *_: object) -> None:
+        self._bells.discard(self._bell)
+
+
+def _over_the_network(settings: ReachyMiniSettings) -> AbstractAsyncContextManager[Daemon]:
+    from engage_hri.services.control.reachy_mini.connection import connected
+
+    return connected(settings)
+
+
+def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
+    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")

@@ -1,0 +1,251 @@
+"""Course of each behavior on Reachy Mini: the track that it takes, its way, and its sync points. Pure.
+
+Nods, faces and postures are those of the simulated torso's repertoire, in the size of this robot. It has no face, so
+what a face would do its antennas do.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from math import radians
+
+from msgspec import Struct
+
+from engage_hri.schemas.behavior_types import TYPES
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    Face,
+    FaceFacs,
+    FaceLexeme,
+    FaceShift,
+    Gaze,
+    GazeShift,
+    Head,
+    HeadDirectionShift,
+    Pose,
+    Posture,
+    PostureShift,
+    posed,
+)
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.suggestion import suggestion
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.vocabulary import normal
+from engage_hri.schemas.world import World
+from engage_hri.services.control.reachy_mini import geometry, joints
+from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
+from engage_hri.services.control.torso import expressions
+from engage_hri.services.control.torso.choreography import OFFSETS
+from engage_hri.services.control.torso.course import Impossible, Situation
+from engage_hri.services.control.torso.path import Leg
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
+
+Looks = Gaze | GazeShift | HeadDirectionShift
+Faces = Face | FaceLexeme | FaceFacs | FaceShift
+TYPES_OF_BEHAVIORS: tuple[type[BlockBehavior], ...] = (
+    Gaze, GazeShift, HeadDirectionShift, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture, PostureShift, Pose,
+)  # fmt: skip
+"""Types of behaviors that move it."""
+LEAST = {"head": radians(0.3), "nod": 0.0, "torso": radians(0.4), "face": radians(1.5)}
+"""A track that has less to go stays."""
+ANTENNAS: Mapping[str, tuple[float, float]] = {
+    "brow": (-10.0, 45.0), "lid": (-8.0, 70.0), "mouth_corner": (18.0, 60.0), "lips": (-6.0, -6.0),
+    "jaw": (-4.0, -4.0),
+}  # fmt: skip
+"""Degrees outwards that an antenna turns for what a face would do: by the full way up or open, and down or closed."""
+DROOP, RAISED = 130.0, -15.0
+"""Degrees outwards from straight up between which an antenna shows a face."""
+
+
+class Instant(Struct, frozen=True):
+    """Sync points that are passed together. hold: the one of them at which the behavior may have to wait."""
+
+    syncs: tuple[str, ...]
+    hold: str = ""
+
+
+class Course(Struct, frozen=True, kw_only=True):
+    """A behavior worked out. track: what it moves. goal: angles at its stroke, or at the end of a shift.
+
+    legs: its way; of what goes home by itself, up to its stroke only. is_swing: the way runs through to its end.
+    stays: it goes nowhere from its goal. entity: what the head is on at the goal. note: what is done otherwise.
+    """
+
+    track: str
+    legs: tuple[Leg, ...]
+    goal: tuple[float, ...]
+    instants: tuple[Instant, ...]
+    is_swing: bool = False
+    stays: bool = False
+    entity: str = ""
+    note: str = ""
+
+    @property
+    def arrival(self) -> str:
+        """The sync point that says that it is at its goal."""
+        return "end" if self.stays else "stroke"
+
+
+def instants(behavior: BlockBehavior, strokes: Sequence[str] = ()) -> tuple[Instant, ...]:
+    """Sync points of a behavior by instant. strokes: repetitions of its stroke."""
+    row = TYPES[type_name(behavior)]
+    found: list[Instant] = []
+    for sync in row.points:
+        group = next((tuple(group) for group in row.one_instant if sync in group), (sync,))
+        if sync == "stroke_end":
+            found += [Instant((each,)) for each in strokes]
+        if not found or sync not in found[-1].syncs:
+            found.append(Instant(group, next((each for each in group if each in row.holds), "")))
+    return tuple(found)
+
+
+class Circumstances(Struct, frozen=True):
+    """Circumstances that a behavior begins from. tracks: their angles. base: angles that each goes home to."""
+
+    tracks: Mapping[str, tuple[float, ...]]
+    base: Mapping[str, tuple[float, ...]]
+    world: World
+    mounting: Mounting
+    repertoire: Repertoire = BUILT_IN
+
+
+def course(behavior: BlockBehavior, now: Circumstances) -> Course:
+    """Work out a behavior. Raises Impossible."""
+    match behavior:
+        case Gaze() | GazeShift() | HeadDirectionShift():
+            return _look(behavior, now)
+        case Head():
+            return _nod(behavior, now)
+        case Face() | FaceLexeme() | FaceFacs() | FaceShift():
+            joints_of_face, note = expressions.face(behavior, _situation(now))
+            return _out(behavior, "face", antennas(joints_of_face), now, note=note)
+        case Posture() | PostureShift() | Pose():
+            return _posture(behavior, now)
+        case _:
+            raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type_name(behavior)}")
+
+
+def look_at(behavior: Looks, tracks: Mapping[str, tuple[float, ...]], now: Circumstances) -> tuple[Radians, Radians]:
+    """Yaw and pitch of the head on the target of a behavior. Raises Impossible: there is no such entity."""
+    if (entity := now.world.entity(behavior.target)) is None:
+        advice = suggestion(behavior.target, (each.id for each in now.world.entities), "it is empty")
+        raise Impossible("NO_SUCH_TARGET", f"the world has no {behavior.target!r}", advice)
+    yaw, pitch = geometry.aim(entity.position, joints.summed(tracks), now.mounting)
+    if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle:
+        right, up = OFFSETS.get(normal(behavior.offset_direction), (0, 0))
+        size = radians(behavior.offset_angle) / (math.hypot(right, up) or 1.0)
+        yaw, pitch = yaw - right * size, pitch + up * size
+    return yaw, pitch
+
+
+def seconds(track: str, here: Sequence[float], goal: Sequence[float]) -> Seconds:
+    """Natural time of a way; 0: it is none."""
+    way = max(abs(b - a) for a, b in zip(here, goal, strict=True))
+    if way < LEAST[track] + 1e-9:
+        return 0.0
+    match track:
+        case "head":
+            return 0.12 + math.degrees(way) / 110.0
+        case "face":
+            return 0.15 + math.degrees(way) / 300.0
+        case _:
+            return 0.3 + math.degrees(way) / 60.0
+
+
+def antennas(face: Angles) -> tuple[float, float]:
+    """Angles of the right and left antenna that stand for a face: raised in surprise, apart in joy, hanging in grief.
+
+    face: shares of the way of the joints of the simulated torso's face, -1 to 1; a lid is 1 when it is shut.
+    """
+    outwards = []
+    for side in ("right", "left"):
+        angle = math.degrees(joints.UPRIGHT)
+        for joint, share in face.items():
+            kind = joint.removeprefix("left_").removeprefix("right_")
+            if kind not in ANTENNAS or (kind != joint and not joint.startswith(side)):
+                continue
+            up, down = ANTENNAS[kind]
+            share = -share if kind == "lid" else share  # shut is down
+            angle += up * share if share > 0.0 else -down * share
+        outwards.append(radians(max(RAISED, min(DROOP, angle))))
+    return (-outwards[0], outwards[1])
+
+
+def _situation(now: Circumstances) -> Situation:
+    return Situation({}, {}, now.world, repertoire=now.repertoire)
+
+
+def _out(
+    behavior: BlockBehavior, track: str, goal: tuple[float, ...], now: Circumstances, *, entity: str = "",
+    note: str = "",
+) -> Course:  # fmt: skip
+    """The way to a goal, at which it may be held, and from which it goes home, or stays."""
+    points = instants(behavior)
+    stays = len(points) == 2
+    here = now.tracks[track]
+    time = seconds(track, here, goal)
+    goal = goal if time else here
+    arrival = next(i for i, each in enumerate(points) if ("end" if stays else "stroke") in each.syncs)
+    marks = [(sync, 0.0) for each in points[:arrival] for sync in each.syncs]
+    marks += [(sync, 1.0) for each in points[arrival : None if stays else -1] for sync in each.syncs]
+    leg = Leg(goal=goal, seconds=time, marks=tuple(marks))
+    return Course(track=track, legs=(leg,), goal=goal, instants=points, stays=stays, entity=entity, note=note)
+
+
+def _look(behavior: Looks, now: Circumstances) -> Course:
+    yaw, pitch = look_at(behavior, now.tracks, now)
+    turn = now.tracks["torso"][0]
+    goal = (yaw, pitch, joints.follow(yaw, turn))
+    for limit, angle in zip(joints.TRACKS["head"], goal, strict=True):
+        if not limit.low <= angle <= limit.high:
+            low, high = math.degrees(limit.low), math.degrees(limit.high)
+            wanted = f"{limit.joint} would be at {math.degrees(angle):.0f} degrees"
+            reason = f"cannot look at {behavior.target!r}: {wanted}; it goes from {low:.0f} to {high:.0f}"
+            advice = "is control.drivers.reachy_mini.position where the robot stands?"
+            raise Impossible("CANNOT_CREATE_BEHAVIOR", reason, advice)
+    is_beside = isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction
+    return _out(behavior, "head", goal, now, entity="" if is_beside else behavior.target, note=_looked_note(behavior))
+
+
+def _looked_note(behavior: Looks) -> str:
+    """Note what this head does otherwise than a gaze asks."""
+    if isinstance(behavior, HeadDirectionShift):
+        return ""
+    notes = []
+    if behavior.influence.upper() not in ("", "HEAD"):
+        notes.append(f"this body has no influence {behavior.influence!r} of a gaze; it turns the 'HEAD', the nearest")
+    if behavior.offset_angle and normal(behavior.offset_direction) not in OFFSETS:
+        asked = f"offsetDirection {behavior.offset_direction!r}"
+        notes.append(f"this body has no {asked} of a gaze; it looks at {behavior.target!r} itself, the nearest")
+    return "; ".join(notes)
+
+
+def _nod(behavior: Head, now: Circumstances) -> Course:
+    made = expressions.head(behavior, _situation(now))
+    size = joints.NOD_SIZE
+    legs = tuple(
+        Leg(
+            goal=tuple(size * angle for angle in leg.goal), velocity=tuple(size * speed for speed in leg.velocity),
+            seconds=leg.seconds, marks=leg.marks,
+        )
+        for leg in made.legs
+    )  # fmt: skip
+    strokes = [point.sync for point in made.points if point.sync.startswith("stroke:")]
+    goal = next(leg.goal for leg in legs if any(sync == "stroke" for sync, _ in leg.marks))
+    return Course(
+        track="nod", legs=legs, goal=goal, instants=instants(behavior, strokes), is_swing=True, note=made.note
+    )
+
+
+def _posture(behavior: Posture | PostureShift | Pose, now: Circumstances) -> Course:
+    stance = "" if isinstance(behavior, Pose) else behavior.stance
+    parts, note = expressions.posture(stance, posed(behavior), _situation(now))
+    if "torso" not in parts:
+        raise Impossible("CANNOT_CREATE_BEHAVIOR", "this body has no arms")
+    notes = [note] if note else []
+    if len(parts) > 1:
+        notes.append("this body has no arms; it moves the 'TORSO', the nearest")
+    turn, lean = parts["torso"]["torso_turn"], parts["torso"]["torso_lean"]
+    goal = []
+    for limit, angle in zip(joints.TRACKS["torso"], (turn, lean * joints.LEAN_SIZE), strict=True):
+        goal.append(max(limit.low, min(limit.high, angle)))
+    return _out(behavior, "torso", tuple(goal), now, note="; ".join(notes))

@@ -1,0 +1,223 @@
+"""The driver of Reachy Mini on the real daemon with its mock-up: the contract in real time, and real outages.
+
+All of the contract takes minutes, so that it runs on request: REACHY_MINI_FULL=1.
+"""
+
+import asyncio
+import json
+import math
+import os
+import signal
+from collections.abc import AsyncIterator, Callable, Iterator
+
+import numpy as np
+import pytest
+
+from engage_hri.schemas.behaviors import Gaze, PostureShift, Wait
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.services.control.body import Arrived, Body, BodyFailed
+from engage_hri.services.control.reachy_mini import messages
+from engage_hri.services.control.reachy_mini.body import ReachyMini
+from engage_hri.services.control.reachy_mini.connection import connected
+from engage_hri.services.control.reachy_mini.link import Daemon
+from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from tests.control.contract import BodyContract
+from tests.control.reachy_mini.daemon import Mockup, running
+from tests.control.reachy_mini.fake import HOME, FakeDaemon
+from tests.control.suite import WORLD, Stage, aside, performed
+
+pytestmark = pytest.mark.real_time
+SOME = (
+    BodyContract.test_takes_the_time_that_it_predicted,
+    BodyContract.test_a_shift_on_its_way_is_taken_over_by_another,
+    BodyContract.test_a_look_that_comes_over_a_shift_on_its_way_goes_home_to_where_that_leads,
+    BodyContract.test_home_is_reached_from_anything,
+    BodyContract.test_refuses_what_it_cannot_do_before_anything_moves,
+)
+"""Claims of the contract that need no long waits."""
+
+
+@pytest.fixture(scope="module")
+def mockup(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mockup]:
+    with running(tmp_path_factory.mktemp("daemon")) as mockup:
+        yield mockup
+
+
+class OnTheMockup(BodyContract):
+    tolerance = 0.2  # of a machine with other work
+
+    @pytest.fixture
+    async def body(self, mockup: Mockup) -> AsyncIterator[Body]:
+        body = ReachyMini(ReachyMiniSettings(url=mockup.url))
+        body.see(self.world)
+        async with body.connected():
+            yield body
+
+
+@pytest.mark.skipif(not os.environ.get("REACHY_MINI_FULL"), reason="takes minutes: REACHY_MINI_FULL=1")
+class TestAll(OnTheMockup):
+    """All of the contract."""
+
+
+@pytest.mark.parametrize("claim", SOME, ids=lambda claim: claim.__name__)
+class TestClaims:
+    async def test_on_the_mockup(self, mockup: Mockup, claim) -> None:
+        suite = OnTheMockup()
+        body = ReachyMini(ReachyMiniSettings(url=mockup.url))
+        body.see(suite.world)
+        async with body.connected():
+            await claim(suite, body)
+
+
+class Held(Stage):
+    """A behavior that can be awaited at a hold point."""
+
+    async def _perform(self) -> None:
+        self.is_held = asyncio.Event()
+        async for progress in self._body.perform(self._behavior, self.authority):
+            self.progress.append(progress)
+            if isinstance(progress, Arrived):
+                self.is_held.set()
+
+    async def wait(self) -> None:
+        await asyncio.sleep(0)
+        async with asyncio.timeout(20.0):
+            await self.is_held.wait()
+
+
+# -- outages ------------------------------------------------------------------------------------------------------
+
+
+def kill(mockup: Mockup) -> None:
+    mockup.stop()
+
+
+def freeze(mockup: Mockup) -> None:
+    mockup.send(signal.SIGSTOP)
+
+
+def switch_motors_off(mockup: Mockup) -> None:
+    mockup.ask("POST", "/api/motors/set_mode/disabled")
+
+
+OUTAGES: dict[Callable[[Mockup], None], tuple[Callable[[Mockup], None], str]] = {
+    kill: (Mockup.begin, "closed the connection"),
+    freeze: (lambda mockup: mockup.send(signal.SIGCONT), "no measurement for 1 s"),
+    switch_motors_off: (lambda mockup: mockup.ask("POST", "/api/motors/set_mode/enabled"), "motors are disabled"),
+}
+"""What happens, what ends it, and what is told of it."""
+
+
+@pytest.mark.parametrize("outage", OUTAGES)
+async def test_an_outage_is_told_at_once_and_the_robot_works_again_after_it(mockup: Mockup, outage) -> None:
+    mend, told = OUTAGES[outage]
+    body, faults = ReachyMini(ReachyMiniSettings(url=mockup.url)), list[Fault]()
+    body.see(WORLD)
+    body.on_fault = faults.append
+    look = Gaze(id="look", target="near-right")
+    async with body.connected():
+        held = Held(body, look, "stroke_start")
+        await held.wait()
+        since = asyncio.get_running_loop().time()
+        outage(mockup)
+        with pytest.raises(BodyFailed) as failed:
+            await held.over()
+        took = asyncio.get_running_loop().time() - since
+        assert told in failed.value.fault.reason
+        assert not body.estimate(look, None, WORLD).feasible
+        mend(mockup)
+        await body.home()  # waits until it is back
+        progress = await performed(body, look)
+
+    assert took < 1.0 + 0.5 + 2.0  # stated: the silence, and half a second; and a busy machine's two
+    assert progress[-1].sync == "end"  # type: ignore[union-attr]
+    assert [told in fault.reason for fault in faults] == [True]
+    assert faults[0].advice
+
+
+async def test_without_a_daemon_it_says_where_it_looked_and_how_to_start_one() -> None:
+    body = ReachyMini(ReachyMiniSettings(url="http://127.0.0.1:9"))
+    with pytest.raises(RunFailed) as failed:
+        async with body.connected():
+            raise AssertionError("connected to nothing")
+
+    assert "the daemon at http://127.0.0.1:9 cannot be reached" in failed.value.fault.reason
+    assert "reachy-mini-daemon" in failed.value.fault.advice
+    assert "--set control.drivers.reachy_mini.url=" in failed.value.fault.advice
+
+
+# -- the truth of measurements ------------------------------------------------------------------------------------
+
+
+async def test_the_gaze_axis_is_what_the_daemon_s_matrix_of_the_head_says(mockup: Mockup) -> None:
+    body = ReachyMini(ReachyMiniSettings(url=mockup.url))
+    body.see(WORLD)
+    async with body.connected():
+        await performed(body, PostureShift(id="lean", lexeme="LEAN_FORWARD"))
+        stage = Held(body, Gaze(id="look", target="far-left"), "stroke_start")
+        await stage.wait()
+        await performed(body, Wait(id="settle", duration=0.5))
+        told = mockup.ask("GET", "/api/state/full?use_pose_matrix=true")
+        matrix = np.array(json.loads(told)["head_pose"]["m"]).reshape(4, 4)
+        gaze, target = body.state().gaze, WORLD.entity("far-left")
+        stage.authority.extend("end")
+        await stage.over()
+
+    assert gaze is not None
+    assert target is not None
+    eyes = (matrix @ (0.0395, 0.0, 0.0525, 1.0))[:3] + np.array((0.0, 0.0, 0.73 + 0.177))
+    assert gaze.axis == pytest.approx(tuple(matrix[:3, 0]), abs=1e-3)
+    assert gaze.origin == pytest.approx(tuple(eyes), abs=1e-3)
+    assert aside(gaze, target.position) < math.radians(0.8)
+
+
+async def test_the_fake_daemon_is_no_better_than_the_real_one(mockup: Mockup) -> None:
+    real = await _followed(lambda: connected(ReachyMiniSettings(url=mockup.url)))
+    fake = await _followed(lambda: FakeDaemon()(ReachyMiniSettings()))
+
+    assert fake[0] >= real[0] - 0.03, "the fake lags less"
+    assert abs(fake[0] - real[0]) < 0.05
+    assert max(real[1], fake[1]) < math.radians(2.0)
+    assert abs(real[2] - fake[2]) < 0.008  # seconds between measurements, and of a busy machine
+
+
+async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]:
+    """Answer each measurement for 2 s with a place of a smooth course.
+
+    Returns the lag that explains what is measured best, seconds; how far that leaves it off at most, radians; and the
+    median of the seconds between two measurements.
+    """
+    loop = asyncio.get_running_loop()
+    async with connect() as daemon:  # type: ignore[attr-defined]
+        assert hasattr(daemon, "measurement")
+        await _go_home(daemon)
+        began, seen = loop.time(), []
+        while (now := loop.time()) < began + 2.0:
+            yaw = messages.measured(await daemon.measurement()).pose["head_yaw"]
+            now = loop.time()
+            seen.append((now - began, yaw))
+            await daemon.command(_target(_course(now - began)))
+        await _go_home(daemon)
+    times, yaws = np.array(seen).T
+    lags = np.linspace(0.0, 0.2, 101)
+    offs = [np.percentile(np.abs(yaws - [_course(t - lag) for t in times]), 90) for lag in lags]
+    best = int(np.argmin(offs))
+    return float(lags[best]), float(offs[best]), float(np.median(np.diff(times)))
+
+
+def _course(at: float) -> float:
+    return 0.25 * (1.0 - math.cos(2.0 * max(0.0, at)))
+
+
+async def _go_home(daemon: Daemon) -> None:
+    """Lead the head to where the course begins, slowly."""
+    here = messages.measured(await daemon.measurement()).pose
+    for step in range(1, 31):
+        share = 1.0 - step / 30
+        await daemon.command(_target(share * here["head_yaw"], share * here["head_pitch"]))
+        await daemon.measurement()
+
+
+def _target(yaw: float, pitch: float = 0.0) -> str:
+    pose = {"head_yaw": yaw, "head_pitch": pitch, "head_roll": 0.0, "body_yaw": 0.0, "body_lean": 0.0}
+    return messages.target({**pose, "right_antenna": HOME["right"], "left_antenna": HOME["left"]})
