@@ -7,9 +7,7 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from engage_hri.services.control.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.laws import poses_agree
-from engage_hri.services.control.testing.stage import Stage, performed, times
+from engage_hri.services.control.testing import WORLD, Stage, performed, poses_agree, times
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.variability import is_lost, normal
 
