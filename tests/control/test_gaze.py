@@ -11,9 +11,7 @@ from engage_hri.schemas.behaviors import Gaze, GazeShift, Head, PostureShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Arrived, Reached
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.motions import recorded, stops, violations
-from engage_hri.services.control.testing.stage import Stage, performed, times
+from engage_hri.services.control.testing import WORLD, Stage, performed, recorded, stops, times, violations
 from engage_hri.services.control.torso.body import SimulatedBody
 
 

@@ -17,7 +17,7 @@ LAWS = sorted(name.removeprefix("test_") for name in dir(BodyContract) if name.s
 LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars.Omitting, "reports_every_sync_point_once_and_in_order", "gaze at near-right"),
     (liars.Repeating, "reports_every_sync_point_once_and_in_order", "pointing at far-left"),
-    (liars.Backdating, "reports_a_point_as_it_is_passed", "200 ms after it"),
+    (liars.Backdating, "reports_a_point_as_it_is_passed", "200 ms after its `at`"),
     (liars.Hesitating, "never_stops_where_it_may_pass", "head NOD, stroke_start"),
     (liars.Splitting, "points_that_are_one_instant_are_reported_as_one", "they are 10 ms apart"),
     (liars_by_deed.Posing, "can_do_something_of_each_type_that_it_has", "no poses"),

@@ -25,12 +25,19 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.motions import STEP, recorded, violations
-from engage_hri.services.control.testing.rays import aside, beside
-from engage_hri.services.control.testing.stage import Stage, performed, times
-from engage_hri.services.control.testing.suite import ON_AXIS
-from engage_hri.services.control.testing.witness import arms
+from engage_hri.services.control.testing import (
+    ON_AXIS,
+    STEP,
+    WORLD,
+    Stage,
+    arms,
+    aside,
+    beside,
+    performed,
+    recorded,
+    times,
+    violations,
+)
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 

@@ -23,9 +23,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.motions import recorded, stops, violations
-from engage_hri.services.control.testing.stage import Stage, performed, times
+from engage_hri.services.control.testing import WORLD, Stage, performed, recorded, stops, times, violations
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire

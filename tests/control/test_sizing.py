@@ -12,9 +12,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Poi
 from engage_hri.schemas.body import Estimate
 from engage_hri.services.control.body import Body, MovementAuthority
 from engage_hri.services.control.config import Slow, Variability
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.motions import Recording, recorded, violations
-from engage_hri.services.control.testing.stage import times
+from engage_hri.services.control.testing import WORLD, Recording, recorded, times, violations
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.sizing import SIZES
 from engage_hri.services.runtime.virtual_time import run_virtual

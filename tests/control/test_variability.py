@@ -7,9 +7,7 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from engage_hri.services.control.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.laws import angles
-from engage_hri.services.control.testing.stage import Stage, performed, times
+from engage_hri.services.control.testing import WORLD, Stage, performed, poses_agree, times
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.variability import Deviations, configured, is_lost, normal
 
@@ -60,7 +58,7 @@ async def test_an_arm_that_stalls_for_ever_can_still_be_aborted():
     stage.authority.revoke()
     await stage.over()
     await asyncio.sleep(2.0)
-    assert angles(body.state().pose) == pytest.approx(angles(home), abs=0.01)
+    assert poses_agree(body.state().pose, home)
 
 
 async def test_an_arm_that_is_near_already_comes_early_once():
@@ -88,7 +86,7 @@ async def test_an_overheated_motor_fails_its_behavior_and_the_arm_goes_home():
     await asyncio.sleep(3.0)
 
     assert stage.passed == ["start", "ready", "stroke_start"]
-    assert angles(body.state().pose) == pytest.approx(angles(home), abs=0.01)
+    assert poses_agree(body.state().pose, home)
 
 
 async def test_a_silent_voice_reports_what_nobody_hears():

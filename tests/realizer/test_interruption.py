@@ -15,7 +15,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
-from engage_hri.services.control.testing.asked import WORLD
+from engage_hri.services.control.testing import WORLD
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused

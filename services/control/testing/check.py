@@ -73,6 +73,7 @@ def _suite(make: Make, stated: Stated) -> type[BodyContract]:
         "tolerance": stated.tolerance,
         "noise": stated.noise,
         "accuracy": stated.accuracy,
+        "age": 0.005 if stated.real_time else 0.001,
         "world": stated.world or WORLD,
         "behaviors": _behaviors(stated),
     }

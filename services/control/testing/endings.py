@@ -181,7 +181,7 @@ class EndingLaws(Suite):
 
     def check_limits(self, body: Body, recording: Recording, behavior: BlockBehavior) -> None:
         """Judge what was recorded. Raises LawBroken with the first limit that was left."""
-        for each in violations(recording, body.capabilities.joints, self.noise):
+        for each in violations(recording, body.capabilities.joints, self.noise, self.age):
             unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]
             broken(

@@ -117,3 +117,9 @@ def listed(names: Iterable[str]) -> str:
 def angles(pose: BodyPose) -> dict[str, Radians]:
     """The angle of each joint, by its name."""
     return {each.joint: each.angle for each in pose.joints}
+
+
+def poses_agree(one: BodyPose, other: BodyPose, within: Radians = 0.01) -> bool:
+    """True if each joint of one pose is where it is in the other."""
+    there = angles(other)
+    return all(abs(angle - there[joint]) < within for joint, angle in angles(one).items())

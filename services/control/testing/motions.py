@@ -103,13 +103,16 @@ async def recorded(body: Body, joints: Iterable[str] = ()) -> AsyncIterator[Reco
             raise ended
 
 
-def violations(recording: Recording, limits: Iterable[JointLimit], noise: Radians = 0.0) -> list[Violation]:
+def violations(
+    recording: Recording, limits: Iterable[JointLimit], noise: Radians = 0.0, age: Seconds = 0.0
+) -> list[Violation]:
     """List joints that leave their range, their speed or their acceleration.
 
-    noise: standard deviation of one reading.
+    noise: standard deviation of one reading. age: by how much one reading may be older than another.
     """
     found: list[Violation] = []
-    times, samples, late = _readings(recording)
+    times, samples, step = _readings(recording)
+    late = max(age, step)
     for limit in limits:
         if limit.joint not in recording.joints or len(times) < 3:
             continue
@@ -155,12 +158,13 @@ def _too_fast(limit: JointLimit, times: Array, column: Array, noise: Radians, la
             break
         between = times[span:] - times[:-span]
         speed = (column[span:] - column[:-span]) / between
-        slack = (DEVIATIONS * math.sqrt(2.0) * noise + 2.0 * limit.speed * late) / between
+        slack = (DEVIATIONS * math.sqrt(2.0) * noise + 2.0 * np.abs(speed) * late) / between
         _note(worst, limit.joint, "speed", np.abs(speed) - slack, limit.speed, times[:-span], speed)
         around = (between[:-span] + between[span:]) / 2.0
         change = (speed[span:] - speed[:-span]) / around
         shortest = np.minimum(between[:-span], between[span:])
-        slack = (DEVIATIONS * math.sqrt(6.0) * noise + 4.0 * limit.speed * late) / shortest**2
+        fastest = np.maximum(np.abs(speed[:-span]), np.abs(speed[span:]))
+        slack = (DEVIATIONS * math.sqrt(6.0) * noise + 4.0 * fastest * late) / shortest**2
         _note(
             worst, limit.joint, "acceleration", np.abs(change) - slack, limit.acceleration, times[: -2 * span], change
         )

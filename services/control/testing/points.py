@@ -83,8 +83,8 @@ class PointsLaws(Suite):
                         broken(
                             behavior,
                             sync,
-                            expected=f"a report between 0 and {ms(PROMPT)} after it was",
-                            measured=f"{ms(heard - progress.at)} after it",
+                            expected=f"that it is told within {ms(PROMPT)}",
+                            measured=f"it is told {ms(heard - progress.at)} after its `at`",
                         )
                     if isinstance(progress, Reached) and progress.arrived > progress.at:
                         broken(

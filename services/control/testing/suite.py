@@ -36,6 +36,7 @@ class Suite:
 
     tolerance: stated error of its estimates, seconds from each sync point to the next.
     noise: standard deviation of a reading of its encoders, radians.
+    age: by how much one reading may be older than another, seconds; of one that comes again in motion it is measured.
     accuracy: how near the joints come to where they are to be, and the eyes to a target, radians.
     behaviors: what it is asked to do; of each type that it has at least one. world: where their targets are.
     seeds: number of random trials of each law that has some; None: many in virtual time, one in real time.
@@ -45,6 +46,7 @@ class Suite:
     pytestmark: ClassVar[Any] = [pytest.mark.asyncio]
     tolerance: Seconds = 1e-6
     noise: Radians = 0.0
+    age: Seconds = 0.001
     accuracy: Radians = ON_AXIS
     behaviors: tuple[BlockBehavior, ...] = BEHAVIORS
     world = WORLD

@@ -24,6 +24,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds
+from engage_hri.schemas.world import World
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, BodyState, Progress, Reached
 from engage_hri.services.control.testing.cases import findings_of
 from engage_hri.services.control.testing.laws import Finding, angles, degrees, ms, named
@@ -91,7 +92,7 @@ class Witness:
         behavior, sync = stage.behavior, reached.sync
         late = asyncio.get_running_loop().time() - reached.at
         if not 0.0 <= late + 1e-6 <= PROMPT + self.suite.tolerance + 1e-6:
-            self._note(behavior, sync, "a report as it is passed", f"{ms(late)} after it")
+            self._note(behavior, sync, "a report as it is passed", f"it is told {ms(late)} after its `at`")
         if isinstance(behavior, SHIFTS):
             self.base = behavior.target if sync == "end" else None if sync == "start" else self.base
         elif isinstance(behavior, PostureShift | Pose):
@@ -195,7 +196,7 @@ class Witness:
                         stage.authority.revoke("relax")
                 await stage.over()
             except BehaviorRefused as refused:
-                stage.is_over_early = True
+                stage.is_refused = True
                 if stage.progress or not refused.fault.reason:
                     self._note(
                         stage.behavior,
@@ -204,7 +205,7 @@ class Witness:
                         f"refused: {refused.fault}; passed {len(stage.passed)} points",
                     )
             except BodyFailed as failed:
-                stage.is_over_early = True
+                stage.has_failed = True
                 if not may_fail or not failed.fault.reason:
                     self._note(
                         stage.behavior,
@@ -213,7 +214,7 @@ class Witness:
                         f"failed: {failed.fault}",
                     )
             except Exception as error:
-                stage.is_over_early = True
+                stage.has_failed = True
                 self.lies += findings_of(error, named(stage.behavior)) or ()
         for stage in self.stages:
             self._check_end(stage)
@@ -229,9 +230,9 @@ class Witness:
         points, how = sync_points(stage.behavior), stage.authority.revoked
         if told != points[: len(told)]:
             self._note(stage.behavior, "", f"points in order: {', '.join(points)}", ", ".join(told))
-        elif told != points and how is None and not stage.is_over_early:
+        elif told != points and how is None and not (stage.is_refused or stage.has_failed):
             self._note(stage.behavior, stage.next_point, "all points, since nobody has revoked it", ", ".join(told))
-        elif told == points and stage.is_over_early:
+        elif told == points and (stage.is_refused or stage.has_failed):
             self._note(stage.behavior, "end", "no `end` of what has failed", ", ".join(told))
 
 
@@ -239,7 +240,7 @@ class WatchedStage(Stage):
     """A stage whose reports a witness hears as they come."""
 
     def __init__(self, witness: Witness, body: Body, behavior: BlockBehavior, through: str) -> None:
-        self.is_over_early = False
+        self.is_refused = self.has_failed = False
         self._witness = witness
         super().__init__(body, behavior, through)
 
@@ -282,4 +283,14 @@ async def crowded(suite: Suite, body: Body, makers: Sequence[Maker], chance: Ran
                 if isinstance(one.behavior, SHIFTS):
                     witness.base = None
                 one.authority.revoke(chance.choice(("relax", "freeze")))
+    return witness
+
+
+async def witnessed(body: Body, world: World, makers: Sequence[Maker], chance: Random) -> Witness | None:
+    """Let a crowd of behaviors come to its end, and return who has watched; None: the body has none of them."""
+    suite = Suite()
+    suite.world = world
+    witness = await crowded(suite, body, makers, chance)
+    if witness is not None:
+        await witness.close()
     return witness
