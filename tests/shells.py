@@ -22,6 +22,8 @@ SHELLS = {
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/ordinary.py",  # a body that moves on the loop's clock
     "services/control/composed.py",  # takes several bodies home at once
+    "services/control/mujoco/film.py",  # hands pictures to ffmpeg
+    "services/control/mujoco/pulse.py",  # steps of a physics on loop time
     "services/control/torso/body.py",  # a body that moves on the loop's clock
     "services/control/reachy_mini/body.py",  # a body that moves on the loop's clock
     "services/control/reachy_mini/link.py",  # keeps the connection to the robot

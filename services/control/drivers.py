@@ -30,10 +30,11 @@ GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
 BUILT_IN = {
     "simulated": "engage_hri.services.control.torso.body:SimulatedBody",
+    "mujoco": "engage_hri.services.control.mujoco.body:MujocoBody",
     "reachy_mini": "engage_hri.services.control.reachy_mini.body:ReachyMini",
 }
 """Drivers of this package, each imported only when it is asked for."""
-EXTRAS: dict[str, str] = {"reachy_mini": "reachy-mini"}
+EXTRAS = {"mujoco": "mujoco", "reachy_mini": "reachy-mini"}
 """The extra of this package that a driver needs."""
 FORMS = "NAME, FILE.py:CLASS or package.module:CLASS"
 Driver = Callable[..., Body]

@@ -83,8 +83,7 @@ class SimulatedBody(Body):
     @classmethod
     def configured(cls, config: ControlConfig, settings: None) -> Self:
         """Make a torso with the zones, deviations and repertoire of the section `control`. Raises InputRefused."""
-        repertoire = extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
-        return cls(config.no_point_zones, config.variability, repertoire)
+        return cls(config.no_point_zones, config.variability, repertoire_of(config))
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -231,6 +230,7 @@ class SimulatedBody(Body):
         """Report the sync points of `run` as it crosses them, until it is done, cut or revoked. Raises BodyFailed."""
         since = -inf
         while run.pending and not run.is_over:
+            self._check_joints(run)
             if not run.holding:
                 self._torso.extend(run)
             point = run.pending[0]
@@ -239,15 +239,20 @@ class SimulatedBody(Body):
                 await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
+            elif (came := await self._come(run, point, due)) is None:
+                continue
             elif not run.holding and self._torso.is_off_target(run, point.sync):
                 raise _out_of_reach(run)
             elif point.held_with and (run.holding or not run.may_pass(point.held_with)):
-                arrived = max(due, since)
+                arrived = max(came, since)
                 if not run.may_pass(point.held_with):
                     run.holding = True
                     yield Arrived(point.held_with, arrived)
                 while not run.may_pass(point.held_with) and not run.is_over:
                     await run.bell.wait(inf)
+                    self._check_joints(run)
+                if await self._come(run, point, self._loop.time()) is None:
+                    continue
                 if not run.is_over and self._torso.is_off_target(run, point.sync):
                     raise _out_of_reach(run)
                 # What is taken over just as it may go on has passed the point, and goes no further.
@@ -260,11 +265,27 @@ class SimulatedBody(Body):
                 if is_last_on_target(run.behavior, point.sync):
                     self._torso.leave_target(run)
                 self._torso.attention.follow_run(run, self._loop.time())
-                yield Reached(point.sync, due, due)
+                yield Reached(point.sync, came, came)
         if run.is_beneath or run.is_taken_over:
             for sync, due in run.passed_by(self._loop.time()):
+                if not self._has_come(run, run.pending[0]):
+                    break
                 run.pending.pop(0)
                 yield Reached(sync, at := max(due, since), at)
+
+    async def _come(self, run: Run, point: CoursePoint, due: Seconds) -> Seconds | None:
+        """Wait until the joints have come to a point that the plan has passed at `due`. Returns when they had.
+
+        None: something else has changed; look again. Raises BodyFailed. These joints are where the plan has them.
+        """
+        return due
+
+    def _has_come(self, run: Run, point: CoursePoint) -> bool:
+        """True if the joints have come to a point that the plan has passed."""
+        return True
+
+    def _check_joints(self, run: Run) -> None:
+        """Raise BodyFailed if the joints do not come along any more."""
 
     async def _fail_or_stall(self, run: Run, point: CoursePoint) -> None:
         if point.sync == OVERHEAT:
@@ -321,6 +342,11 @@ class SimulatedBody(Body):
 
 def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
     return {fault.part: radians(fault.amount or 0.0) for fault in faults if fault.kind == "displaced"}
+
+
+def repertoire_of(config: ControlConfig) -> Repertoire:
+    """The repertoire with what the files of the configuration add to it. Raises InputRefused."""
+    return extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
 
 
 def _read(file: str) -> str:

@@ -1,6 +1,7 @@
 """A copy of the simulated torso, which moves on a clock of its own: for what a plan would come to."""
 
 from copy import copy
+from math import inf
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -46,7 +47,7 @@ def beside(torso: Torso, clock: Clock, world: World) -> Torso:
     runs = {id(run): copy(run) for run in torso.runs.values()}
     for run in runs.values():
         run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
-        run.authority = _alike(run)
+        run.authority, run.gate = _alike(run), inf
     other.runs = {part: runs[id(run)] for part, run in torso.runs.items()}
     other.base = None
     return other

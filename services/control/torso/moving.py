@@ -5,6 +5,7 @@ Time is that of a clock: of the event loop for the body, of its own for a rehear
 
 import math
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Protocol
 
 from msgspec.structs import replace
@@ -200,7 +201,7 @@ class Torso:
             self._wait_for_reach()
 
     def _play(self, run: Run, path: Path, aim: Aim | None) -> None:
-        now = self.clock.time()
+        now, run.gate = self.clock.time(), inf
         run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
         column = 0
         for part in run.course.parts:

@@ -47,6 +47,8 @@ class Run:
         self.motion: Motion
         self.size = 1.0
         """Share of the full amplitude, 0 to 1."""
+        self.gate: Seconds = inf
+        """Position on its path at which it waits for joints that have not come along; inf: they have."""
         self._aim: tuple[str, Seconds] | None = None
         """The sync point that the rate is set for, with the instant asked for; None: it runs at its own rate."""
         self._is_held = False
@@ -133,8 +135,8 @@ class Run:
         """Position on `path`, in its natural seconds, up to which it may go now."""
         for point in self.pending:
             if point.sync in FAULTS or (point.held_with and not self.may_pass(point.held_with)):
-                return path.marks.get(point.stands_at or point.sync, inf)
-        return inf
+                return min(self.gate, path.marks.get(point.stands_at or point.sync, inf))
+        return self.gate
 
     @property
     def is_taken_over(self) -> bool:

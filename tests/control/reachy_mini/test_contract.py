@@ -5,13 +5,13 @@ from collections.abc import AsyncIterator
 from random import Random
 
 import pytest
+from tests.control.contract import BodyContract
+from tests.control.suite import Stage
 
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.reachy_mini.body import ReachyMini
-from tests.control.contract import BodyContract
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
-from tests.control.suite import Stage
 
 
 class TestReachyMini(BodyContract):

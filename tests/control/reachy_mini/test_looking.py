@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 from msgspec.structs import replace
+from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift
 from engage_hri.schemas.units import Vector
@@ -15,7 +16,6 @@ from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
-from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed
 
 
 @pytest.fixture

@@ -12,6 +12,8 @@ from collections.abc import AsyncIterator, Callable, Iterator
 
 import numpy as np
 import pytest
+from tests.control.contract import BodyContract
+from tests.control.suite import WORLD, Stage, aside, performed
 
 from engage_hri.schemas.behaviors import Gaze, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
@@ -21,10 +23,8 @@ from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.connection import connected
 from engage_hri.services.control.reachy_mini.link import Daemon
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
-from tests.control.contract import BodyContract
 from tests.control.reachy_mini.daemon import Mockup, running
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
-from tests.control.suite import WORLD, Stage, aside, performed
 
 pytestmark = pytest.mark.real_time
 SOME = (

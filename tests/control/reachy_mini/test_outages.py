@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from itertools import pairwise
 
 import pytest
+from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Head
 from engage_hri.schemas.faults import Fault, RunFailed
@@ -15,7 +16,6 @@ from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
 from tests.control.reachy_mini.limits import too_much
-from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed
 
 GAZE = Gaze(id="look", target="near-right")
 

@@ -1,0 +1,340 @@
+"""The torso with physics: it moves along the plans of the simulated torso, as far as its motors can.
+
+The plan of each part is that of `control.torso`; servos follow it, in MuJoCo. A sync point is reported once the plan
+has come there *and the measured joints are there*. The plan waits for joints that lag, and a behavior whose joints
+make no way any more fails with the name of the joint. The face is a screen: it is where its plan has it.
+"""
+
+import math
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
+from contextlib import aclosing, asynccontextmanager
+from functools import partial
+from math import inf
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from engage_hri.schemas.behaviors import BlockBehavior, Pointing
+from engage_hri.schemas.body import JointLimit, NoPointZone
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
+from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.mujoco import along
+from engage_hri.services.control.mujoco.along import Off, Watch
+from engage_hri.services.control.mujoco.described import DescribedBody
+from engage_hri.services.control.mujoco.faults import KINDS, SHARED, refuse
+from engage_hri.services.control.mujoco.film import Film, Frame
+from engage_hri.services.control.mujoco.filming import film_of, finish, framed
+from engage_hri.services.control.mujoco.pulse import TICK, Pulse
+from engage_hri.services.control.mujoco.settings import MujocoSettings
+from engage_hri.services.control.mujoco.workbench import Workbench
+from engage_hri.services.control.torso import kinematics, tracks
+from engage_hri.services.control.torso.body import SimulatedBody, repertoire_of
+from engage_hri.services.control.torso.course import CoursePoint
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
+from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.torso.tracks import Track
+from engage_hri.services.control.waiting import Bell
+
+SAMPLES = 6
+"""Places of a plan between a sync point and where the plan is, at which the joints may be to have come there."""
+
+
+class MujocoBody(SimulatedBody):
+    """The torso of `SimulatedBody` as a physics model at a table. Estimates are of the healthy body."""
+
+    Settings = MujocoSettings
+
+    def __init__(
+        self,
+        zones: tuple[NoPointZone, ...] = (),
+        deviations: Variability | None = None,
+        repertoire: Repertoire = BUILT_IN,
+        settings: MujocoSettings | None = None,
+    ) -> None:
+        """deviations: of these, joints that are displaced and a mute voice; motors deviate by `switch_faults`.
+
+        Raises InputRefused: a deviation, a fault or a film that cannot be had.
+        """
+        super().__init__(zones, deviations, repertoire)
+        self._settings = settings or MujocoSettings()
+        self.capabilities = msgspec.structs.replace(
+            self.capabilities, body="mujoco", joints=tuple(map(_as_measured, self.capabilities.joints)),
+            faults=KINDS,
+        )  # fmt: skip
+        self.bench = Workbench(self._plan(), self._loop.time(), self._settings.seed)
+        self._watches: dict[Run, Watch] = {}
+        self._awaiting: dict[Run, CoursePoint] = {}
+        """The sync point that joints have not come to, though the plan has."""
+        self.pulse = Pulse(step=self._compute, rise=self.bench.rise, after=self._look)
+        self._faults: tuple[BodyFault, ...] = ()
+        """Faults that the physics plays; the others are those of the simulated torso."""
+        self.switch_faults([*super().faults, *self._settings.faults])
+
+    @classmethod
+    def configured(cls, config: ControlConfig, settings: MujocoSettings | None) -> Body:  # type: ignore[override]
+        """Make the torso, or the robot that the settings describe. Raises InputRefused."""
+        settings = settings or MujocoSettings()
+        if settings.robot:
+            return DescribedBody(Path(settings.robot), settings)
+        return cls(config.no_point_zones, config.variability, repertoire_of(config), settings)
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
+        async with super().connected():
+            if (film := film_of(self.bench.model, self._settings)) is None:
+                yield
+                return
+            self.pulse.on_step = partial(self._film, film)
+            self.pulse.wake()
+            try:
+                yield
+            finally:
+                self.pulse.on_step = lambda at: None
+                finish(film, self._settings)
+
+    def _film(self, film: Film, at: Seconds) -> None:
+        if film.is_due(at):
+            film.take(self.frame())
+
+    def frame(self) -> Frame:
+        """The body as a film shows it now."""
+        runs = self._torso.runs
+        pointing = {
+            part: run.behavior.target
+            for part, run in runs.items()
+            if isinstance(run.behavior, Pointing) and run.awaits("stroke_end") and not run.awaits("stroke_start")
+        }
+        now, data = self._loop.time(), self.bench.physics.data
+        return framed(now, data, self.state(), self._torso.world, pointing, self._plan())
+
+    # -- the contract -------------------------------------------------------------------------------------------
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        try:
+            async with aclosing(super().perform(behavior, authority)) as stream:
+                async for progress in stream:
+                    self.pulse.wake()
+                    yield progress
+        finally:
+            self.pulse.wake()
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        """Move to the safe pose, and return when the joints are there. Raises BodyFailed: they do not come."""
+        self.pulse.step()
+        self.pulse.wake()
+        await super().home(parts)
+        watch, bell = Watch(), Bell()
+        going = [part for part in tracks.LIMITS if part != "nod" and (not parts or part in parts)]
+        while (off := self._off(going, self._loop.time())) is not None and (
+            off.share > 1.0 or self._are_moving(going)
+        ):
+            watch.see(off, now := self._loop.time())
+            if off.share > 1.0 and (waited := watch.stuck(now)) is not None:
+                raise BodyFailed(self._stuck("home", off, waited))
+            self.pulse.wake()
+            await bell.wait(now + TICK)
+
+    def state(self) -> BodyState:
+        self.pulse.step()
+        now, pose = self._loop.time(), self._measured()
+        arms = kinematics.arm(pose, "left"), kinematics.arm(pose, "right")
+        looked = self._torso.attention.fixated(now)
+        return BodyState(
+            pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=arms[0], right_arm=arms[1],
+            moving=self._voice.is_busy or self._are_moving(tracks.LIMITS), looking_at=looked if self._rests_on(looked) else "",
+            speaking=self._voice.saying,
+        )  # fmt: skip
+
+    def see(self, world: World) -> None:
+        self.pulse.step()
+        super().see(world)
+        self.bench.room.lay(world)
+        self.pulse.wake()
+
+    # -- faults -------------------------------------------------------------------------------------------------
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        return (*super().faults, *self._faults)
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        ours = [fault for fault in faults if fault.kind not in SHARED]
+        refuse(ours, self.capabilities)
+        self.pulse.step()
+        super().switch_faults([fault for fault in faults if fault.kind in SHARED])
+        self._faults = tuple(ours)
+        self.bench.suffer(ours)
+        moved = {fault.part for fault in faults if fault.kind == "displaced"}
+        self.bench.displace({joint: angle for joint, angle in self._plan().items() if joint in moved})
+        self.pulse.wake()
+
+    # -- steps --------------------------------------------------------------------------------------------------
+
+    def _plan(self) -> dict[str, float]:
+        """The planned angle of each joint now."""
+        return tracks.pose_at(self._torso.tracks, self._loop.time())
+
+    def _measured(self) -> dict[str, float]:
+        """The measured angle of each joint; of the face, where it is shown."""
+        return {**self._plan(), **self.bench.measured}
+
+    def _are_moving(self, parts: Iterable[str]) -> bool:
+        """True if these parts move, by their plan or by what is measured."""
+        going = [self._torso.tracks[part] for part in parts]
+        now, quick = self._loop.time(), self.bench.physics.quick
+        return any(track.is_moving(now) or not quick.isdisjoint(track.joints) for track in going)
+
+    def _compute(self, now: Seconds) -> bool:
+        return self.bench.advance(now, self._plan())
+
+    def _look(self, now: Seconds) -> bool:
+        """Look at what has come of a step. True: everything is at rest."""
+        for run in list(dict.fromkeys(self._torso.runs.values())):
+            self._govern(run, now)
+        for gone in [run for run in self._watches if not self._torso.owns(run)]:
+            del self._watches[gone]
+        is_planned = any(track.is_moving(now) for track in self._torso.tracks.values())
+        return not (is_planned or self._watches) and self.bench.is_at_rest(self._plan())
+
+    # -- joints and plan ----------------------------------------------------------------------------------------
+
+    def _govern(self, run: Run, now: Seconds) -> None:
+        """Let the plan of a run wait while its joints lag, and go on when they have come along."""
+        off = self._off(run.course.parts, now, along.LAG)
+        awaited = self._awaiting.get(run)
+        watch = self._watches.get(run)
+        if off is None or (awaited is None and off.share < (1.0 if watch is None else 0.5)):
+            if watch is not None:
+                del self._watches[run]
+                run.gate = inf
+                run.bell.ring()
+            return
+        if watch is None:
+            watch = self._watches[run] = Watch()
+        if run.gate == inf and not run.holding:
+            self._stop(run, now)
+        near = self._off_point(run, awaited, now) if awaited is not None else off
+        watch.see(near, now)
+        if watch.stuck(now) is not None or (awaited is not None and near.share <= 1.0):
+            run.bell.ring()
+
+    def _stop(self, run: Run, now: Seconds) -> None:
+        """Stop the plan of a run where it can, before its next point but one."""
+        motion = run.motion
+        s, rate = motion.s(now), motion.rate(now)
+        stop = s + rate * rate / (2 * motion.path.gentlest_brake)
+        ahead = [motion.path.marks[point.sync] for point in run.pending[1:] if point.sync in motion.path.marks]
+        if run in self._awaiting and ahead:
+            stop = max(s, min(stop, ahead[0]))
+        run.gate = stop
+        motion.brake(now, min(stop, motion.limit))
+
+    async def _come(self, run: Run, point: CoursePoint, due: Seconds) -> Seconds | None:
+        self.pulse.step()
+        now = self._loop.time()
+        if self._has_come(run, point):
+            if self._awaiting.pop(run, None) is not None and run.gate < inf:
+                run.gate = inf
+                self._watches.pop(run, None)
+                self._torso.extend(run)
+            return max(due, now)
+        self._awaiting[run] = point
+        self.pulse.wake()
+        await run.bell.wait(now + TICK)
+        if run.is_over:
+            self._awaiting.pop(run, None)
+        return None
+
+    def _has_come(self, run: Run, point: CoursePoint) -> bool:
+        return self._off_point(run, point, self._loop.time()).share <= 1.0
+
+    def _check_joints(self, run: Run) -> None:
+        watch = self._watches.get(run)
+        if watch is None or watch.off is None or run.is_over:
+            return
+        if (waited := watch.stuck(self._loop.time())) is not None:
+            raise BodyFailed(self._stuck(run.behavior.id, watch.off, waited))
+
+    def _off(self, parts: Iterable[str], now: Seconds, allowed: Mapping[str, float] = along.NEAR) -> Off | None:
+        """The joint of these parts that is farthest off its plan; None: they have no motors."""
+        joints, here, there, limits = [], [], [], []
+        measured = self.bench.measured
+        for part in parts:
+            track = self._torso.tracks[part]
+            others = self._others(track, now)
+            for joint, angle in zip(track.joints, track.angles(now), strict=True):
+                if joint in measured:
+                    joints.append(joint)
+                    here.append(measured[joint] - others.get(joint, 0.0))
+                    there.append(angle)
+                    limits.append(allowed[part])
+        return along.farthest(joints, here, there, limits) if joints else None
+
+    def _off_point(self, run: Run, point: CoursePoint, now: Seconds) -> Off:
+        """Measure how far the joints of a run are off a sync point, or off the nearest place behind it."""
+        path, s = run.motion.path, run.motion.s(now)
+        mark = path.marks.get(point.sync, s)
+        later = [path.marks[each.sync] for each in run.pending if path.marks.get(each.sync, 0.0) > mark + 1e-9]
+        until = max(mark, min([s, *later[:1]]))
+        places = [mark] if until - mark < 1e-9 else np.linspace(mark, until, SAMPLES).tolist()
+        offs = [self._off_at(run, place, now) for place in places]
+        return min(offs, key=lambda off: off.share)
+
+    def _off_at(self, run: Run, s: float, now: Seconds) -> Off:
+        """Measure how far the joints of a run are off a place on its path."""
+        q, column = run.motion.path.at(s).q, 0
+        joints: list[str] = []
+        here: list[float] = []
+        there: list[float] = []
+        limits: list[float] = []
+        measured = self.bench.measured
+        for part in run.course.parts:
+            track = self._torso.tracks[part]
+            angles = q[column : column + len(track.joints)]
+            column += len(track.joints)
+            if track.aim is not None and not track.is_still(now, track.aim):
+                angles = track.aim.within(angles + track.aim.offset(track.trunk.angles(now)))
+            others = self._others(track, now)
+            for joint, angle in zip(track.joints, angles.tolist(), strict=True):
+                joints.append(joint)
+                there.append(angle)
+                here.append(measured[joint] - others.get(joint, 0.0) if joint in measured else angle)
+                limits.append(along.NEAR[part])
+        return along.farthest(joints, here, there, limits)
+
+    def _others(self, track: Track, now: Seconds) -> dict[str, float]:
+        """Angles that the other track of the head adds to the joints of this one."""
+        if track.part not in ("head", "nod"):
+            return {}
+        other = self._torso.tracks["nod" if track.part == "head" else "head"]
+        return dict(zip(other.joints, other.angles(now), strict=True))
+
+    def _rests_on(self, looked: str) -> bool:
+        """True if the measured eyes are where the plan has them."""
+        off = self._off(("head", "torso"), self._loop.time()) if looked else None
+        return off is None or off.share < 2.0
+
+    def _stuck(self, where: str, off: Off, waited: Seconds) -> Fault:
+        """Describe joints that do not come: which one, how far it is off, and what is known of its motor."""
+        here, there = math.degrees(off.here), math.degrees(off.there)
+        known = self.bench.suspicion(off.joint)
+        reason = f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be, and has made no way for {waited:.1f} s"
+        return Fault(reason=f"{reason}: {known}" if known else reason, where=where, service="control")
+
+
+def _as_measured(limit: JointLimit) -> JointLimit:
+    """Limits of what is measured of a joint that follows a plan: it swings a little beyond."""
+    if limit.part == "face":
+        return limit
+    from engage_hri.services.control.mujoco.model import SLACK
+
+    return msgspec.structs.replace(
+        limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=1.3 * limit.speed,
+        acceleration=4.0 * limit.acceleration,
+    )  # fmt: skip

@@ -1,0 +1,165 @@
+"""A robot that a description names, in MuJoCo: head and arms are ordinary bodies that share one physics."""
+
+import math
+from collections.abc import AsyncGenerator, AsyncIterator, Sequence
+from contextlib import aclosing, asynccontextmanager
+from copy import copy
+from functools import lru_cache, partial
+from pathlib import Path
+
+import msgspec
+import mujoco
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Pointing, Wait
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Phase
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import Body, MovementAuthority, Progress
+from engage_hri.services.control.composed import ComposedBody, Member
+from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
+from engage_hri.services.control.mujoco.faults import OURS, refuse
+from engage_hri.services.control.mujoco.film import Film, Frame
+from engage_hri.services.control.mujoco.filming import film_of, finish, framed
+from engage_hri.services.control.mujoco.ik import Chain
+from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb
+from engage_hri.services.control.mujoco.motors import Motor
+from engage_hri.services.control.mujoco.physics import Physics
+from engage_hri.services.control.mujoco.robot import PREFIX, assembled
+from engage_hri.services.control.mujoco.settings import MujocoSettings
+from engage_hri.services.control.mujoco.stage import Stage, limits_of
+from engage_hri.services.control.voice import speaking
+from engage_hri.services.tangram.table import tangram_table
+
+HEAD_TYPES = ("gaze", "gazeShift", "headDirectionShift", "head")
+FAULTS = tuple(kind for kind in OURS if kind not in ("blocked", "table"))
+"""Kinds of faults that a described robot plays."""
+MEASURED_SPEED, MEASURED_ACCELERATION, SLACK = 1.4, 6.0, math.radians(1.5)
+"""What is measured of a joint, as multiples of what is planned, and beyond its range."""
+
+
+class DescribedBody(ComposedBody):
+    """A robot by a description, with the parts that it has. Estimates are of the healthy robot."""
+
+    def __init__(self, file: Path, settings: MujocoSettings | None = None) -> None:
+        """file: its description. Raises InputRefused: that, its model, or a setting is wrong."""
+        self._settings = settings or MujocoSettings()
+        described, path = read(file)
+        model, motors = _model(msgspec.json.encode(described), path)
+        physics = Physics(copy(model), motors, at=0.0, prefix=PREFIX, seed=self._settings.seed)
+        ranges = {joint: tuple(model.joint(PREFIX + joint).range.tolist()) for joint in motors}
+        limits = {name: limits_of(name, part, ranges) for name, part in described.parts.items()}
+        self.stage = Stage(described, physics, limits)
+        physics.time = self.stage.pulse.now()
+        self._limbs = _limbs(described, self.stage)
+        super().__init__([Member(limb.part, limb, (limb.part,)) for limb in self._limbs])
+        self.capabilities = _capabilities(described, self.stage, self.capabilities)
+        self._faults: tuple[BodyFault, ...] = ()
+        self.switch_faults(self._settings.faults)
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
+        async with super().connected():
+            if (film := film_of(self.stage.physics.model, self._settings)) is None:
+                yield
+                return
+            self.stage.pulse.on_step = partial(self._film, film)
+            self.stage.pulse.wake()
+            try:
+                yield
+            finally:
+                self.stage.pulse.on_step = lambda at: None
+                finish(film, self._settings)
+
+    def _film(self, film: Film, at: Seconds) -> None:
+        if film.is_due(at):
+            film.take(self.frame())
+
+    def frame(self) -> Frame:
+        """The robot as a film shows it now."""
+        pointing = {limb.part: limb.points_at for limb in self._limbs if isinstance(limb, ArmLimb) and limb.points_at}
+        return framed(self.stage.pulse.now(), self.stage.physics.data, self.state(), self._world, pointing)
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        if isinstance(behavior, Wait):
+            seconds = behavior.duration or 0.0
+            phase = Phase(since="start", to="end", shortest=seconds, natural=seconds, hold=True)
+            here = pose or self.state().pose
+            return Estimate(behavior=behavior.id, feasible=True, phases=(phase,), pose_after=here, pose_end=here)
+        return super().estimate(behavior, pose, world)
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        performed = (
+            speaking.wait(behavior, authority) if isinstance(behavior, Wait) else super().perform(behavior, authority)
+        )
+        async with aclosing(performed) as stream:
+            async for progress in stream:
+                yield progress
+
+    def see(self, world: World) -> None:
+        self.stage.pulse.step()
+        super().see(world)
+        self.stage.room.lay(world)
+        self.stage.pulse.wake()
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        return self._faults
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        refuse(faults, self.capabilities)
+        self._faults = tuple(faults)
+        self.stage.suffer(faults)
+
+    def _able(self, behavior: BlockBehavior) -> list[Member]:
+        """Members that can do a behavior by its type; of two arms the nearer to what it points at is first."""
+        able = super()._able(behavior)
+        target = self._world.entity(behavior.target) if isinstance(behavior, Pointing) else None
+        if target is not None:
+            able.sort(key=lambda member: _shoulder(member.body, target.position))
+        return able
+
+
+@lru_cache(8)
+def _model(described: bytes, path: Path) -> tuple[mujoco.MjModel, dict[str, Motor]]:
+    """The model of a described robot at the table. To compile one of forty meshes takes half a second."""
+    return assembled(msgspec.json.decode(described, type=Description), path, tangram_table())
+
+
+def _shoulder(body: Body, target: tuple[float, float, float]) -> Seconds:
+    assert isinstance(body, Limb)
+    return math.dist(body.axis(body.rest).origin, target)
+
+
+def _limbs(described: Description, stage: Stage) -> list[Limb]:
+    """The parts that move on their own. Joints of a torso only hold."""
+    model, found = stage.physics.model, list[Limb]()
+    if (head := described.head) is not None:
+        chain = Chain(model, head.joints, head.eyes, prefix=PREFIX)
+        found.append(HeadLimb(stage, "head", stage.limits["head"], chain, HEAD_TYPES, described.name))
+    for part, arm in described.parts.items():
+        if isinstance(arm, ArmDescription):
+            chain = Chain(model, arm.joints, arm.elbow, arm.hand, prefix=PREFIX)
+            found.append(ArmLimb(stage, part, stage.limits[part], chain, ("pointing",), described.name))
+    return found
+
+
+def _capabilities(described: Description, stage: Stage, of_parts: Capabilities) -> Capabilities:
+    joints = tuple(
+        replace(
+            limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=MEASURED_SPEED * limit.speed,
+            acceleration=MEASURED_ACCELERATION * limit.acceleration,
+        )
+        for own in stage.limits.values()
+        for limit in own
+    )  # fmt: skip
+    return replace(
+        of_parts,
+        body=described.name,
+        types=(*of_parts.types, "wait"),
+        joints=joints,
+        reach=described.reach,
+        faults=FAULTS,
+    )

@@ -1,0 +1,185 @@
+"""Films of a body: what it looked like while it moved, drawn afterwards. Time is that of its frames.
+
+Drawing a picture takes some tenths of a second without a GPU, so nothing is drawn while the body moves.
+"""
+
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.mujoco import face
+from engage_hri.services.control.mujoco.pictures import FROM_THE_SIDE, Beam, Camera, Cone, Picture, View
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw
+
+RATE = 12.0
+"""Pictures a second."""
+FORMATS = (".mp4", ".webp", ".gif", ".png")
+
+
+class Frame(Struct, frozen=True, kw_only=True):
+    """A body at an instant. qpos, mocap: state of its model. pose: of its face. caption: what is said."""
+
+    at: Seconds
+    qpos: Any
+    mocap: Any
+    pose: Mapping[str, float] = {}
+    drawn: tuple[Cone | Beam, ...] = ()
+    caption: str = ""
+
+
+class Film:
+    """Frames of one model as they come, a picture every so often at most. `write` draws them."""
+
+    def __init__(self, model: mujoco.MjModel, rate: float = RATE) -> None:
+        self._model = model
+        self._interval = 1.0 / rate
+        self.frames: list[Frame] = []
+
+    def is_due(self, at: Seconds) -> bool:
+        """True if it is time for another frame."""
+        return not self.frames or at >= self.frames[-1].at + self._interval - 1e-9
+
+    def take(self, frame: Frame) -> None:
+        self.frames.append(frame)
+
+    def write(self, path: Path, *, view: View = FROM_THE_SIDE, size: tuple[int, int] = (720, 540)) -> None:
+        """Draw the film into a file: `.mp4` (needs the program ffmpeg), `.webp` or `.gif`, which most browsers play,
+        or `.png`, a sheet of pictures.
+
+        Raises InputRefused: an unknown ending, or no ffmpeg. RunFailed: this machine cannot draw.
+        """
+        check(path)
+        if not self.frames:
+            return
+        camera = Camera(self._model, *size)
+        try:
+            frames = self.frames if path.suffix != ".png" else _chosen(self.frames, 12)
+            pictures = self._pictures(camera, frames, view)
+            if path.suffix == ".mp4":
+                _write_mp4(path, frames, pictures, self._interval)
+            elif path.suffix == ".png":
+                _write_sheet(path, frames, list(pictures))
+            else:
+                _write_animation(path, frames, list(pictures), self._interval)
+        finally:
+            camera.close()
+
+    def picture(self, camera: Camera, frame: Frame, view: View = FROM_THE_SIDE) -> Picture:
+        """Draw one frame."""
+        data = mujoco.MjData(self._model)
+        data.qpos[:] = frame.qpos
+        if self._model.nmocap:
+            data.mocap_pos[:] = frame.mocap
+        if frame.pose:
+            show_face(self._model, frame.pose)
+        mujoco.mj_forward(self._model, data)
+        return camera.picture(data, frame.drawn, view)
+
+    def _pictures(self, camera: Camera, frames: Sequence[Frame], view: View) -> Iterator[Picture]:
+        for frame in frames:
+            yield _captioned(self.picture(camera, frame, view), frame, frames[0].at)
+
+
+def check(path: Path) -> None:
+    """Raise InputRefused if no film of this name can be written here."""
+    if path.suffix not in FORMATS:
+        raise InputRefused(
+            Fault(reason=f"a film {path.name!r}", advice=f"name it {', '.join(FORMATS)}", service="control")
+        )
+    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
+        advice = "install ffmpeg, or name the film .webp or .gif"
+        raise InputRefused(
+            Fault(reason="no program ffmpeg for an .mp4", where=str(path), advice=advice, service="control")
+        )
+
+
+def show_face(model: mujoco.MjModel, pose: Mapping[str, float]) -> None:
+    """Change the shapes of a model's face to an expression."""
+    for name, stroke in face.strokes(pose).items():
+        geom = model.geom(name)
+        geom.pos[1:] = (stroke.y, stroke.z)
+        if stroke.height:
+            geom.size[2] = stroke.height
+        else:
+            geom.quat[:] = face.turned(name, stroke)
+
+
+def _captioned(picture: Picture, frame: Frame, since: Seconds) -> Picture:
+    """Add the time and what is said."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.fromarray(picture)
+    draw = ImageDraw.Draw(image)
+    font = ImageFont.load_default(18)
+    _text(draw, (12, 8), f"{frame.at - since:5.2f} s", font)
+    if frame.caption:
+        width = draw.textlength(frame.caption, font=font)
+        _text(draw, ((picture.shape[1] - width) / 2, picture.shape[0] - 34), frame.caption, font)
+    return np.asarray(image)
+
+
+def _text(draw: "ImageDraw.ImageDraw", at: tuple[float, float], text: str, font: Any) -> None:
+    draw.text(at, text, font=font, fill=(255, 255, 255), stroke_width=2, stroke_fill=(20, 24, 32))
+
+
+def _chosen(frames: Sequence[Frame], count: int) -> list[Frame]:
+    """Choose so many frames at equal distances."""
+    if len(frames) <= count:
+        return list(frames)
+    return [frames[round(number * (len(frames) - 1) / (count - 1))] for number in range(count)]
+
+
+def _write_sheet(path: Path, frames: Sequence[Frame], pictures: Sequence[Picture]) -> None:
+    from PIL import Image
+
+    columns = min(4, len(pictures))
+    height, width, _ = pictures[0].shape
+    sheet = Image.new("RGB", (columns * width // 2, ceil(len(pictures) / columns) * height // 2))
+    for number, picture in enumerate(pictures):
+        small = Image.fromarray(picture).resize((width // 2, height // 2))
+        sheet.paste(small, (number % columns * width // 2, number // columns * height // 2))
+    sheet.save(path)
+
+
+def _write_animation(path: Path, frames: Sequence[Frame], pictures: Sequence[Picture], last: Seconds) -> None:
+    from PIL import Image
+
+    images = [Image.fromarray(picture) for picture in pictures]
+    spans = [round(1000 * (later.at - frame.at)) for frame, later in pairwise(frames)]
+    options: dict[str, Any] = {"quality": 80} if path.suffix == ".webp" else {"optimize": False}
+    images[0].save(
+        path, save_all=True, append_images=images[1:], duration=[*spans, round(1000 * last)], loop=0, **options
+    )
+
+
+def _write_mp4(path: Path, frames: Sequence[Frame], pictures: Iterator[Picture], interval: Seconds) -> None:
+    """Hand the pictures to ffmpeg, each for as long as it lasted."""
+    program: subprocess.Popen[bytes] | None = None
+    shown = 0
+    for number, (frame, picture) in enumerate(zip(frames, pictures, strict=True)):
+        if program is None:
+            height, width, _ = picture.shape
+            program = subprocess.Popen(
+                ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+                 "-r", f"{1 / interval:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)],
+                stdin=subprocess.PIPE,
+            )  # fmt: skip
+        until = frames[number + 1].at if number + 1 < len(frames) else frame.at + interval
+        times = round((until - frames[0].at) / interval) - shown
+        shown += max(0, times)
+        assert program.stdin is not None
+        program.stdin.write(picture.tobytes() * max(0, times))
+    if program is not None:
+        program.communicate()

@@ -1,0 +1,183 @@
+"""Parts of a described robot, each an ordinary body of one part: where it looks or points, by inverse kinematics."""
+
+import math
+from collections.abc import AsyncGenerator, Mapping, Sequence
+from contextlib import aclosing
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Head, Pointing
+from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, Ray
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import (
+    BehaviorRefused,
+    BodyFailed,
+    BodyState,
+    MovementAuthority,
+    Progress,
+    Reached,
+)
+from engage_hri.services.control.mujoco.ik import ON_AXIS, Chain, Solution
+from engage_hri.services.control.mujoco.stage import Angles, Stage
+from engage_hri.services.control.ordinary import OrdinaryBody, Way
+from engage_hri.services.control.torso.kinematics import HAND_TO_TARGET, TABLE_TOP
+from engage_hri.services.control.waiting import Bell
+
+NODS: Mapping[str, tuple[Radians, Radians]] = {
+    "NOD": (0.0, -math.radians(10.0)), "SHAKE": (math.radians(10.0), 0.0), "TILT": (0.0, math.radians(5.0)),
+}  # fmt: skip
+"""Yaw and pitch of the first stroke of a movement of the head."""
+OVER_THE_TABLE: Meters = 0.05
+"""Height over the table that elbow and hand keep: a forearm is that thick."""
+ABOVE: Meters = 0.15
+"""Height over the target at which an arm that is ready points."""
+
+
+class Limb(OrdinaryBody):
+    """A part of a described robot. chain: its joints, with the axis that they move."""
+
+    near = math.radians(0.5)
+    rate = 200.0
+    settling = 0.02
+    speed = 0.9
+    acceleration = 0.5
+
+    def __init__(
+        self, stage: Stage, part: str, joints: Sequence[JointLimit], chain: Chain, types: Sequence[str], name: str
+    ) -> None:
+        self.part, self.joints, self.types, self.name = part, tuple(joints), tuple(types), name  # type: ignore[misc]
+        self.rest = {limit.joint: stage.home[limit.joint] for limit in joints}  # type: ignore[misc]
+        super().__init__()
+        self.stage, self.chain = stage, chain
+        self._is_open = True
+        self._solved: dict[tuple[object, ...], Solution] = {}
+
+    def angles(self) -> Angles:
+        return self.stage.angles(self.part)
+
+    def go(self, goal: Angles, seconds: Seconds) -> None:
+        self.stage.go(self.part, goal, seconds)
+
+    async def _move(self, goal: Angles, authority: MovementAuthority | None, sync: str) -> Seconds | None:
+        try:
+            return await super()._move(goal, authority, sync)
+        except BodyFailed as failed:
+            joint = failed.fault.reason.partition(" ")[0]
+            known = self.stage.suspicion(joint)
+            raise BodyFailed(replace(failed.fault, advice=known or failed.fault.advice)) from failed
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        await super().home(parts)
+        bell = Bell()
+        while (not parts or self.part in parts) and self.stage.is_moving(self.part):
+            await bell.wait(bell.now() + 1.0 / self.rate)
+
+    def state(self) -> BodyState:
+        state = super().state()
+        return replace(state, moving=state.moving or self.stage.is_moving(self.part))
+
+    def axis(self, angles: Angles) -> Ray:
+        """The axis of eyes or forearm at these angles, all other joints as they are."""
+        return self.chain.ray(self.stage.qpos, angles)
+
+    def solve(self, behavior: BlockBehavior, target: Vector, **how: Meters) -> Angles:
+        """Angles on a target, each time a mapping of their own. Raises BehaviorRefused: it finds none."""
+        key = (target, *how.items())
+        if key not in self._solved:
+            if len(self._solved) > 200:
+                self._solved.clear()
+            self._solved[key] = self.chain.aim(self.stage.safe_qpos, target, self._home, **how)
+        found = self._solved[key]
+        if found.low > 2e-3:
+            raise self.refused(
+                behavior, f"the {self.part} finds no way to it: the table is in the way, or it is too near"
+            )
+        if found.off > ON_AXIS:
+            off = math.degrees(found.off)
+            raise self.refused(behavior, f"the {self.part} comes no nearer than {off:.1f} degrees to it")
+        return dict(found.angles)
+
+    def refused(self, behavior: BlockBehavior, reason: str) -> BehaviorRefused:
+        return BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
+
+
+class HeadLimb(Limb):
+    """A head: it looks, and nods."""
+
+    near = math.radians(0.3)
+
+    def aim(self, behavior: BlockBehavior, world: World) -> Angles:
+        return self.solve(behavior, self.position(behavior, world))
+
+    def way(self, behavior: BlockBehavior, world: World) -> Way:
+        if not isinstance(behavior, Head):
+            return super().way(behavior, world)
+        turn = NODS.get(behavior.lexeme.upper())
+        if turn is None:
+            raise self.refused(behavior, f"this head has no {behavior.lexeme!r}: it has {', '.join(NODS)}")
+        return [
+            ("stroke", self._beside(behavior, *turn)),
+            ("stroke_end", self._beside(behavior, *(-0.4 * each for each in turn))),
+        ]
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        estimate = super().estimate(behavior, pose, world)
+        if estimate.feasible and isinstance(behavior, Head) and (behavior.repetition or 1) > 1:
+            return replace(
+                estimate, degraded=f"this body does not repeat a {behavior.lexeme!r}; it makes one, the nearest"
+            )
+        return estimate
+
+    def gaze(self, angles: Angles) -> Ray:
+        return self.axis(angles)
+
+    def _beside(self, behavior: BlockBehavior, yaw: Radians, pitch: Radians) -> Angles:
+        """Angles at which the eyes look beside where they belong."""
+        base = self.axis(self._base)
+        x, y, z = base.axis
+        heading, height = math.atan2(y, x) + yaw, math.asin(max(-1.0, min(1.0, z))) + pitch
+        axis = (math.cos(height) * math.cos(heading), math.cos(height) * math.sin(heading), math.sin(height))
+        eyes = base.origin
+        return self.solve(behavior, (eyes[0] + 2 * axis[0], eyes[1] + 2 * axis[1], eyes[2] + 2 * axis[2]))
+
+
+class ArmLimb(Limb):
+    """An arm: it points with its forearm. points_at: id of what it points at now; empty: nothing."""
+
+    points_at = ""
+
+    async def _move(self, goal: Angles, authority: MovementAuthority | None, sync: str) -> Seconds | None:
+        if sync not in ("stroke", "stroke_end"):
+            self.points_at = ""
+        return await super()._move(goal, authority, sync)
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        async with aclosing(super().perform(behavior, authority)) as stream:
+            async for progress in stream:
+                if isinstance(progress, Reached) and progress.sync == "stroke":
+                    self.points_at = getattr(behavior, "target", "")
+                yield progress
+
+    def aim(self, behavior: BlockBehavior, world: World) -> Angles:
+        target = self.position(behavior, world)
+        entity = world.entity(getattr(behavior, "target", ""))
+        if isinstance(behavior, Pointing) and behavior.mode not in (
+            None,
+            "",
+            f"{self.part.removesuffix('_arm').upper()}_HAND",
+        ):
+            raise self.refused(behavior, f"it is to be done with {behavior.mode!r}")
+        distance = HAND_TO_TARGET + (entity.radius if entity is not None else 0.0)
+        return self.solve(behavior, target, floor=TABLE_TOP + OVER_THE_TABLE, distance=distance)
+
+    def way(self, behavior: BlockBehavior, world: World) -> Way:
+        aim = self.aim(behavior, world)
+        x, y, z = self.position(behavior, world)
+        floor = TABLE_TOP + OVER_THE_TABLE + 0.03
+        above = self.chain.aim(self.stage.safe_qpos, (x, y, z + ABOVE), aim, floor=floor)
+        return [("ready", above.angles), ("stroke", aim), ("stroke_end", aim)]
+
+    def forearm(self, angles: Angles) -> Ray:
+        return self.axis(angles)

@@ -1,0 +1,209 @@
+"""Physics of a robot with position servos: the model, its motors, and what the encoders tell. Time is an argument.
+
+The servos get a planned position for each instant, and with it its rate of change; between two plans it is a straight
+line. What the joints make of it is up to torque, inertia, gravity, friction and contact.
+"""
+
+import math
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from engage_hri.schemas.units import Radians, Seconds, Vector
+from engage_hri.services.control.mujoco.motors import COLD, WARM, Condition, Motor
+
+Array = NDArray[np.float64]
+
+ROUNDING: Seconds = 1e-6
+STILL = math.radians(0.02)
+"""rad/s: a joint that is slower stands."""
+MOVING = math.radians(1.0)
+"""rad/s from which on a joint is said to move."""
+STEPS_AT_ONCE = 50
+"""Most steps in one call. A loop that was late catches up in several."""
+
+
+class Contact(Struct, frozen=True):
+    """A contact of the robot with a thing: the names of both geoms. depth: metres."""
+
+    robot: str
+    thing: str
+    depth: float
+
+
+class Physics:
+    """A model in motion. joints: those with a motor, in the order of all arrays here.
+
+    time: up to when it has been computed. noise: of each encoder, standard deviation in radians.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, motors: Mapping[str, Motor], *, at: Seconds, prefix: str = "", seed: int = 0
+    ) -> None:
+        """model: with a position servo for each joint in `motors`, named like it, both with the prefix."""
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self.joints = tuple(motors)
+        self.motors = dict(motors)
+        self.time = at
+        self.noise = np.zeros(len(motors))
+        self.conditions = {joint: Condition() for joint in motors}
+        self.temperatures = np.full(len(motors), COLD)
+        self._chance = np.random.default_rng(seed)
+        self._error = np.zeros(len(motors))
+        self._offset = np.zeros(len(motors))
+        ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + joint) for joint in motors]
+        self._q = np.array([model.jnt_qposadr[each] for each in ids])
+        self._v = np.array([model.jnt_dofadr[each] for each in ids])
+        self._u = np.array(
+            [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + joint) for joint in motors]
+        )
+        self._lead = np.array([motor.damping / motor.stiffness for motor in motors.values()])
+        self._drag = np.array([motor.drag for motor in motors.values()])
+        self._limit = np.array([motor.limit for motor in motors.values()])
+        self._stick = np.zeros(len(motors))
+        self._friction = np.array([motor.friction for motor in motors.values()])
+        self._reference = np.zeros(len(motors))
+
+    # -- state --------------------------------------------------------------------------------------------------
+
+    def place(self, angles: Mapping[str, Radians]) -> None:
+        """Put joints where their encoders tell these angles, at once and at rest."""
+        for joint, angle in angles.items():
+            number = self.joints.index(joint)
+            self._reference[number] = angle
+            self.data.qpos[self._q[number]] = angle - self._offset[number]
+            self.data.qvel[self._v[number]] = 0.0
+        mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def angles(self) -> Array:
+        """True joint angles."""
+        return np.asarray(self.data.qpos[self._q])
+
+    @property
+    def measured(self) -> Array:
+        """Joint angles as the encoders tell them."""
+        return self.angles + self._error + self._offset
+
+    def told(self) -> Array:
+        """Positions of the whole model, with joints where their encoders tell them."""
+        qpos = np.array(self.data.qpos)
+        qpos[self._q] = self.measured
+        return qpos
+
+    @property
+    def speeds(self) -> Array:
+        return np.asarray(self.data.qvel[self._v])
+
+    @property
+    def torques(self) -> Array:
+        """Torques of the motors, N m."""
+        return np.asarray(self.data.actuator_force[self._u])
+
+    @property
+    def quick(self) -> set[str]:
+        """The joints that move."""
+        return {joint for joint, speed in zip(self.joints, self.speeds.tolist(), strict=True) if abs(speed) > MOVING}
+
+    def is_at_rest(self, reference: Array) -> bool:
+        """True if nothing moves, and the plan does not, either."""
+        if np.max(np.abs(reference - self._reference)) > 1e-9 or np.max(np.abs(self.speeds)) > STILL:
+            return False
+        hot = any(each.heating > 1.0 for each in self.conditions.values())
+        return not hot and float(np.max(np.abs(self.data.qvel), initial=0.0)) < 0.02
+
+    def contacts(self) -> list[Contact]:
+        """Contacts of the robot now."""
+        found = []
+        for each in self.data.contact[: self.data.ncon]:
+            one, other = (int(geom) for geom in each.geom)
+            if self.model.geom_contype[one] != 1:
+                one, other = other, one
+            if self.model.geom_contype[one] == 1:
+                found.append(Contact(self.model.geom(one).name, self.model.geom(other).name, -float(each.dist)))
+        return found
+
+    def complaints(self, joint: str) -> list[str]:
+        """Complaints of the motor of a joint."""
+        number = self.joints.index(joint)
+        temperature, limit = self.temperatures[number], self._limit[number]
+        if temperature > WARM + 1.0:
+            return [f"its motor is overheated, {temperature:.0f} degrees Celsius"]
+        if limit <= 0.0:
+            return ["its motor gives no torque"]
+        if abs(self.torques[number]) > 0.98 * limit:
+            return [f"its motor gives all it can, {limit:.1f} N m"]
+        return []
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    def skip(self, to: Seconds) -> None:
+        """Let time pass in which nothing moves: the motors cool."""
+        self._heat(np.zeros(len(self.joints)), to - self.time)
+        self.time = to
+
+    def advance(self, to: Seconds, reference: Array) -> bool:
+        """Compute up to `to`, at which the servos are to be at `reference`. False if that is not all done yet."""
+        step = float(self.model.opt.timestep)
+        count = math.floor((to - self.time + ROUNDING) / step)
+        if count <= 0:
+            return True
+        steps = min(count, STEPS_AT_ONCE)
+        slope = (reference - self._reference) / (count * step)
+        before, squares = self._reference, np.zeros(len(self.joints))
+        servo = before - self._offset  # a servo believes its encoder
+        for number in range(1, steps + 1):
+            self.data.ctrl[self._u] = servo + slope * (number * step) + self._lead * slope
+            self._stick_or_slip()
+            mujoco.mj_step(self.model, self.data)
+            squares += self.torques**2
+        self._reference = before + slope * (steps * step)
+        self.time += steps * step
+        self._heat(squares / steps, steps * step)
+        if self.noise.any():
+            self._error = self.noise * self._chance.standard_normal(len(self.joints))
+        return steps == count
+
+    def _stick_or_slip(self) -> None:
+        """Friction of a sticky gear falls as it begins to move (Stribeck)."""
+        if not self._stick.any():
+            return
+        ratio = self.speeds / math.radians(3.0)
+        self.model.dof_frictionloss[self._v] = self._friction + self._stick * np.exp(-(ratio**2))
+
+    def _heat(self, squares: Array, seconds: Seconds) -> None:
+        """Warm the motors by the squares of their torques, and let a hot one give less."""
+        for number, (joint, motor) in enumerate(self.motors.items()):
+            condition = self.conditions[joint]
+            warmer = condition.warmed(float(self.temperatures[number]), motor, float(squares[number]), seconds)
+            self.temperatures[number] = warmer
+            limit = motor.limit * condition.strength * condition.derating(warmer)
+            if abs(limit - self._limit[number]) > 1e-9:
+                self._limit[number] = limit
+                self.model.actuator_forcerange[self._u[number]] = (-limit, limit)
+
+    # -- faults -------------------------------------------------------------------------------------------------
+
+    def suffer(self, conditions: Mapping[str, Condition]) -> None:
+        """Put motors and gears into these conditions; those of the others are as new."""
+        for number, (joint, motor) in enumerate(self.motors.items()):
+            condition = self.conditions[joint] = conditions.get(joint, Condition())
+            self._drag[number] = motor.drag + condition.drag
+            self._friction[number] = motor.friction + condition.friction
+            self._stick[number] = condition.stiction
+            self._offset[number] = condition.offset
+            if condition.warm > self.temperatures[number]:
+                self.temperatures[number] = condition.warm
+            elif condition.heating <= 1.0:
+                self.temperatures[number] = min(self.temperatures[number], COLD)
+        self.model.dof_damping[self._v] = self._drag
+        self.model.dof_frictionloss[self._v] = self._friction
+        self._heat(np.zeros(len(self.joints)), 0.0)
+
+    def put(self, body: str, place: Vector) -> None:
+        """Put a body that nothing moves (`mocap`) somewhere else."""
+        self.data.mocap_pos[self.model.body(body).mocapid[0]] = place

@@ -1,0 +1,151 @@
+"""A robot of other people at the table: its model with fixed feet, position servos for the described joints.
+
+All other joints are stiff. Its motors are made to its measure: a stiffness by which each joint would swing at the
+described frequency, and the torque that a lively motion takes. Its servos know most of the weight they carry
+(`CARRIED`), as those of humanoids do.
+"""
+
+import math
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.control.mujoco import model
+from engage_hri.services.control.mujoco.description import Description, Place
+from engage_hri.services.control.mujoco.motors import Motor
+from engage_hri.services.tangram.table import TangramTable
+
+CARRIED = 0.9
+"""Share of the weight that the servos of a described robot know."""
+ROTOR = 0.4
+"""Inertia of a rotor behind its gear, as a share of that of what the joint moves."""
+PREFIX = "robot/"
+"""Before the names of the robot's bodies and joints, in the room."""
+MESH = re.compile(r'filename\s*=\s*"([^"]+)"')
+
+
+def assembled(described: Description, path: Path, table: TangramTable) -> tuple[mujoco.MjModel, dict[str, Motor]]:
+    """The model at the table, and its motors. Raises InputRefused: the model lacks something described."""
+    robot = _loaded(path)
+    _check(described, robot, path)
+    _prepare(described, robot)
+    scene = mujoco.MjSpec.from_string(model.room(table, _pedestal(described)))
+    half = math.radians(described.yaw) / 2
+    frame = scene.worldbody.add_frame(pos=described.position, quat=(math.cos(half), 0.0, 0.0, math.sin(half)))
+    scene.attach(robot, frame=frame, prefix=PREFIX)
+    motors = _motors(described, scene)
+    for joint, motor in motors.items():
+        servo = scene.add_actuator(name=PREFIX + joint, target=PREFIX + joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo.set_to_position(kp=motor.stiffness, kv=motor.damping)
+        servo.forcelimited, servo.forcerange = 1, (-motor.limit, motor.limit)
+        own = scene.joint(PREFIX + joint)
+        own.armature, own.frictionloss = motor.armature, motor.friction
+        own.damping = np.array([motor.drag, 0.0, 0.0])  # linear in the speed
+    return scene.compile(), motors
+
+
+def _loaded(path: Path) -> mujoco.MjSpec:
+    try:
+        if path.suffix.lower() != ".urdf":
+            return mujoco.MjSpec.from_file(str(path))
+        text, assets = _urdf(path)
+        spec = mujoco.MjSpec.from_string(text, assets=assets)
+        spec.compiler.fusestatic = False
+        return spec
+    except (ValueError, OSError) as error:
+        raise InputRefused(
+            Fault(reason=f"MuJoCo cannot read it: {error}", where=str(path), service="control")
+        ) from error
+
+
+def _urdf(path: Path) -> tuple[str, dict[str, bytes]]:
+    """A URDF with its meshes by plain names. `package://NAME/...` is looked for in the folders above the file."""
+    assets: dict[str, bytes] = {}
+
+    def plain(found: re.Match[str]) -> str:
+        tail = found[1].partition("://")[2].partition("/")[2] if "://" in found[1] else found[1]
+        file = next((up / tail for up in path.parents if (up / tail).is_file()), None)
+        if file is None or file.suffix.lower() not in (".stl", ".obj"):
+            return found[0]
+        name = tail.replace("/", "-")
+        assets[name] = file.read_bytes()
+        return f'filename="{name}"'
+
+    text = MESH.sub(plain, path.read_text(encoding="utf-8"))
+    options = '<mujoco><compiler discardvisual="false" fusestatic="false" strippath="true"/></mujoco>'
+    return re.sub(r"(<robot\b[^>]*>)", rf"\1{options}", text, count=1), assets
+
+
+def _check(described: Description, robot: mujoco.MjSpec, path: Path) -> None:
+    joints, bodies = {each.name for each in robot.joints}, {each.name for each in robot.bodies}
+    named = [(joint, joints, "joint") for part in described.parts.values() for joint in part.joints]
+    named += [(joint, joints, "joint") for joint in described.home]
+    named += [(place.body, bodies, "body") for place in _places(described)]
+    for name, known, kind in named:
+        if name not in known:
+            advice = f"it has {', '.join(sorted(filter(None, known)))[:600]}"
+            reason = f"{described.name}: the model has no {kind} {name!r}"
+            raise InputRefused(Fault(reason=reason, where=str(path), advice=advice, service="control"))
+
+
+def _places(described: Description) -> list[Place]:
+    arms = [arm for arm in (described.left_arm, described.right_arm) if arm is not None]
+    heads = [described.head.eyes] if described.head is not None else []
+    return [*heads, *(arm.elbow for arm in arms), *(arm.hand for arm in arms)]
+
+
+def _prepare(described: Description, robot: mujoco.MjSpec) -> None:
+    """Stiffen the joints that nobody moves, take out motors, and let only arms touch things."""
+    moved = {joint for part in described.parts.values() for joint in part.joints}
+    for each in (*robot.actuators, *robot.sensors, *robot.keys, *robot.equalities, *robot.tendons):
+        robot.delete(each)
+    arms = [arm for arm in (described.left_arm, described.right_arm) if arm is not None]
+    names = set()
+    for arm in arms:
+        for body in (robot.joint(arm.joints[0]).parent, *robot.joint(arm.joints[0]).parent.find_all("body")):
+            names.add(body.name)
+    for joint in list(robot.joints):
+        if joint.name not in moved:
+            robot.delete(joint)
+    for body in robot.bodies:
+        body.gravcomp = CARRIED
+        for geom in body.geoms:
+            is_solid = geom.contype and body.name in names
+            has_looks = geom.group != 3
+            geom.contype, geom.conaffinity = (1, 0) if is_solid else (0, 0)
+            geom.group = geom.group if has_looks else 3
+
+
+def _motors(described: Description, scene: mujoco.MjSpec) -> dict[str, Motor]:
+    """Motors to the measure of what they move, in the safe pose."""
+    bare = scene.compile()
+    data = mujoco.MjData(bare)
+    for joint, angle in described.home.items():
+        if mujoco.mj_name2id(bare, mujoco.mjtObj.mjOBJ_JOINT, PREFIX + joint) >= 0:
+            data.joint(PREFIX + joint).qpos[0] = math.radians(angle)
+    mujoco.mj_forward(bare, data)
+    inertia = np.zeros((bare.nv, bare.nv))
+    mujoco.mj_fullM(bare, data, inertia)
+    motors = {}
+    omega = 2 * math.pi * described.stiffness
+    for part in described.parts.values():
+        for joint in part.joints:
+            number = int(bare.joint(PREFIX + joint).dofadr[0])
+            moved = max(float(inertia[number, number]), 0.003)
+            rotor = ROTOR * moved
+            whole = moved + rotor
+            weight = abs(float(data.qfrc_bias[number])) + 9.81 * math.sqrt(moved)
+            limit = 3 * weight + 2 * whole * math.radians(part.acceleration)
+            motors[joint] = Motor(
+                stiffness=whole * omega**2, damping=2 * 0.8 * whole * omega, limit=limit, friction=0.004 * limit,
+                drag=0.02 * whole * omega, armature=rotor, speed=math.radians(part.speed),
+            )  # fmt: skip
+    return motors
+
+
+def _pedestal(described: Description) -> str:
+    x, y, z = described.position
+    return f' <geom class="looks" type="cylinder" pos="{x} {y} 0.01" size="0.22 0.01" material="dark"/>\n'

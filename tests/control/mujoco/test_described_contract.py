@@ -1,0 +1,22 @@
+"""A robot of other people, the iCub, held to the contract of bodies through a description of its model."""
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
+pytest.importorskip("icub_models", reason="needs the package icub-models, which has the model")
+
+from tests.control.contract import BodyContract
+
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.mujoco.described import DescribedBody
+
+ICUB = Path(__file__).parent / "robots" / "icub.toml"
+
+
+class TestDescribedBody(BodyContract):
+    tolerance = 0.1
+
+    def make(self) -> Body:
+        return DescribedBody(ICUB)

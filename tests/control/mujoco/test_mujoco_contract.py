@@ -1,0 +1,20 @@
+"""The torso with physics, held to the contract of bodies: healthy, and with noisy encoders."""
+
+import pytest
+
+pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
+
+from tests.control.contract import BodyContract
+
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.mujoco.body import MujocoBody
+
+STATED = 0.05
+"""Seconds by which a healthy body may come later than it predicts, at any sync point."""
+
+
+class TestMujocoBody(BodyContract):
+    tolerance = STATED
+
+    def make(self) -> Body:
+        return MujocoBody()
