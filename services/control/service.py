@@ -66,7 +66,7 @@ async def embody(
             ready()
             try:
                 control.tell_held()
-                control.shown.look()
+                control.shown.begin()
                 async for received in inbox:
                     with bus.containing(received):
                         control.take(received)
