@@ -27,7 +27,7 @@ from engage_hri.services.recognition.events.machine import Forgotten, Mishap
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.scene import GoesOn
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
-from engage_hri.services.recognition.perceive.reporters import Reporters
+from engage_hri.services.recognition.perceive.reporters import OLDEST, Reporters
 from engage_hri.services.recognition.perceive.reports import Told
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -35,8 +35,6 @@ from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 
-OLDEST: Seconds = 60.0
-"""Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
 STRANGERS_KEPT = 256
 """Number of programs of others whose name as a reporter is remembered."""
 COMPLAINTS = 100

@@ -253,6 +253,8 @@ def test_another_life_ends_what_the_last_one_said_and_has_yet_to_see_them():
     world.presence(GONE, 2.0)
 
     assert world.presence(alive("two"), 3.0) == ["2? ann -speak", "2? ann lost", "2? bob lost"]
+    world.presence(GONE, 4.0)
+    world.presence(alive("two"), 5.0)
     assert world.until(20.0) == []
 
 
@@ -341,6 +343,16 @@ def test_a_live_word_beats_that_of_one_who_is_away_and_the_other_is_asked_when_i
     assert world.hears(lost(3.0), by="others", life="m") == ["3 ann lost"]
     world.presence(alive(), 4.0)
     assert world.until(5.0) == ["4.5? ann found", "4.5 ann ~speak since 1", "4.5 ann ~look cup since 1"]
+
+
+def test_who_is_away_for_a_moment_still_counts_when_the_other_ends():
+    world = both()
+    world.presence(PeerGone(participant="others"), 2.0)
+    world.presence(GONE, 5.0)
+
+    assert world.until(6.0) == []
+    world.presence(alive(), 7.0)
+    assert world.until(20.0) == ["7.5? ann found", "7.5 ann ~speak since 1", "7.5 ann ~look cup since 1"]
 
 
 def test_a_program_without_a_token_keeps_nobody():

@@ -16,6 +16,8 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.perceive.reports import Report, Told
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 
+OLDEST: Seconds = 60.0
+"""Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
 CATCH_UP: Seconds = 0.5
 """Time from the return of a reporter until what it said before is confirmed: what it has said meanwhile comes first."""
 LATER: Seconds = 1e-6
@@ -193,6 +195,7 @@ class Reporters:
         if not life or life not in one.former:
             told += self._lives(one, life, now)
             more = self._corrected(one, said, now) if isinstance(said, OngoingActions) else self._event(one, said)
+            one.floor = max(one.floor, now - OLDEST)
             if one.standing != "silenced":
                 told += [self._not_before(one, each) for each in more]
         if not reporter:
