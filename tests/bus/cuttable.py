@@ -1,9 +1,11 @@
 """The memory bus with links that can be cut. After a cut it hands out what was missed, as the Zenoh bus does."""
 
+import random
 from itertools import combinations
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.units import Probability
 from engage_hri.services.bus.interface import Received, Subscription
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub, Past
 
@@ -11,13 +13,16 @@ from engage_hri.services.bus.memory import MemoryBus, MemoryHub, Past
 class CuttableHub(MemoryHub):
     """kept: number of commands and events that each participant hands out after a cut.
 
-    tokens_first: whether presence is told before what was missed, or after it.
+    tokens_first: whether presence is told before what was missed, or after it. loss: share of the events that are lost
+    on the way, as those of a program that nobody can ask again.
     """
 
-    def __init__(self, kept: int = 4096, *, tokens_first: bool = True) -> None:
+    def __init__(self, kept: int = 4096, *, tokens_first: bool = True, loss: Probability = 0.0, seed: int = 0) -> None:
         super().__init__()
         self._kept = kept
         self._tokens_first = tokens_first
+        self._loss = loss
+        self._chance = random.Random(seed)
         self._apart: set[frozenset[str]] = set()
         self._missed: dict[tuple[str, str], list[Past]] = {}
         """What did not come through, by sender and receiver."""
@@ -67,7 +72,7 @@ class CuttableHub(MemoryHub):
     def _carry(self, past: Past, sender: str, bus: MemoryBus) -> None:
         if self._is_cut(sender, bus.name):
             self._missed.setdefault((sender, bus.name), []).append(past)
-        else:
+        elif keys.key_class(past.received.key) != "evt" or self._chance.random() >= self._loss:
             super()._carry(past, sender, bus)
 
     def _is_cut(self, one: str, other: str) -> bool:
