@@ -1,7 +1,7 @@
 """Actions that are seen: those of the robot (from its sync points as realised) and of people (from perception).
 
-They are told twice: each change as an event, and after it, as a state, what goes on now. The state is for readers that
-come late, or have missed an event.
+They are told twice: each change as an event, and after it, as a state, what goes on now. The state is for readers
+that come late, or have missed an event.
 """
 
 from msgspec import Struct
@@ -63,5 +63,5 @@ class OngoingActions(Struct, frozen=True, kw_only=True, tag="ongoing_actions", o
     actions: tuple[ActionBegan, ...] = ()
     """The actions that go on, each as its `ActionBegan` was told, the oldest first."""
     seen: bool | None = None
-    """True: perception sees the person, as by `ActorFound`; False: it has lost the person; None: this reporter does not
-    tell. Of somebody who is lost, `actions` are those that go on if the person is found again."""
+    """True: perception sees the person, as by `ActorFound`; False: it has lost the person; None: this reporter does
+    not tell. Of somebody who is lost, `actions` are those that go on if the person is found again."""

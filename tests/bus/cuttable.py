@@ -13,11 +13,13 @@ from engage_hri.services.bus.memory import MemoryBus, MemoryHub, Past
 class CuttableHub(MemoryHub):
     """kept: number of commands and events that each participant hands out after a cut.
 
-    tokens_first: whether presence is told before what was missed, or after it. loss: share of the events that are lost
-    on the way, as those of a program that nobody can ask again.
+    tokens_first: whether presence is told before what was missed, or after it. loss: share of the events that are
+    lost on the way, as those of a program that nobody can ask again.
     """
 
-    def __init__(self, kept: int = 4096, *, tokens_first: bool = True, loss: Probability = 0.0, seed: int = 0) -> None:
+    def __init__(
+        self, kept: int = 4096, *, tokens_first: bool = True, loss: Probability = 0.0, seed: int = 0
+    ) -> None:
         super().__init__()
         self._kept = kept
         self._tokens_first = tokens_first

@@ -9,25 +9,31 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.behaviors import Action, Event, TurnSignal
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Subscription
 from engage_hri.services.bus.memory import MemoryBus
 from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.recognition import service
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.recognizer import Recognizer
+from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.service import serve
 from tests.bus.cuttable import CuttableHub
 from tests.recognition.observations import ROBOT, world
 
+GRACE = RecognitionConfig().report_grace
+SERVICES = ("recognition", "control", "cameras", "others")
+SPEECH = "block-1:speech-1"
 Doing = dict[tuple[Action, str], Seconds]
 """Actions that go on, with a target or a behavior, and since when."""
 
 
 class Belief(Struct, frozen=True):
-    """What somebody does, as recognition has it, or as it is. of_people: False for the robot."""
+    """What somebody does, as recognition has it, or as it is."""
 
     is_here: bool
     looks: str = ""
@@ -198,3 +204,56 @@ class Stage:
 
 def _first(targets: Iterable[str]) -> str:
     return next(iter(targets), "")
+
+
+class Running:
+    """A stage with these processes on it; none: all."""
+
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, *names: str, hub: CuttableHub | None = None, **config: Any
+    ) -> None:
+        self.hub = hub or CuttableHub()
+        self.stage = Stage(self.hub, monkeypatch, **config)
+        self._names = names or SERVICES
+
+    async def __aenter__(self) -> Stage:
+        self.stage.start(*self._names)
+        await asyncio.sleep(0.1)
+        return self.stage
+
+    async def __aexit__(self, *raised: object) -> None:
+        await self.stage.kill("recognition")
+        await self.hub.close()
+
+
+async def ask(stage: Stage, kind: str, person: str, *objects: str, **event: Any) -> "asyncio.Task[EventOutcome]":
+    """Ask for an event; returns the task that has its outcome."""
+    realizer = stage.hub._buses.get("realizer") or stage.hub.join("realizer")
+    realizer.declare_alive()
+    asked = Event(id=f"{kind}-1", kind=kind, responder=person, objects=objects, **event)  # type: ignore[arg-type]
+
+    async def outcome() -> EventOutcome:
+        async with Requester(realizer) as requests:
+            request = RequestEvent(id="r", requester="realizer", block="block-1", at=realizer.stamp(), event=asked)
+            decided = await requests.send(keys.EVENT, request).outcome
+        assert isinstance(decided, EventOutcome)
+        return decided
+
+    task = asyncio.create_task(outcome(), name="realizer")
+    await asyncio.sleep(0.05)
+    return task
+
+
+async def all_of(inbox: Subscription) -> list[ConnectionEvent]:
+    """The events that have come."""
+    received = [await inbox.next() for _ in range(len(inbox))]
+    return [each.message for each in received if each is not None and isinstance(each.message, ConnectionEvent)]
+
+
+async def turn_ends(stage: Stage) -> None:
+    realizer = stage.hub._buses["realizer"]
+    signal = TurnSignal(id="turn", turn="turn-1", signal="ended", actor="ann")
+    async with Requester(realizer) as requests:
+        await requests.send(
+            keys.TURN, SignalTurn(id="s", requester="realizer", signal=signal, at=realizer.stamp())
+        ).outcome

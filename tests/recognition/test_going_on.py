@@ -63,7 +63,8 @@ a nod of the robot that was missed is the answer
     human's ap-1: started 1, succeeded 2.5 after 0.5 by nod, completed 3.5 lasting 1
 
 a turn that goes on after its body was out of reach is not withdrawn
-    1 asking; 4 robot -speak words; 9 robot ~speak words since=1; 30 robot -speak words; 30 turn ended; 30.4 human +nod
+    1 asking; 4 robot -speak words; 9 robot ~speak words since=1; 30 robot -speak words; 30 turn ended
+    30.4 human +nod
     robot's ap-1: started 1, succeeded 30.4 after 0.4 by nod
 
 a turn whose body stays out of reach is withdrawn

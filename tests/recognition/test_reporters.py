@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.recognition.events.scene import GoesOn
-from engage_hri.services.recognition.perceive.reporters import CATCH_UP, TABLE, Given, Reporters, Standing
+from engage_hri.services.recognition.perceive.reporters import TABLE, Given, Reporters, Standing
 from engage_hri.services.recognition.perceive.reports import Told
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 from tests.recognition.observations import ROBOT, stamp
@@ -147,7 +147,9 @@ def test_somebody_who_was_lost_unnoticed_is_lost_and_does_nothing_new():
 
 def test_somebody_found_again_goes_on_with_what_the_reporter_says():
     """A camera that has lost a face for a while does not say again that a look has begun."""
-    world = World(found(1.0), began("look", 2.0, "robot"), lost(3.0), state(3.0, began("look", 2.0, "robot"), seen=False))
+    world = World(
+        found(1.0), began("look", 2.0, "robot"), lost(3.0), state(3.0, began("look", 2.0, "robot"), seen=False)
+    )
     world.hears(found(3.8))
 
     assert world.hears(state(3.8, began("look", 2.0, "robot"))) == ["3.8 ann ~look robot since 2"]
@@ -393,7 +395,3 @@ def test_every_standing_is_left_for_here():
             standing = TABLE[standing, "alive"].next
             standing = TABLE.get((standing, "caught_up"), TABLE[standing, "alive"]).next
         assert standing == "here"
-
-
-def test_catching_up_is_quicker_than_anybody_forgets():
-    assert CATCH_UP < GRACE

@@ -24,7 +24,9 @@ ROBOT = f"restarted-{os.getpid()}"
 async def start(endpoint: str) -> Process:
     """Start recognition, and wait until it is there."""
     words = ("run", "recognition", "--robot", ROBOT, "--connect", endpoint)
-    process = await asyncio.create_subprocess_exec(sys.executable, "-m", "engage_hri", *words, stdout=PIPE, stderr=STDOUT)
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "engage_hri", *words, stdout=PIPE, stderr=STDOUT
+    )
     assert process.stdout is not None
     async with asyncio.timeout(PATIENCE):
         while b"is ready" not in (line := await process.stdout.readline()):

@@ -47,4 +47,3 @@ def test_the_end_that_comes_after_its_block_changes_nothing():
     log.ends(ROBOT, "speak", 4.6, behavior="block-1:speech-1")
 
     assert log.session.scene.robot_speaks_since == 4.5
-

@@ -19,7 +19,7 @@ from engage_hri.services.runtime.ongoing_actions import ActionEvent
 OLDEST: Seconds = 60.0
 """Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
 CATCH_UP: Seconds = 0.5
-"""Time from the return of a reporter until what it said before is confirmed: what it has said meanwhile comes first."""
+"""Time from the return of a reporter until what it said before goes on: what it has said meanwhile comes first."""
 LATER: Seconds = 1e-6
 """Distance of what is told late, and so cannot have its own time any more."""
 FORMER = 8

@@ -1,4 +1,4 @@
-"""What one reporter says of one actor, and what its state shows to have been missed. Pure."""
+"""Report of one actor by one reporter: what goes on, and what a state shows to have been missed. Pure."""
 
 from collections.abc import Callable
 from typing import NamedTuple
