@@ -1,15 +1,11 @@
 """What reporters say holds as long as they are there, and for a grace after that; a state shows what was missed."""
 
-from typing import get_args
-
-import pytest
-
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.recognition.events.scene import GoesOn
-from engage_hri.services.recognition.perceive.reporters import TABLE, Given, Reporters, Standing
+from engage_hri.services.recognition.perceive.reporters import Reporters
 from engage_hri.services.recognition.perceive.reports import Told
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 from tests.recognition.observations import ROBOT, stamp
@@ -376,22 +372,3 @@ def test_a_program_that_only_sends_events_is_told_as_ever():
 
     assert heard == ["1 ann found", "2 ann +speak", "3 ann -speak", "4 ann lost", "5 ann found", "6 ann +nod"]
     assert world.until(1000.0) == []
-
-
-# -- the table ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("standing", get_args(Standing))
-def test_the_table_is_total(standing: Standing):
-    timers: dict[Standing, Given] = {"away": "grace_over", "back": "caught_up"}
-    given = {"gone", "alive", "reborn", *([timers[standing]] if standing in timers else [])}
-
-    assert {one for state, one in TABLE if state == standing} == given
-
-
-def test_every_standing_is_left_for_here():
-    for standing in get_args(Standing):
-        for _ in range(3):
-            standing = TABLE[standing, "alive"].next
-            standing = TABLE.get((standing, "caught_up"), TABLE[standing, "alive"]).next
-        assert standing == "here"
