@@ -64,6 +64,7 @@ WATCHED = (
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
 _OWN_FAULT = keys.fault(OWN)
+_OWN_ONGOING = keys.perceived_ongoing(OWN, "*")
 _RARELY = "sent when something goes wrong"
 _WITHDRAWN = "sent when a request is withdrawn"
 _LONG = "sent for a request that goes on for a second"
@@ -120,14 +121,14 @@ TABLE: tuple[Row, ...] = (
     Row("realizer", "asks", keys.ESTIMATE),
     *_service(
         "recognition", keys.ANY_CONNECTION_EVENT, keys.RECOGNIZED_ACTION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
-        heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW,
-               keys.ROBOT_STATE),
+        heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
+               keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
     ),
     *_service(
-        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.BODY_HELD,
-        keys.BODY_FAULTS, heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
+        "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,
+        keys.BODY_HELD, keys.BODY_FAULTS, heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
-    *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, *_RAW)),
+    *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, _OWN_ONGOING, *_RAW)),
     Row("perception", "publishes", _OWN_FAULT, _RARELY),
     *(
         Row("perception", "subscribes", key)
@@ -141,7 +142,8 @@ TABLE: tuple[Row, ...] = (
     Row("observer", "subscribes", keys.NET),
     *(
         Row("observer", "subscribes", key, _NO_PROGRAM)
-        for key in (keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.TURN_CLOSED)
+        for key in (keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.TURN_CLOSED, keys.ROBOT_ONGOING,
+                    keys.ANY_PERCEIVED_ONGOING)
     ),
     Row("observer", "subscribes", keys.WORLD, "looked at by `engage doctor`"),
     *_watches("operator", "what an operator sees"),
@@ -149,7 +151,10 @@ TABLE: tuple[Row, ...] = (
     *_commands("operator", "robot", "faults"),
     Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
     *_manages("wizard", "robot", "faults", why=f"drives the robot by hand; {_NO_PROGRAM}"),
-    Row("wizard", "publishes", keys.PERCEIVED_ACTION, f"says what perception does not see; {_NO_PROGRAM}"),
+    *(
+        Row("wizard", "publishes", key, f"says what perception does not see; {_NO_PROGRAM}")
+        for key in (keys.PERCEIVED_ACTION, _OWN_ONGOING)
+    ),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""
 

@@ -1,4 +1,8 @@
-"""Actions that are seen: those of the robot (from its sync points as realised) and of people (from perception)."""
+"""Actions that are seen: those of the robot (from its sync points as realised) and of people (from perception).
+
+They are told twice: each change as an event, and after it, as a state, what goes on now. The state is for readers
+that come late, or have missed an event.
+"""
 
 from msgspec import Struct
 
@@ -44,3 +48,20 @@ class ActorLost(Struct, frozen=True, kw_only=True, tag="actor_lost", omit_defaul
 
     actor: str
     at: Stamp
+
+
+class OngoingActions(Struct, frozen=True, kw_only=True, tag="ongoing_actions", omit_defaults=True):
+    """state: all that an actor does now, as one reporter knows it: perception of a person, control of the robot.
+
+    Published after each event of the actor, so that its reader knows all earlier ones.
+
+    at: the instant of the last change; what is missing here has ended by then.
+    """
+
+    actor: str
+    at: Stamp
+    actions: tuple[ActionBegan, ...] = ()
+    """The actions that go on, each as its `ActionBegan` was told, the oldest first."""
+    seen: bool | None = None
+    """True: perception sees the person, as by `ActorFound`; False: it has lost the person; None: this reporter does
+    not tell. Of somebody who is lost, `actions` are those that go on if the person is found again."""

@@ -8,7 +8,7 @@ how a message travels:
 |--------|-----|-----|
 | cmd    | requests to a server | each, in order; late subscribers get the last 2 s; idempotent by id |
 | evt    | request states, feedback, sync points, actions, connection events, faults | as cmd |
-| state  | world, statistics, open events, claims | last value, also for a late subscriber |
+| state  | world, ongoing actions, statistics, open events, claims | last value, also for a late subscriber |
 | stream | joints, raw perception | newest only, may be dropped |
 | rpc    | short reads | query, short timeout, no reply = failure |
 | alive  | presence of participants | liveliness; delivered as `PeerAlive` and `PeerGone` |
@@ -50,6 +50,8 @@ HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
 HELD = f"{PREFIX}/state/realizer/held"
 BODY_HELD = f"{PREFIX}/state/control/held"
 BODY_FAULTS = f"{PREFIX}/state/control/faults"
+ROBOT_ONGOING = f"{PREFIX}/state/control/ongoing_actions"
+"""`OngoingActions` of the robot."""
 ROBOT_STATE = f"{PREFIX}/state/control/robot_state"
 
 ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
@@ -65,6 +67,7 @@ ANY_REQUEST_STATE = f"{PREFIX}/evt/*/request"
 ANY_FEEDBACK = f"{PREFIX}/evt/*/feedback"
 ANY_FAULT = f"{PREFIX}/evt/*/fault"
 ANY_ACTION = f"{PREFIX}/evt/*/action"
+ANY_PERCEIVED_ONGOING = f"{PREFIX}/state/perception/ongoing_actions/*/*"
 ANY_OPEN_EVENTS = f"{PREFIX}/state/recognition/open_events/*"
 ANY_STATISTICS = f"{PREFIX}/state/recognition/statistics/*"
 ANY_ALIVE = f"{PREFIX}/alive/*"
@@ -187,6 +190,16 @@ def is_chunk(name: str) -> bool:
 def open_events(actor: str) -> str:
     """Key of the open connection events with one person."""
     return f"{PREFIX}/state/recognition/open_events/{actor}"
+
+
+def perceived_ongoing(reporter: str, actor: str) -> str:
+    """Key of what a person does (`actor`), as the participant `reporter` perceives it; each may be `*`."""
+    return f"{PREFIX}/state/perception/ongoing_actions/{reporter}/{actor}"
+
+
+def reporter_of(key: str) -> str:
+    """Reporter in `engage/v1/state/perception/ongoing_actions/<reporter>/<actor>`; empty for another key."""
+    return key.split("/")[5] if matches(ANY_PERCEIVED_ONGOING, key) else ""
 
 
 def head_pose(actor: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
@@ -67,7 +67,7 @@ Message = (
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
     | SwitchFaults | FaultsSwitched | BodyFaults | DescribeBody | Capabilities | EstimateBehaviors | Estimates
-    | ActionBegan | ActionEnded | ActorFound | ActorLost | World | HeadPose | VoiceActivity
+    | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | HeadPose | VoiceActivity
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip

@@ -32,7 +32,8 @@ PURE_MACHINERY = {
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
-    "services/runtime/publisher.py", "services/runtime/steps.py", "services/client/chunking.py",
+    "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
+    "services/client/chunking.py",
     "services/client/event_stream.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""

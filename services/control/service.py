@@ -88,7 +88,7 @@ async def embody(
             try:
                 control.tell_held()
                 control.switch.tell()
-                control.shown.look()
+                control.shown.begin()
                 async for received in inbox:
                     with bus.containing(received):
                         control.take(received)

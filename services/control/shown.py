@@ -3,12 +3,14 @@
 from math import inf
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.body import Body
 from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
 
 IDLE: Seconds = 1.0
 """Interval of `RobotState` messages while nothing moves."""
@@ -28,6 +30,7 @@ class Shown:
         self._bus = bus
         self._body = body
         self._actions = actions
+        self._ongoing = OngoingActionTracker()
         self._interval = 1.0 / rate
         self._next = Timer(self.look)
         self._looked: Seconds = -inf
@@ -69,9 +72,16 @@ class Shown:
             self.tell(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
 
     def tell(self, actions: list[ActionMessage]) -> None:
-        """Publish actions of the robot."""
+        """Publish actions of the robot, and what goes on after them."""
         for action in actions:
             self._bus.publish(keys.ROBOT_ACTION, action)
+        for state in self._ongoing.feed(actions, self._bus.stamp()):
+            self._bus.publish(keys.ROBOT_ONGOING, state)
+
+    def begin(self) -> None:
+        """Publish that the robot does nothing yet, and look for the first time."""
+        self._bus.publish(keys.ROBOT_ONGOING, OngoingActions(actor=self._bus.robot, at=self._bus.stamp()))
+        self.look()
 
     def close(self) -> None:
         """Look no more."""

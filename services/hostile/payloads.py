@@ -6,7 +6,7 @@ from typing import NamedTuple
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner, InhibitionEnded
 from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, PerformanceSteered
 from engage_hri.schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
@@ -118,6 +118,9 @@ class Payloads:
                 return self._command(next(key for key, kinds in COMMANDS.items() if isinstance(message, kinds)))
             case ActionBegan() | ActionEnded():
                 return self._chance.choice((keys.PERCEIVED_ACTION, keys.ROBOT_ACTION, keys.RECOGNIZED_ACTION))
+            case OngoingActions(actor=actor):
+                perceived = keys.perceived_ongoing("stranger", _chunk(actor))
+                return self._chance.choice((perceived, keys.ROBOT_ONGOING))
             case HeadPose(actor=actor):
                 return keys.head_pose(_chunk(actor))
             case VoiceActivity(actor=actor):

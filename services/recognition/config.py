@@ -91,6 +91,10 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Settings for raw perception."""
     lost_face_grace: Seconds = 0.5
     """Time for which a face may be lost before the person has gone."""
+    report_grace: Seconds = 4.0
+    """Time for which what a participant said of people, or of the robot, holds after it has gone from the bus: a
+    link that was cut looks like a death. After that it has ended when the participant went. As long as a requester
+    waits for its server."""
     look_break: Seconds = 0.15
     """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
     meanwhile waits for the decision."""
@@ -122,7 +126,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
             "turn_patience", "backchannel_limit", "direct_by_look", "window", "reference_mtbce",
             "longest_speech", "longest_gesture", "longest_manipulation",
         ))  # fmt: skip
-        not_negative(self, ("after_robot_directed", "lost_face_grace", "hysteresis"))
+        not_negative(self, ("after_robot_directed", "lost_face_grace", "report_grace", "hysteresis"))
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
         if not 0 <= self.look_break <= self.sensing.settling:

@@ -19,7 +19,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import InterruptedLooks, Symbolic
 from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mishap
-from engage_hri.services.recognition.events.scene import Covered
+from engage_hri.services.recognition.events.scene import Covered, GoesOn
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
 
@@ -80,12 +80,14 @@ class Recognizer:
                     self._wait(covered, at)
             case ActionBegan(confidence=confidence) if confidence < self._config.least_confidence:
                 pass
+            case GoesOn(began=began) if began.confidence < self._config.least_confidence:
+                pass
+            case GoesOn(began=began) if began.actor != self.session.robot:
+                derived = self._report(began, at, observation)
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() if (
                 observation.actor != self.session.robot
             ):
-                derived = self._attend(lambda attention: attention.take_report(observation, at), at)
-                for when, told in self._interrupted.feed(observation, at):
-                    self._wait(told, when)
+                derived = self._report(observation, at, observation)
             case _:
                 self._wait(observation, at)
         return self._take(derived)
@@ -104,6 +106,13 @@ class Recognizer:
     def lose_track(self, person: str, at: Seconds) -> list[Result]:
         """Begin anew with this person after a failure: see `Session.lose_track`."""
         return self._told([*self.session.lose_track(person, at)])
+
+    def _report(self, report: Symbolic, at: Seconds, meaning: Symbolic | GoesOn) -> list[Symbolic]:
+        """Take a report of perception, which the session gets as `meaning`."""
+        derived = self._attend(lambda attention: attention.take_report(report, at), at)
+        for when, told in self._interrupted.feed(report, at):
+            self._wait(meaning if told is report else told, when)
+        return derived
 
     def _attend(self, derive: Callable[[Attention], list[Symbolic]], at: Seconds) -> list[Symbolic]:
         """Derive actions from raw perception. If that fails, a new `Attention` begins with nothing."""

@@ -1,10 +1,10 @@
 """The recognition service: feeds the recognizer from the bus and publishes what comes out. It decides nothing."""
 
 from collections.abc import Iterable
-from math import inf
+from math import inf, isnan
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
@@ -22,19 +22,21 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.machine import Forgotten, Mishap
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
+from engage_hri.services.recognition.events.scene import GoesOn
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
-from engage_hri.services.recognition.perceive.reporters import Reporters
+from engage_hri.services.recognition.perceive.reporters import OLDEST, Reporters
+from engage_hri.services.recognition.perceive.reports import Told
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.runtime.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 
-OLDEST: Seconds = 60.0
-"""Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
-OF_ACTORS = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity
-"""Observations of one actor. All others with an instant tell of the robot."""
+STRANGERS_KEPT = 256
+"""Number of programs of others whose name as a reporter is remembered."""
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
 
@@ -43,7 +45,8 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
     """Serve until cancelled. One inbox, so that actions, requests and feedback keep their order."""
     recognition = _Recognition(bus, config)
     patterns = (
-        keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD,
+        keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
+        keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD,
         keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.ROBOT_STATE,
         *RequestDesk.patterns("recognition"),
     )  # fmt: skip
@@ -69,7 +72,9 @@ class _Recognition:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
         self._bad_ids: set[str] = set()
-        self._reporters = Reporters()
+        self._reporters = Reporters(bus.robot, config.report_grace, bus.clock, self._instant)
+        self._strangers: Latest[str, str] = Latest(STRANGERS_KEPT)
+        """Names of reporters whose messages name no participant, by their life."""
         self._clock_errors = ClockErrors(bus.robot)
         session = session_of(bus.run)
         self._recognizer = Recognizer(bus.robot, config, clock=bus.clock, name=f"{session}-", strict=False)
@@ -78,7 +83,7 @@ class _Recognition:
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._recognizer.deadline, self._statistics.deadline)
+        times = (self._recognizer.deadline, self._statistics.deadline, self._reporters.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def begin(self) -> None:
@@ -86,6 +91,7 @@ class _Recognition:
         self._bus.publish(keys.statistics("all"), self._statistics.overall(self._bus.now()))
 
     def advance(self) -> None:
+        self._tell(self._reporters.advance(self._bus.now()))
         self._publish(self._recognizer.advance(self._bus.now()))
 
     def take(self, received: Received) -> None:
@@ -94,13 +100,36 @@ class _Recognition:
         is_unaccepted = request is None and isinstance(observation, RequestEvent | SignalTurn | Cancel)
         if is_unaccepted or not self._is_credible(received):
             return
-        if isinstance(observation, Perceived):
+        now = self._bus.now()
+        self._tell(self._reporters.advance(now))
+        if isinstance(observation, OngoingActions | ActionEvent):
+            name, life = self._reporter(received)
+            self._tell(self._reporters.hear(observation, name, life, now))
+        elif isinstance(observation, PeerAlive | PeerGone):
+            self._tell(self._reporters.feed(observation, now))
+        elif isinstance(observation, Perceived):
             fault = self._feed(observation, self._when(observation, received.at))
             if fault is not None and request is not None and self.desk.is_live(request.id):
                 self.desk.refuse(request.id, fault)
-        if received.key == keys.PERCEIVED_ACTION or isinstance(received.message, PeerGone | PeerAlive):
-            for change in self._reporters.feed(received.message, received.source, self._bus.stamp()):
-                self._feed(change, self._bus.now())
+
+    def _reporter(self, received: Received) -> tuple[str, str]:
+        """Name and life of who tells of actions. The robot's are told by its body, whoever speaks for it."""
+        is_perceived = received.key == keys.PERCEIVED_ACTION
+        name = received.source if is_perceived else keys.reporter_of(received.key) or "control"
+        if received.source:
+            return name, received.life if name == received.source else ""
+        if is_perceived:
+            return self._strangers.get(received.life, ""), ""
+        if received.life and name != "control":
+            self._strangers[received.life] = name
+        return name, ""
+
+    def _tell(self, told: Iterable[Told]) -> None:
+        """Feed what reporters say, or what follows from it."""
+        for observation, at, is_sure in told:
+            if not isinstance(observation, GoesOn):
+                self._note_error(observation.actor, observation.at, at, is_sure=is_sure)
+            self._feed(observation, at)
 
     def _cancel(self, cancel: Cancel) -> None:
         self._feed(cancel, self._bus.now())
@@ -120,9 +149,20 @@ class _Recognition:
                 return actor != self._bus.robot and received.key == keys.head_pose(actor)
             case VoiceActivity(actor=actor):
                 return actor != self._bus.robot and received.key == keys.voice_activity(actor)
+            case OngoingActions(actor=actor):
+                return all(action.actor == actor for action in received.message.actions) and self._may_tell(received)
             case World(people=people):
                 return all(self._has_valid_id(person.id) for person in people)
         return True
+
+    def _may_tell(self, received: Received) -> bool:
+        """True if a state of ongoing actions is on its proper key: that of its actor and its reporter."""
+        assert isinstance(received.message, OngoingActions)
+        actor, reporter = received.message.actor, keys.reporter_of(received.key)
+        if not reporter:
+            return actor == self._bus.robot
+        is_own = received.source in ("", reporter)
+        return is_own and actor != self._bus.robot and received.key == keys.perceived_ongoing(reporter, actor)
 
     def _has_valid_id(self, actor: str) -> bool:
         """True if the id can be in a key; without that there are no events. A bad id is reported once."""
@@ -140,18 +180,27 @@ class _Recognition:
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
                 pass
-            case Cancel() | PeerGone():
+            case Cancel() | GoesOn():
                 stamp = None
             case _:
                 stamp = observation.at
         if stamp is None:
             return arrived
-        now, told = self._bus.now(), self._bus.local(stamp)
-        at = max(min(told, now), now - OLDEST)
+        at = self._instant(stamp)
         if not isinstance(observation, HeadOwner | World):
-            actor = observation.actor if isinstance(observation, OF_ACTORS) else self._bus.robot
-            self._clock_errors.heard(actor, at, inf if at > told else self._bus.error(stamp.clock))
+            actor = observation.actor if isinstance(observation, HeadPose | VoiceActivity) else self._bus.robot
+            self._note_error(actor, stamp, at)
         return at
+
+    def _instant(self, stamp: Stamp) -> Seconds:
+        """Local time of a stamp, at most now and at least `OLDEST` ago."""
+        now, told = self._bus.now(), self._bus.local(stamp)
+        return now if isnan(told) else max(min(told, now), now - OLDEST)
+
+    def _note_error(self, actor: str, stamp: Stamp, at: Seconds, *, is_sure: bool = True) -> None:
+        """Note how wrong an instant may be. actor: of whom it tells. at: local time that it is taken for."""
+        is_sure = is_sure and at <= self._bus.local(stamp)
+        self._clock_errors.heard(actor, at, self._bus.error(stamp.clock) if is_sure else inf)
 
     def _publish(self, results: Iterable[Result]) -> Fault | None:
         """Publish the results. Returns the fault if a bug has shown."""

@@ -74,8 +74,10 @@ class SymbolicReports:
                 if self._reported is not None and not self._lost:
                     yield replace(message, targets=self._reported.targets)
                     self._reported = None
-            case ActorLost() if self._lost:
-                self._lost, self._reported = False, None  # this was reported when the face was lost
+            case ActorLost(at=at) if self._lost:
+                if self._reported is not None:
+                    yield ActionEnded(actor=message.actor, action="look", targets=self._reported.targets, at=at)
+                self._lost, self._reported = False, None  # the loss was reported when the face was lost
             case (ActionBegan(action="speak") | ActionEnded(action="speak")) as speech:
                 if self._ear.hear(speech):
                     yield speech

@@ -10,6 +10,7 @@ from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Subscription
+from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
 from engage_hri.services.simulation.attentive import AttentiveHuman
@@ -30,6 +31,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     human = _human(config, bus.robot, random.Random(config.seed))
     person = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
     cameras = Cameras(person, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
+    perceived = PerceivedActions(bus)
     with bus.subscribe(
         keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
         *([keys.ROBOT_MOTION] if config.perception == "raw" else []),
@@ -44,8 +46,10 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
             now = bus.now()
             if received is not None:
                 cameras.feed(received.message, now)
-            for message in cameras.advance(now):
+            reports = list(cameras.advance(now))
+            for message in reports:
                 bus.publish(_key(message), message)
+            perceived.follow(reports)
 
 
 def _key(message: Message) -> str:

@@ -15,6 +15,7 @@ from engage_hri.schemas.units import FARTHEST, Stamp
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.config import SimulationConfig
@@ -42,8 +43,8 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
     with bus.subscribe(keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK) as inbox:
         ready()
         bus.publish(keys.WORLD, msgspec.structs.replace(world, at=bus.stamp()))
-        for person in world.people:
-            bus.publish(keys.PERCEIVED_ACTION, ActorFound(actor=person.id, at=bus.stamp()))
+        perceived = PerceivedActions(bus)
+        perceived.tell(*(ActorFound(actor=person.id, at=bus.stamp()) for person in world.people))
         if not (is_attentive and world.people):
             await asyncio.get_running_loop().create_future()
         sees = frozenset(entity.id for entity in world.objects)
@@ -55,8 +56,7 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
             if received is not None:
                 human.feed(received.message, bus.now())
             while acts := human.due(bus.now()):
-                for message in body.does(acts[0], bus.stamp()):
-                    bus.publish(keys.PERCEIVED_ACTION, message)
+                perceived.tell(*body.does(acts[0], bus.stamp()))
                 human.schedule(acts[1:], bus.now() + (acts[0].seconds if isinstance(acts[0], Pause) else 0.0))
 
 

@@ -6,10 +6,12 @@ from itertools import pairwise
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gaze, Pointing
+from engage_hri.schemas.actions import OngoingActions
+from engage_hri.schemas.behaviors import Gaze, GazeShift, Pointing, Speech
 from engage_hri.schemas.body import RobotState
 from engage_hri.services.bus.memory import MemoryHub
 from tests.control.directing import robot
+from tests.ongoing import going_on
 
 POINT = Pointing(id="point-1", target="near-right")
 
@@ -49,3 +51,38 @@ async def test_who_wants_less_hears_what_is_new_and_the_rest_four_times_a_second
         for start, told in zip(began, states, strict=True)
     )
     assert seldom == often
+
+
+async def test_what_the_robot_does_is_there_for_whoever_comes_late(hub: MemoryHub):
+    late = hub.join("late")
+    async with robot(hub) as client:
+        with late.subscribe(keys.ROBOT_ONGOING) as inbox:
+            first = await inbox.next()
+        client.perform(GazeShift(id="g", target="near-right"))
+        speaking = client.perform(Speech(id="s", text="one two three four"))
+        await asyncio.sleep(1.0)
+        with late.subscribe(keys.ROBOT_ONGOING) as inbox:
+            amid = await inbox.next()
+        await client.outcome(speaking)
+        with late.subscribe(keys.ROBOT_ONGOING) as inbox:
+            last = await inbox.next()
+
+    told = [each.message for each in (first, amid, last) if each and isinstance(each.message, OngoingActions)]
+    assert [{(each.action, *each.targets) for each in state.actions} for state in told] == [
+        set(),
+        {("look", "near-right"), ("speak",)},
+        {("look", "near-right")},
+    ]
+    assert all(state.actor == "robot" and state.seen is None for state in told)
+
+
+async def test_each_state_is_what_the_events_before_it_say(hub: MemoryHub):
+    async with robot(hub, hears=(keys.ROBOT_ONGOING,)) as client:
+        for behavior in (Gaze(id="g", target="near-right"), POINT, Gaze(id="g2", target="far-left"), POINT):
+            await client.outcome(client.perform(behavior))
+        heard = list(client.heard)
+
+    states = [at for at, message in enumerate(heard) if isinstance(message, OngoingActions)]
+    assert len(states) > 5
+    for at in states:
+        assert heard[at].actions == going_on(heard[:at], "robot")  # type: ignore[attr-defined]

@@ -9,12 +9,13 @@ The lines at the end say what becomes of every event, in the order in which they
 | step | says |
 |---|---|
 | `1 human +act blue`, `2 human -act blue` | an action begins, ends; last comes its target or its behavior |
+| `5 human ~act blue since=1` | an action goes on that began at 1, which becomes known only now |
 | `1 asks dg blue cause=reference` | the realizer requests an event: `ap`, `dg`, `mfg` or `bc` |
 | `1 cancels 2` | the second request is cancelled |
 | `1 turn ended turn=turn-9` | a turn (turn-1) ended, or `aborted`, `answered`, `repaired` |
 | `1 passes gaze-1:stroke`, `1 block done` | feedback of block-1: a sync point, the end |
 | `1 owner fragment blue` | who has the robot's head, and where |
-| `1 lost human`, `2 found human`, `3 gone control` | a face; a service |
+| `1 lost human`, `2 found human` | a face |
 | `9 time` | nothing happens |
 | `1 asked nod` | the robot asks at 1 for a nod, its turn ends at 2 or `until=4`; `asking`: goes on |
 
@@ -24,7 +25,6 @@ The lines at the end say what becomes of every event, in the order in which they
 from collections.abc import Iterator
 from typing import Any
 
-from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import HUMAN, ROBOT, Log
 from tests.stories import Story, number
@@ -115,9 +115,13 @@ def _take(log: Log, at: float, verb: str, *words: str) -> None:
     match verb:
         case "human" | "robot":
             act, what = plain[0][0], plain[0][1:]
+            since = float(named.get("since", at))
             is_behavior = what == "speak" or ":" in "".join(plain[1:])
             about = {"behavior" if is_behavior else "target": plain[1] if plain[1:] else ""}
-            (log.begins if act == "+" else log.ends)(verb, what, at, **about)  # type: ignore[arg-type]
+            if act == "~":
+                log.goes_on(verb, what, at, since, **about)  # type: ignore[arg-type]
+            else:
+                (log.begins if act == "+" else log.ends)(verb, what, at, **about)  # type: ignore[arg-type]
         case "asks":
             for name in ("accept", "anchors"):
                 named[name] = tuple(filter(None, named.get(name, "").split(",")))
@@ -136,8 +140,6 @@ def _take(log: Log, at: float, verb: str, *words: str) -> None:
             log.owner(plain[0], plain[1].replace("person", HUMAN), at)  # type: ignore[arg-type]
         case "lost" | "found":
             (log.lost if verb == "lost" else log.found)(plain[0], at)
-        case "gone":
-            log.feed(PeerGone(participant=plain[0]), at)
         case "time":
             log.until(at)
         case _:

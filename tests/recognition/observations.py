@@ -12,6 +12,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
+from engage_hri.services.recognition.events.scene import GoesOn
 from engage_hri.services.recognition.events.session import Observation, Session
 
 ROBOT, HUMAN = "robot", "human"
@@ -91,6 +92,11 @@ class Log:
 
     def ends(self, actor: str, action: Action, at: float, target: str = "", behavior: str = "") -> list[Effect]:
         return self.feed(_ended(actor, action, at, target, behavior), at)
+
+    def goes_on(
+        self, actor: str, action: Action, at: float, since: float, target: str = "", behavior: str = ""
+    ) -> list[Effect]:
+        return self.feed(GoesOn(_began(actor, action, since, target, behavior), since), at)
 
     def found(self, actor: str, at: float) -> list[Effect]:
         return self.feed(ActorFound(actor=actor, at=stamp(at)), at)

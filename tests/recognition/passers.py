@@ -15,6 +15,7 @@ from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.perceive.reporters import Reporters
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from engage_hri.services.runtime.ongoing_actions import ActionEvent, OngoingActionTracker
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
 
@@ -31,19 +32,26 @@ class Lobby(Struct):
     recognizer: Recognizer = field(default=None)  # type: ignore[arg-type]
     published: PublishedStatistics = field(default=None)  # type: ignore[arg-type]
     book: OpenEventTracker = field(default=None)  # type: ignore[arg-type]
-    reporters: Reporters = field(default_factory=Reporters)
+    reporters: Reporters = field(default=None)  # type: ignore[arg-type]
+    tracker: OngoingActionTracker = field(default_factory=OngoingActionTracker)
 
     def __post_init__(self) -> None:
         self.recognizer = Recognizer(ROBOT, self.config)
         self.published = PublishedStatistics(ROBOT, self.config)
         self.book = OpenEventTracker(ROBOT, "session")
+        self.reporters = Reporters(ROBOT, self.config.report_grace, "loop", lambda stamp: stamp.seconds)
         self.feed(world("host"), 0.0)
 
     def feed(self, observation: Perceived, at: Seconds) -> None:
         while (due := self._deadline) is not None and due < at:
             self._tell(self.recognizer.advance(due), due)
-        self._tell(self.recognizer.feed(observation, at, at), at)
-        self.reporters.feed(observation, "cameras", stamp(at))  # type: ignore[arg-type]
+        if not isinstance(observation, ActionEvent):
+            self._tell(self.recognizer.feed(observation, at, at), at)
+            return
+        for said in (observation, *self.tracker.feed([observation], stamp(at))):
+            for told in self.reporters.hear(said, "cameras", "", at):
+                self._tell(self.recognizer.feed(told.observation, told.at, at), at)
+        self.tracker.forget(at)
 
     @property
     def _deadline(self) -> Seconds | None:

@@ -1,6 +1,5 @@
-"""The ends of what the robot does may be lost, with its body or on the way: nothing stays open for that."""
+"""The ends of what the robot does may be lost: nothing stays open for that."""
 
-from engage_hri.schemas.presence import PeerGone
 from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log
 from tests.stories import Story, each
@@ -16,12 +15,6 @@ a gesture whose end is lost ends with its block
     1 human +speak; 1.5 robot +GESTURE block-1:head-1; 2 block done
     human's ap-1: started 1
     human's bc-1: started 1.5, succeeded 1.5, completed 2 lasting 0.5
-
-a body that vanishes has stopped speaking and looking
-    1 human +speak; 2 human -speak; 2.5 robot +speak words; 2.6 robot +look human; 3 human +look robot
-    3.5 gone control; 3.6 time
-    human's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 3.5 lasting 1
-    human's mfg-1: started 3, succeeded 3 after 0, completed 3.5 lasting 0.5 told 3.501
 """
 
 
@@ -54,17 +47,3 @@ def test_the_end_that_comes_after_its_block_changes_nothing():
     log.ends(ROBOT, "speak", 4.6, behavior="block-1:speech-1")
 
     assert log.session.scene.robot_speaks_since == 4.5
-
-
-def test_a_body_that_vanishes_is_silent():
-    log = speaking()
-    log.feed(PeerGone(participant="control"), 3.5)
-
-    assert log.session.scene.robot_speaks_since is None
-
-
-def test_others_who_vanish_are_not_the_body():
-    log = speaking()
-    log.feed(PeerGone(participant="generation"), 3.5)
-
-    assert log.session.scene.robot_speaks_since == 2.5

@@ -192,7 +192,9 @@ async def test_the_death_of_perception_closes_what_is_open_with_the_people_it_re
                 continue
 
     assert received is not None
-    assert (received.message.id, received.message.state, received.at) == ("4-mfg-1", "completed", 1.5)  # type: ignore[union-attr]
+    assert isinstance(received.message, ConnectionEvent)
+    assert (received.message.id, received.message.state, received.message.duration) == ("4-mfg-1", "completed", 1.0)
+    assert received.at == 1.0 + RecognitionConfig().report_grace
 
 
 async def test_a_block_that_ends_stops_the_wait_for_its_anchors(hub: MemoryHub):

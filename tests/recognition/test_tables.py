@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -19,6 +20,7 @@ from engage_hri.services.recognition.events.machine import (
     table,
 )
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
+from engage_hri.services.recognition.perceive import reporters
 
 TABLES = {
     "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,
@@ -150,3 +152,30 @@ def test_bad_configuration_is_refused(setting, value, reason):
 def test_bad_configuration_of_sensing_is_refused(setting, value, reason):
     with pytest.raises(ValueError, match=reason):
         Sensing(**{setting: value})
+
+
+# -- reporters -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("standing", get_args(reporters.Standing))
+def test_the_table_of_reporters_is_total(standing: reporters.Standing):
+    timers: dict[reporters.Standing, reporters.Given] = {"away": "grace_over", "back": "caught_up"}
+    given = {"gone", "alive", "reborn", *([timers[standing]] if standing in timers else [])}
+
+    assert {one for state, one in reporters.TABLE if state == standing} == given
+
+
+def test_the_documentation_shows_the_table_of_reporters_as_it_is():
+    lines = ["stateDiagram-v2", "    [*] --> here"]
+    for (state, given), row in reporters.TABLE.items():
+        lines.append(f"    {state} --> {row.next} : {given}{f' / {row.effect}' if row.effect else ''}")
+
+    assert "\n".join(lines) + "\n" in PAGE.read_text()
+
+
+def test_every_standing_is_left_for_here():
+    for standing in get_args(reporters.Standing):
+        for _ in range(3):
+            standing = reporters.TABLE[standing, "alive"].next
+            standing = reporters.TABLE.get((standing, "caught_up"), reporters.TABLE[standing, "alive"]).next
+        assert standing == "here"

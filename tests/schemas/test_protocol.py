@@ -51,7 +51,8 @@ def test_every_key_is_in_the_table() -> None:
         keys.cancel, keys.keep_alive, keys.request_state, keys.fault, keys.statistics, keys.status, keys.alive,
         keys.head_pose, keys.voice_activity, keys.open_events,
     )  # fmt: skip
-    made = {make("x").replace("*/*", "x/x") for make in makers} | {keys.connection_event("x", "x")}
+    made = {make("x").replace("*/*", "x/x") for make in makers}
+    made |= {keys.connection_event("x", "x"), keys.perceived_ongoing("x", "x")}
 
     assert table == (constants | made) - {keys.PREFIX, keys.EVERYTHING}
 

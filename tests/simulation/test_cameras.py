@@ -41,6 +41,7 @@ from engage_hri.services.simulation.human import (
 from engage_hri.services.simulation.person_at_table import PersonAtTable
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
+from tests.ongoing import going_on, is_seen
 
 FACE_AT = tangram_table().person.face
 EYES: Vector = (0.05, 0.0, 1.17)
@@ -267,6 +268,18 @@ def test_a_lost_face_is_a_lost_actor_who_is_found_looking_where_they_look_by_the
                 open_look = ""
 
     assert len(film.of(ActorLost)) > 5
+
+
+def test_who_leaves_while_the_face_is_lost_looks_nowhere_any_more() -> None:
+    gone_unseen = 0
+    for seed in range(20):
+        film = symbolic(LookAt(FACE), Pause(3.0), Leave(), until=5.0, seed=seed, lost_faces=30.0, lost_for=(0.5, 1.5))
+        messages = film.of(ActionBegan, ActionEnded, ActorFound, ActorLost)
+        gone_unseen += isinstance(messages[-1], ActionEnded)
+
+        assert going_on(messages, "human") == ()
+        assert is_seen(messages, "human") is False
+    assert 0 < gone_unseen < 20
 
 
 def test_a_covered_piece_stays_in_the_world_as_last_seen_with_little_confidence() -> None:

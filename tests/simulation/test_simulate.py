@@ -3,11 +3,13 @@
 import math
 from collections import Counter
 from functools import partial
+from typing import Any
 
+import msgspec
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, OngoingActions
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.world import World
@@ -15,8 +17,9 @@ from engage_hri.services.bus.interface import Bus, Keep
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.appendix_b import MOVE
-from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.config import PerceptionFaults, SimulationConfig
 from engage_hri.services.simulation.service import simulate
+from tests.ongoing import going_on, is_seen
 
 QUICK = SimulationConfig(await_participants=(), entrance=1.0, jitter=0.0)
 
@@ -133,3 +136,27 @@ async def test_raw_perception_comes_on_its_own_keys_in_place_of_actions(hub: Mem
 
     assert seen.keys() == {keys.head_pose("human"), keys.voice_activity("human")}
     assert seen[keys.head_pose("human")] == pytest.approx((10.0 - 1.8) * 15, abs=2)
+
+
+@pytest.mark.parametrize("faults", [{}, {"lost_faces": 30.0, "lost_for": (0.3, 3.0), "missed_look": 0.2}])
+async def test_what_the_person_does_is_told_as_a_state_after_each_event(
+    hub: MemoryHub, faults: dict[str, Any]
+) -> None:
+    config = msgspec.structs.replace(QUICK, human="stochastic", faults=PerceptionFaults(**faults))
+    state_key = keys.perceived_ongoing("simulation", "human")
+    bus, told = hub.join("test"), []
+    async with running(hub, {"simulation": partial(simulate, config=config)}):
+        with bus.subscribe(keys.PERCEIVED_ACTION, state_key) as inbox:
+            while (received := await inbox.next(120.0)) is not None:
+                told.append(received.message)
+        with hub.join("late").subscribe(state_key) as inbox:
+            last = await inbox.next()
+
+    states = [at for at, message in enumerate(told) if isinstance(message, OngoingActions)]
+    assert states
+    for at in states:
+        assert told[at].actions == going_on(told[:at], "human")  # type: ignore[union-attr]
+        assert told[at].seen == is_seen(told[:at], "human")  # type: ignore[union-attr]
+    assert isinstance(told[-1], OngoingActions), "each event is followed by a state"
+    assert last is not None
+    assert last.message == told[-1]

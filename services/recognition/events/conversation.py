@@ -111,6 +111,18 @@ class Conversation:
         self.acts_since = None
         self.pair.ends("act", at, by_robot=False)
 
+    def goes_on(self, action: Action, since: Seconds, confidence: Probability) -> None:
+        """Take an action of the person that goes on, known only now. It may be the answer, or more of a turn."""
+        if action == "speak" and self.speaks_since is None:
+            self.speaks_since, self.silent_since = since, None
+            self._scene.speaks(self.id)
+        elif action == "act":
+            self.acts_since = since
+        if self.pair.event is None or since < self.pair.event.started:
+            return
+        if not self.pair.human_begins(action, since, confidence) and action in ("speak", "act"):
+            self.pair.human_goes_on(action, since)
+
     def _human_turn(self, at: Seconds, action: Action, confidence: Probability) -> None:
         """Take speech that is no backchannel, or a manipulation: an answer, more of a turn, or a first turn."""
         pair = self.pair
@@ -149,6 +161,13 @@ class Conversation:
             self.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
             self.robot_backchannel.gestures(self._backchannel(self.id, self._scene.robot, at))
+
+    def robot_goes_on(self, action: Action, since: Seconds) -> None:
+        """Take speech or a gesture of the robot that goes on, known only now. It may be the answer."""
+        if action == "speak":
+            self.pair.robot_heard(None)
+        if self.pair.event is not None and since >= self.pair.event.started:
+            self.pair.robot_begins(action, since)
 
     def robot_gesture_ends(self, action: Action, at: Seconds) -> None:
         if self.robot_backchannel.state == BRIEF and action != "point":

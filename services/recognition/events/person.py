@@ -30,10 +30,11 @@ class _Directed(NamedTuple):
 
 
 class _Doing(NamedTuple):
-    """An action that a person performs: its targets and its start."""
+    """An action that a person performs. until: time at which it is over if no report of its end has come."""
 
     targets: tuple[str, ...]
     since: Seconds
+    until: Seconds
 
 
 class Person:
@@ -65,7 +66,7 @@ class Person:
         times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
         times += self.conversation.deadlines
         times += [one.deadline for one in self.directed]
-        times += [one.since + self._longest(action) for action, one in self._doing.items()]
+        times += [one.until for one in self._doing.values()]
         return min([at for at in times if at is not None], default=None)
 
     @property
@@ -77,9 +78,7 @@ class Person:
         yield self.facial.deadline, self.facial.expire
         yield from self.conversation.timed_steps
         yield self._look_directs_at, self._look_directs
-        yield from (
-            (one.since + self._longest(action), self._goes_on_too_long) for action, one in self._doing.items()
-        )
+        yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
 
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`, the deadline."""
@@ -120,7 +119,7 @@ class Person:
             if at < self._doing[action].since:
                 return
             self._stops(action, at)  # its end has been lost
-        self._doing[action] = _Doing(targets, at)
+        self._doing[action] = _Doing(targets, at, at + self._longest(action))
         match action:
             case "point":
                 self.points(targets, at, confidence)
@@ -131,6 +130,25 @@ class Person:
             case "act":
                 self._scene.acting.add(self.id)
                 self.conversation.manipulates(at, confidence)
+
+    def goes_on(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
+        """Take an action that goes on, known only now: it answers what waits for it, and begins nothing itself."""
+        if not self.presence.seen(at):
+            return
+        self.history.is_new(began, since)  # its beginning is no news any more
+        action, targets = began.action, began.targets
+        if action == "look":
+            if self.gaze.targets and since < self.gaze.since:
+                return  # there is a newer one
+            since = max(since, self.gaze.since)
+            if self.gaze.begin(targets, since, began.confidence):
+                self.gaze.spent = True
+                self.gaze_changed(since)
+        elif action not in self._doing:
+            self._doing[action] = _Doing(targets, since, at + self._longest(action))
+            if action == "act":
+                self._scene.acting.add(self.id)
+            self.conversation.goes_on(action, since, began.confidence)
 
     def ends(self, ended: ActionEnded, at: Seconds) -> None:
         if not self.history.is_new(ended, at):
@@ -163,7 +181,7 @@ class Person:
 
     def _goes_on_too_long(self, at: Seconds) -> None:
         """End actions with a lost end and no later beginning."""
-        for action in [action for action, one in self._doing.items() if one.since + self._longest(action) <= at]:
+        for action in [action for action, one in self._doing.items() if one.until <= at]:
             self._stops(action, at)
 
     # -- gaze ---------------------------------------------------------------------------------------------------

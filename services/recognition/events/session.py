@@ -17,7 +17,6 @@ from engage_hri.schemas.behaviors import Action, Event
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
-from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
@@ -28,11 +27,11 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Person
-from engage_hri.services.recognition.events.scene import Covered, SessionScene
+from engage_hri.services.recognition.events.scene import Covered, GoesOn, SessionScene
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
-    | SyncPointProgress | BlockProgress | HeadOwner | World | PeerGone | RobotState
+    | GoesOn | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
 )  # fmt: skip
 TURNS_KEPT = 64
 """Number of ended turns that are remembered, for a pair announced after the end of its turn; aborted ones too."""
@@ -121,6 +120,10 @@ class Session:
                 self._people.observe(actor, at, lambda person: person.begins(observation, at))
             case ActionEnded(actor=actor) if actor in self.persons:
                 self._people.observe(actor, at, lambda person: person.ends(observation, at))
+            case GoesOn(began=ActionBegan(actor=self.robot)):
+                self._robot_goes_on(observation.began, observation.since, at)
+            case GoesOn(began=began, since=since):
+                self._people.observe(began.actor, at, lambda person: person.goes_on(began, since, at))
             case ActorFound(actor=actor) if actor != self.robot:
                 self._people.observe(actor, at, lambda person: person.presence.found(at))
             case ActorLost(actor=actor) if actor in self.persons:
@@ -140,9 +143,6 @@ class Session:
                 self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
             case RobotState(speaking=said):
                 self._robot_is_heard(bool(said), at)
-            case PeerGone(participant="control"):
-                self._robot_stops(at)
-                self.scene.gaze.end((), at)
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
                 self._people.apply_to_all(at, lambda person: person.head_owner_changed(at))
@@ -185,6 +185,23 @@ class Session:
             case "nod" | "shake" | "point":
                 self._robot_actions[began.behavior, began.action] = began
                 self._people.apply_to_all(at, lambda person: person.conversation.robot_gestures(began.action, at))
+
+    def _robot_goes_on(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
+        """Take an action of the robot that goes on: it answers a person who waits, and begins nothing else."""
+        self._history.is_new(began, since)  # its beginning is no news any more
+        if began.action == "look":
+            if self.scene.gaze.targets and since < self.scene.gaze.since:
+                return  # there is a newer one
+            since = max(since, self.scene.gaze.since)
+            if self.scene.gaze.begin(began.targets, since):
+                self._robot_gaze_changed(since)
+            return
+        self._robot_actions[began.behavior, began.action] = began
+        if began.action == "speak" and self.scene.robot_speaks_since is None:
+            self._heard_at = None
+            self.scene.robot_speaks_since = since
+            self.scene.speaks(self.robot)
+        self._people.apply_to_all(at, lambda person: person.conversation.robot_goes_on(began.action, since))
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
         if not self._history.is_new(ended, at):

@@ -1,68 +1,268 @@
-"""Participants that report what people do: when one vanishes from the bus, its people are lost with it."""
+"""Participants that report what people, or the robot, do: what they say holds as long as they are there. Pure.
 
-from msgspec.structs import replace
+A reporter tells changes as events, and may tell as a state what goes on. An event that was missed shows in the state.
+When the reporter vanishes from the bus, mostly its link is gone and not itself: what it said holds for a grace. If it
+stays away, all of that has ended when it went; so it has if the reporter comes back as another life. The same life
+goes on with what it said.
+"""
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.messages import Message
+from collections import deque
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.recognition.perceive.reports import Report, Told
+from engage_hri.services.runtime.ongoing_actions import ActionEvent
 
-_Going = dict[tuple[str, tuple[str, ...]], ActionBegan]
-"""What a person does, by action and targets; a look has no targets here, for a new one ends the last."""
+OLDEST: Seconds = 60.0
+"""Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
+CATCH_UP: Seconds = 0.5
+"""Time from the return of a reporter until what it said before goes on: what it has said meanwhile comes first."""
+LATER: Seconds = 1e-6
+"""Distance of what is told late, and so cannot have its own time any more."""
+FORMER = 8
+"""Number of lives of a reporter that are remembered, as what they said may come late."""
+
+Standing = Literal["here", "away", "silenced", "back"]
+"""`away`: gone, but what it said holds. `silenced`: that has ended. `back`: there again, and catching up."""
+Given = Literal["gone", "alive", "reborn", "grace_over", "caught_up"]
+Effect = Literal["", "end", "resume"]
+"""`end`: all that the reporter said ends. `resume`: it goes on, whatever was assumed meanwhile."""
+
+
+class Row(NamedTuple):
+    """A transition of a reporter's standing. reborn: the reporter is there as another life."""
+
+    next: Standing
+    effect: Effect = ""
+
+
+TABLE: dict[tuple[Standing, Given], Row] = {
+    ("here", "gone"): Row("away"),
+    ("here", "alive"): Row("here"),
+    ("here", "reborn"): Row("here", "end"),
+    ("away", "gone"): Row("away"),
+    ("away", "alive"): Row("back"),
+    ("away", "reborn"): Row("here", "end"),
+    ("away", "grace_over"): Row("silenced", "end"),
+    ("silenced", "gone"): Row("silenced"),
+    ("silenced", "alive"): Row("back"),
+    ("silenced", "reborn"): Row("here"),
+    ("back", "gone"): Row("away", "resume"),
+    ("back", "alive"): Row("back"),
+    ("back", "reborn"): Row("here", "end"),
+    ("back", "caught_up"): Row("here", "resume"),
+}
+"""Every standing has a row for each input that can come then: the two timers run in one standing each."""
+
+
+class _Reporter:
+    """One participant. since: time at which its standing last changed. run: its life; empty: unknown.
+
+    is_alive: its token is there. floor: time before which nothing can be told of its actors any more: the session has
+    been told what was assumed. former: its lives that have gone; what they said may come late.
+    """
+
+    def __init__(self, now: Seconds) -> None:
+        self.is_alive = False
+        self.standing: Standing = "here"
+        self.since = now
+        self.run = ""
+        self.former: deque[str] = deque(maxlen=FORMER)
+        self.reports: dict[str, Report] = {}
+        self.floor = float("-inf")
 
 
 class Reporters:
-    """The people that each participant reports, and what they do.
+    """All reporters around `robot`, and what they say.
 
-    They are lost with it. If its life comes back they are found, and go on with what they did: it says once that an
-    action has begun, and what has ended meanwhile it says after that.
+    grace: time for which what one has said holds after it has gone. clock: of local time. instant: local time of a
+    stamp, at most now.
     """
 
-    def __init__(self) -> None:
-        self._reported: dict[str, dict[str, _Going]] = {}
-        self._runs: dict[str, str] = {}
+    def __init__(self, robot: str, grace: Seconds, clock: str, instant: Callable[[Stamp], Seconds]) -> None:
+        self._robot = robot
+        self._grace = grace
+        self._clock = clock
+        self._instant = instant
+        self._reporters: dict[str, _Reporter] = {}
 
-    def feed(self, message: Message, source: str, at: Stamp) -> list[ActorLost | ActorFound | ActionBegan]:
-        """Derive what a message from a reporter, or about its presence, says of its people. at: now."""
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """Time at which `advance` has something to do."""
+        return min((due for one in self._reporters.values() if (due := self._due(one)) is not None), default=None)
+
+    def _due(self, one: _Reporter) -> Seconds | None:
+        match one.standing:
+            case "away":
+                return one.since + self._grace
+            case "back":
+                return one.since + CATCH_UP
+        return None
+
+    def advance(self, now: Seconds) -> list[Told]:
+        told = []
+        for one in self._reporters.values():
+            due = self._due(one)
+            if due is not None and due <= now:
+                told += self._step(one, "grace_over" if one.standing == "away" else "caught_up", now)
+        return told
+
+    # -- presence -----------------------------------------------------------------------------------------------
+
+    def feed(self, message: PeerAlive | PeerGone, now: Seconds) -> list[Told]:
+        """Take the news that a participant has come or gone."""
         match message:
-            case ActionBegan(actor=actor):
-                self._reported.setdefault(source, {}).setdefault(actor, {})[_which(message)] = message
-            case ActionEnded(actor=actor):
-                self._end(message, self._reported.get(source, {}).get(actor, {}))
-            case ActorFound(actor=actor):
-                self._reported.setdefault(source, {}).setdefault(actor, {})
-            case ActorLost(actor=actor):
-                self._discard(actor, source)
-            case PeerGone(participant=name):
-                if name not in self._reported:
-                    self._runs.pop(name, None)
-                return [ActorLost(actor=actor, at=at) for actor in sorted(self._reported.get(name, ()))]
+            case PeerGone(participant=name) if (one := self._reporters.get(name)) is not None:
+                one.is_alive = False
+                told = self._step(one, "gone", now)
+                self._clear(name)
+                return told
             case PeerAlive(participant=name, run=run):
-                before = self._runs.get(name, run)
-                self._runs[name] = run
-                if before != run:
-                    self._reported.pop(name, None)
-                people = sorted(self._reported.get(name, {}).items())
-                going = [replace(begun, at=at) for _, actions in people for begun in actions.values()]
-                return [*(ActorFound(actor=actor, at=at) for actor, _ in people), *going]
+                one = self._reporter(name, now)
+                one.is_alive = True
+                return self._lives(one, run, now) or self._step(one, "alive", now)
         return []
 
-    def _end(self, ended: ActionEnded, going: _Going) -> None:
-        begun = going.get(_which(ended))
-        if begun is not None and begun.targets == ended.targets:
-            del going[_which(ended)]
+    def _reporter(self, name: str, now: Seconds) -> _Reporter:
+        if name not in self._reporters:
+            self._reporters[name] = _Reporter(now)
+        return self._reporters[name]
+
+    def _clear(self, name: str) -> None:
+        """Drop a reporter of which nothing has to be remembered."""
+        if not self._reporters[name].is_alive and not self._reporters[name].reports:
+            del self._reporters[name]
+
+    def _lives(self, one: _Reporter, run: str, now: Seconds) -> list[Told]:
+        """Note the life of a reporter. If it is another one, all that the last one said has ended."""
+        before = one.run
+        if run in ("", before):
+            return []
+        one.run = run
+        if not before:
+            return []
+        if run in one.former:
+            one.former.remove(run)
+        if one.standing != "here":  # else both may be there: that is told only once all of a name have gone
+            one.former.append(before)
+        told = self._step(one, "reborn", now)
+        one.reports.clear()
+        return told
+
+    def _step(self, one: _Reporter, given: Given, now: Seconds) -> list[Told]:
+        row = TABLE[one.standing, given]
+        told: list[Told] = []
+        if row.effect == "end":
+            told = self._end(one, one.since if one.standing == "away" else now)
+        elif row.effect == "resume":
+            told = self._resume(one, now)
+        if row.next != one.standing:
+            one.standing, one.since = row.next, now
+        return told
+
+    def _end(self, one: _Reporter, at: Seconds) -> list[Told]:
+        one.floor = max(one.floor, at)
+        told = []
+        for actor, report in sorted(one.reports.items()):
+            told += self._ends(one, report, at)
+            if actor != self._robot and not any(other.seen for other in self._others(actor, one)):
+                told.append(Told(ActorLost(actor=actor, at=Stamp(self._clock, at)), at, is_sure=False))
+        return told
+
+    def _resume(self, one: _Reporter, now: Seconds) -> list[Told]:
+        one.floor = now
+        told = []
+        for actor, report in sorted(one.reports.items()):
+            if actor != self._robot and report.seen is not False:
+                told.append(Told(ActorFound(actor=actor, at=Stamp(self._clock, now)), now, is_sure=False))
+            told += [Told(action, now) for action in report.going()]
+        return told
+
+    # -- what they say ------------------------------------------------------------------------------------------
+
+    def hear(self, said: ActionEvent | OngoingActions, reporter: str, life: str, now: Seconds) -> list[Told]:
+        """Take what a reporter says. Returns what follows for the recognizer, in order.
+
+        reporter: empty: unknown; nothing holds then for longer than it is told. life: of its process; empty: unknown.
+        """
+        one = self._reporter(reporter, now)
+        told: list[Told] = []
+        if not life or life not in one.former:
+            told += self._lives(one, life, now)
+            more = self._corrected(one, said, now) if isinstance(said, OngoingActions) else self._event(one, said)
+            one.floor = max(one.floor, now - OLDEST)
+            if one.standing != "silenced":
+                told += [self._not_before(one, each) for each in more]
+        if not reporter:
+            one.reports.clear()
+        self._clear(reporter)
+        return told
+
+    def _event(self, one: _Reporter, event: ActionEvent) -> list[Told]:
+        at = self._instant(event.at)
+        if not isinstance(event, ActorLost):
+            self._report(one, event.actor).take(event)
+            return [Told(event, at)]
+        report = one.reports.pop(event.actor, None)
+        if not self._is_seen(event.actor, one):
+            return [Told(event, at)]
+        return [] if report is None else self._ends(one, report, at)
+
+    def _corrected(self, one: _Reporter, state: OngoingActions, now: Seconds) -> list[Told]:
+        known = one.reports.get(state.actor)
+        if known is None and not (state.seen or (state.actions and state.seen is None)):
+            return []
+        told = self._report(one, state.actor).correct(state, now)
+        if state.seen is False and not one.reports[state.actor].actions:
+            del one.reports[state.actor]
+        if self._is_seen(state.actor, one):
+            told = [each for each in told if not isinstance(each.observation, ActorLost)]
+        return told
+
+    def _report(self, one: _Reporter, actor: str) -> Report:
+        if actor not in one.reports:
+            one.reports[actor] = Report(self._instant)
+        return one.reports[actor]
+
+    def _not_before(self, one: _Reporter, told: Told) -> Told:
+        """Put off what is from before a time of which the session has been told what was assumed."""
+        if isinstance(told.observation, ActionBegan | ActionEnded | ActorFound | ActorLost) and told.at <= one.floor:
+            one.floor += LATER
+            return Told(told.observation, one.floor, is_sure=False)
+        return told
+
+    def _ends(self, one: _Reporter, report: Report, at: Seconds) -> list[Told]:
+        """End what a reporter says, but not what another says, too."""
+
+        def is_over(action: ActionBegan) -> bool:
+            return not any(other.says(action) for other in self._others(action.actor, one))
+
+        return [Told(ended, at, is_sure=False) for ended in report.ends(is_over)]
+
+    def _is_seen(self, actor: str, one: _Reporter) -> bool:
+        """Tell whether another reporter, which is there, sees this person."""
+        return any(report.seen for report in self._others(actor, one, alive=True))
+
+    def _others(self, actor: str, one: _Reporter, *, alive: bool = False) -> list[Report]:
+        """List what others say, as it holds. alive: only of those that are there now.
+
+        Of a program without a token nobody can tell whether it is there: it does not count.
+        """
+        return [
+            other.reports[actor]
+            for other in self._reporters.values()
+            if other is not one
+            and (other.is_alive or (other.standing == "away" and not alive))
+            and actor in other.reports
+        ]
 
     def forget(self, actor: str) -> None:
         """Drop a person who has been gone for long from all reporters."""
-        for source in list(self._reported):
-            self._discard(actor, source)
-
-    def _discard(self, actor: str, source: str) -> None:
-        reported = self._reported.get(source, {})
-        reported.pop(actor, None)
-        if not reported:
-            self._reported.pop(source, None)
-
-
-def _which(message: ActionBegan | ActionEnded) -> tuple[str, tuple[str, ...]]:
-    return message.action, () if message.action == "look" else message.targets
+        for name, one in tuple(self._reporters.items()):
+            one.reports.pop(actor, None)
+            self._clear(name)

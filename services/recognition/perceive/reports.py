@@ -1,0 +1,116 @@
+"""Report of one actor by one reporter: what goes on, and what a state shows to have been missed. Pure."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.recognition.events.interrupted_looks import Symbolic
+from engage_hri.services.recognition.events.scene import GoesOn
+from engage_hri.services.runtime.ongoing_actions import Ongoing, which
+
+
+class Told(NamedTuple):
+    """An observation for the recognizer, and its local time. is_sure: False: that time is the latest possible."""
+
+    observation: Symbolic | GoesOn
+    at: Seconds
+    is_sure: bool = True
+
+
+class Report:
+    """The report of one actor by one reporter. local: converts stamps to local time."""
+
+    def __init__(self, local: Callable[[Stamp], Seconds]) -> None:
+        self._local = local
+        self._ongoing = Ongoing()
+        self._found: Seconds | None = None
+        """Time at which the person was last found."""
+        self._latest: Stamp | None = None
+        """Time of the newest event."""
+
+    @property
+    def actions(self) -> tuple[ActionBegan, ...]:
+        return self._ongoing.actions
+
+    @property
+    def seen(self) -> bool | None:
+        return self._ongoing.seen
+
+    def says(self, action: ActionBegan) -> bool:
+        """Tell whether the same goes on, with the same targets."""
+        known = self._ongoing.get(action)
+        return known is not None and known.targets == action.targets
+
+    def take(self, event: ActionBegan | ActionEnded | ActorFound) -> None:
+        """Take an event, which is told as it is."""
+        self._ongoing.take(event)
+        if isinstance(event, ActorFound):
+            self._found = self._local(event.at)
+        if self._latest is None or not _is_before(event.at, self._latest):
+            self._latest = event.at
+
+    def correct(self, state: OngoingActions, now: Seconds) -> list[Told]:
+        """Take a state. Returns what it shows to have been missed, in order; mostly nothing.
+
+        What has ended meanwhile has ended when something else of its kind began, or else by the state's last change.
+        One that is older than an event has been overtaken.
+        """
+        if self._latest is not None and _is_before(state.at, self._latest):
+            return []
+        at = self._local(state.at)
+        told = [Told(ended, when, is_sure=False) for ended, when in self._ended(state, at)]
+        was_seen, self._ongoing.seen = self.seen, state.seen
+        if state.seen and not was_seen:
+            self._found = at
+            told.append(Told(ActorFound(actor=state.actor, at=state.at), at, is_sure=False))
+        if state.seen is False:
+            # Of somebody who is lost nothing new is believed.
+            self._ongoing.become(action for action in state.actions if self.says(action))
+            lost = Told(ActorLost(actor=state.actor, at=state.at), at, is_sure=False)
+            return [*told, lost] if was_seen else told
+        missed = [action for action in state.actions if not self._knows(action)]
+        self._ongoing.become(state.actions)
+        return told + [self._begun(action, now) for action in missed]
+
+    def _knows(self, action: ActionBegan) -> bool:
+        known = self._ongoing.get(action)
+        return known is not None and (known.targets, known.at) == (action.targets, action.at)
+
+    def _ended(self, state: OngoingActions, at: Seconds) -> list[tuple[ActionEnded, Seconds]]:
+        """The ends that were missed, each with its time. at: local time of the state."""
+        still = {(which(action), action.targets, action.at) for action in state.actions}
+        ended = []
+        for known in self.actions:
+            if (which(known), known.targets, known.at) not in still:
+                since = self._local(known.at)
+                next_ones = (self._local(each.at) for each in state.actions if each.action == known.action)
+                when = min((other for other in next_ones if since <= other <= at), default=at)
+                ended.append((_end(known), max(when, since)))
+        return sorted(ended, key=lambda one: one[1])
+
+    def _begun(self, action: ActionBegan, now: Seconds) -> Told:
+        """Tell a beginning that was missed, as news only if it is as recent as the history that late readers get."""
+        since = self._local(action.at)
+        is_news = now - since <= keys.HISTORY_MAX_AGE and (self._found is None or since >= self._found)
+        return Told(action, since) if is_news else Told(GoesOn(action, since), now)
+
+    def going(self) -> list[GoesOn]:
+        """List what goes on, for a session that has been told that it had ended."""
+        return [GoesOn(action, self._local(action.at)) for action in self.actions]
+
+    def ends(self, is_over: Callable[[ActionBegan], bool]) -> list[ActionEnded]:
+        """List the ends of what goes on, if `is_over`."""
+        return [_end(action) for action in self.actions if is_over(action)]
+
+
+def _end(began: ActionBegan) -> ActionEnded:
+    return ActionEnded(
+        actor=began.actor, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior
+    )
+
+
+def _is_before(one: Stamp, other: Stamp) -> bool:
+    """Tell whether an instant is certainly before another: only those of one clock compare without error."""
+    return one.clock == other.clock and one.seconds < other.seconds
