@@ -12,7 +12,8 @@ is of another namespace is left out of either, and noted. Text behind a referenc
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
+from functools import cached_property
 from itertools import chain, count
 from typing import Any
 
@@ -22,11 +23,12 @@ from lxml import etree
 from engage_hri.schemas import allowed, vocabulary
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.blocks import Block, Unread
+from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import check
 from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
+from engage_hri.schemas.documents.xml_notes import Notes
 from engage_hri.schemas.documents.xml_source import (
     BML_1_0,
     CORE,
@@ -71,7 +73,7 @@ class _Document:
         self._is_draft = False
         self._behaviors: list[of.Behavior] = []
         self._constraints: list[of.Constraint] = []
-        self._unread: list[Unread] = []
+        self._notes = Notes()
         self.line = source.line(source.root)
 
     def read(self) -> Block | TurnFragment:
@@ -104,7 +106,7 @@ class _Document:
 
     def _content(self, root: etree._Element) -> dict[str, Any]:
         self._walk(root, required=False)
-        content = {"behaviors": self._behaviors, "constraints": self._constraints, "unread": self._unread}
+        content = {"behaviors": self._behaviors, "constraints": self._constraints, "unread": self._notes.told()}
         return {"id": self._id(root), **content}
 
     def _id(self, element: etree._Element) -> str:
@@ -132,8 +134,7 @@ class _Document:
     ) -> None:
         """at: an element, or a line."""
         line = at if isinstance(at, int) else self._source.line(at)
-        message = f"line {line}: {reason}; it is ignored"
-        self._unread.append(Unread(message=message, behavior=behavior, kind=kind))
+        self._notes.add(f"line {line}: {reason}; it is ignored", behavior, kind)
 
     def _note_attributes(
         self, element: etree._Element, behavior: str = "", kind: type[of.Behavior] | None = None
@@ -147,8 +148,9 @@ class _Document:
             elif vocabulary.definition(local, name):
                 ignored.append(name)
             else:
-                known = grammar.known_attributes(local, kind) - plain.keys()
-                self._note(f"<{local}> has no attribute {name!r}{meant(name, known)}", element, behavior)
+                is_full = self._notes.is_full("PARSING_FAILURE")  # What was meant takes time to find.
+                near = "" if is_full else meant(name, grammar.known_attributes(local, kind) - plain.keys())
+                self._note(f"<{local}> has no attribute {name!r}{near}", element, behavior)
         if ignored:
             self._note(vocabulary.ignored(local, ignored), element, behavior, "DEGRADED")
         return timing
@@ -202,11 +204,15 @@ class _Document:
 
     def _after_reference(self, element: etree._Element, words: str, required: bool) -> of.Speech:
         reference, line = element.get("id"), self._source.line(element)
-        taken = {each.get("id") for each in self._source.root.iter()}
         wishes = chain([f"{reference}-text"], (f"{reference}-text-{number}" for number in count(2)))
-        id = next(wish for wish in wishes if wish not in taken)
+        id = next(wish for wish in wishes if wish not in self._ids)
         timing = (of.Timing("start", f"{reference}:end"),)
         return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
+
+    @cached_property
+    def _ids(self) -> Set[str | None]:
+        """Ids that the author has given."""
+        return {each.get("id") for each in self._source.root.iter()}
 
     def _unknown(self, element: etree._Element, name: str, required: bool, **said: str) -> of.Unknown:
         is_required = required or fields(attributes(element)).get("required")

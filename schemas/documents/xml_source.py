@@ -49,6 +49,9 @@ _ADVICE = {
 _DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 _ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
 """Encodings in which a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
+_ROOT_ID = re.compile(rb"<(?:[\w.-]+:)?e?bml\s[^<>]*?\bid\s*=\s*[\"']([^\"'<>&]+)[\"']")
+"""Id of the document, near its beginning."""
+_NEAR = 4096
 _DOCTYPE = re.compile(r"\A\ufeff?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _TAGS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)", re.DOTALL)
 
@@ -175,6 +178,12 @@ class Source:
             depth += 1 if event == "start" else -1
             if depth > DEEPEST:
                 raise self.refusal(f"nested deeper than {DEEPEST} levels", element, advice="unnest it")
+
+
+def id_of(data: bytes) -> str | None:
+    """Find the id of a document without parsing it; None if it is not near the beginning."""
+    found = _ROOT_ID.search(data[:_NEAR])
+    return found[1].decode(errors="replace") if found else None
 
 
 def _parser() -> etree.XMLParser:

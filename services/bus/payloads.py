@@ -8,8 +8,10 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_source import id_of
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.limits import LARGEST_XML_SENT
 from engage_hri.schemas.messages import Message, decode
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
@@ -21,7 +23,7 @@ LOCAL = (PeerAlive, PeerGone, Unreadable)
 def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Message:
     """Decode the message that another program sent, in any encoding. Raises InputRefused.
 
-    XML holds a block or a fragment; it becomes a request with the same id.
+    XML holds a block or a fragment; it becomes a request with the same id. It may have `LARGEST_XML_SENT` bytes.
     """
     if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
         message = decode(payload, encoding)
@@ -29,6 +31,10 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
             reason = f"{type(message).__name__} is what each bus makes for its own subscribers; it is never sent"
             raise InputRefused(Fault(reason=reason))
         return message
+    if len(payload) > LARGEST_XML_SENT:
+        reason = f"{len(payload)} bytes of XML; at most {LARGEST_XML_SENT} are read on the bus"
+        advice = "split it into several, or send it as JSON or MessagePack, as `engage play` and the client do"
+        raise InputRefused(Fault(reason=reason, where=key, advice=advice), id_of(payload))
     thing = decode_xml(payload, key)
     requester = keys.requester_of(key) or source
     if isinstance(thing, Block):

@@ -4,6 +4,7 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from select import PIPE_BUF, select
 from typing import Annotated
 
 import typer
@@ -47,11 +48,17 @@ def main(options: Options) -> int:
     return DONE
 
 
+def _without_waiting(data: bytes) -> int | None:
+    """Write to standard output if its reader takes it: one who stops reading must not stop the router."""
+    # That of Python at this moment: with keys Zenoh's log goes where it went at first.
+    output = beneath(sys.stdout)
+    return output.write(data[:PIPE_BUF]) if select([], [output.fileno()], [], 0)[1] else None
+
+
 async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
 
-    # Python's standard output of each moment: with keys it is Zenoh's log that goes where it went at first.
-    told = Patient("standard output", lambda data: beneath(sys.stdout).write(data), LOG.warning)
+    told = Patient("standard output", _without_waiting, LOG.warning)
 
     def tell(line: str) -> None:
         told.write(f"{line}\n")

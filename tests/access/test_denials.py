@@ -1,8 +1,6 @@
 """What a router tells of Zenoh's log: what was refused, and nothing that was not."""
 
-import os
-
-from engage_hri.services.bus.zenoh.denials import MOST, Denials, Unhurried
+from engage_hri.services.bus.zenoh.denials import MOST, Denials
 
 TRACE = "\x1b[2m2026-11-22T22:21:26.150311Z\x1b[0m \x1b[35mTRACE\x1b[0m  rx-0 ThreadId({}) \x1b[2mzenoh::net::routing::interceptor::access_control\x1b[0m: {}"  # noqa: E501
 BOB = "107387840e15874f6e7b603029be66a0 on Interface(lo)+CertCommonName(robot/manager/bob)+Transport(Tls)+1073"
@@ -91,28 +89,6 @@ def test_a_flood_of_one_does_not_hide_another() -> None:
     assert (
         told(*flood, checked("Put").replace("bob", "alice"))[-1] == f"denied: robot/manager/alice may not put {KEY}"
     )
-
-
-def test_one_who_does_not_read_holds_nothing_up() -> None:
-    reading, writing = os.pipe()
-    said: list[str] = []
-
-    def tell(line: str) -> None:
-        said.append(line)
-        os.write(writing, b"x" * 4096)
-
-    try:
-        unhurried = Unhurried(tell, writing)
-        for number in range(1000):  # more than a pipe holds
-            unhurried(str(number))
-        lost = 1000 - len(said)
-        assert 0 < lost < 1000
-        os.read(reading, 2**20)
-        unhurried("again")
-        assert said[-1] == f"again ({lost} lines before it are lost: nobody read)"
-    finally:
-        os.close(reading)
-        os.close(writing)
 
 
 def test_other_errors_of_zenoh_are_passed_on() -> None:

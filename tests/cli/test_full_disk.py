@@ -16,6 +16,7 @@ from engage_hri.schemas.faults import RunFailed
 from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.patient import Patient, complain
+from engage_hri.services.commandline.router import _without_waiting
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage, start
 from tests.cli.test_processes import PATIENCE, line
@@ -119,6 +120,28 @@ def test_what_a_robot_prints_may_find_no_room(monkeypatch: pytest.MonkeyPatch) -
             console.print(name)
         with pytest.raises(RunFailed, match="standard output: 2 lines are lost"):
             outputs.__exit__(None, None, None)
+
+
+def test_a_router_waits_for_no_reader(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    reading, writing = os.pipe()
+    with open(reading, "rb", buffering=0) as reader, open(writing, "w") as output:
+        monkeypatch.setattr(sys, "stdout", output)
+        lines = Patient("standard output", _without_waiting, told.append)
+        for number in range(1000):  # more than a pipe holds
+            lines.write(f"{number:9999}\n" if number < 3 else f"{number:100}\n")
+        written = reader.read(2**20)
+        lines.write("again\n")
+        written += reader.read(2**20)
+
+    kept = [int(line) for line in written.split(b"\n")[:-2]]
+    assert kept == list(range(len(kept)))
+    assert written.endswith(b"\nagain\n")
+    assert lines.lost == 1000 - len(kept) > 0
+    assert told == [
+        "standard output: cannot write: nobody reads; lines are lost until there is room",
+        f"standard output is written again; {lines.lost} lines are lost",
+    ]
 
 
 @has_full

@@ -6,7 +6,9 @@ import msgspec
 import pytest
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.limits import LARGEST_XML_SENT
 from engage_hri.schemas.requests import Refused
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.config import Config
@@ -54,6 +56,32 @@ async def test_a_bad_block_with_an_id_is_refused_by_it_and_warned_of_once(conten
     assert (refused.id, refused.fault.line) == ("b", 2)
     assert (warning.block, warning.kind) == ("b", "PARSING_FAILURE")
     assert "line 2" in warning.message
+
+
+@pytest.mark.parametrize(
+    "spelled", ['<bml id="b">', "<?xml version='1.0'?>\n<!-- x --> <b:bml\n xmlns:b='u' id = 'b'>"]
+)
+async def test_xml_that_is_too_long_to_be_read_in_time_is_refused_unread_and_by_its_name(spelled: str) -> None:
+    """It is not even parsed: what it holds is no XML."""
+    payload = spelled.encode() + b"<" * LARGEST_XML_SENT
+    said = await _said_of(payload, "application/xml")
+
+    (refused,) = [each for each in said if isinstance(each, Refused)]
+    (warning,) = [each for each in said if isinstance(each, WarningFeedback)]
+    assert refused.id == warning.block == "b"
+    assert refused.fault.reason == f"{len(payload)} bytes of XML; at most {LARGEST_XML_SENT} are read on the bus"
+    assert "JSON" in refused.fault.advice
+
+
+async def test_the_same_block_may_come_as_json() -> None:
+    behaviors = [_wait(f"wait-{number}", duration=0.0) for number in range(1500)]
+    request = {"type": "perform_block", "id": "r", "requester": "me", "block": {"id": "b", "behaviors": behaviors}}
+    payload = msgspec.json.encode(request)
+    assert len(payload) > LARGEST_XML_SENT
+    said = await _said_of(payload, "application/json;engage.PerformBlock/1")
+
+    (outcome,) = [each for each in said if isinstance(each, BlockOutcome)]
+    assert outcome.status == "done"
 
 
 def _wait(id: str, **fields: object) -> dict[str, object]:

@@ -8,8 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.blocks import Unread
+from engage_hri.schemas.documents import xml_decode
 from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_notes import MOST
 from engage_hri.schemas.faults import InputRefused
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
 
@@ -129,6 +132,28 @@ def mutated(draw: st.DrawFn) -> bytes:
 def test_no_other_exception_ever_leaves_the_decoder(data: bytes) -> None:
     with suppress(InputRefused):
         decode_xml(data)
+
+
+def test_of_many_unknown_attributes_some_are_told_and_the_rest_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To find what was meant takes time for each: 200 kB held the realizer for a second and more."""
+    searched = list[str]()
+    monkeypatch.setattr(xml_decode, "meant", lambda name, known: searched.append(name) or "")
+    attributes = " ".join(f'a{number}=""' for number in range(90))
+    unread = block("".join(f'<gaze id="g{number}" target="t" {attributes}/>' for number in range(50))).unread
+
+    assert len(searched) == len(unread) - 1 == MOST
+    assert unread[-1] == Unread(message=f"{50 * 90 - MOST} more parts are ignored")
+
+
+def test_one_part_more_is_one_part() -> None:
+    attributes = " ".join(f'a{number}=""' for number in range(MOST // 2))
+    half = f'<gaze id="%s" target="t" {attributes}/>'
+    exactly, more = block(half % "g" + half % "h").unread, block(half % "g" + half % "h" + "<wink/>" * 2).unread
+    too_many = block(half % "g" + half % "h" + '<gaze id="i" target="t" x=""/>').unread
+
+    assert len(exactly) == MOST
+    assert [each.kind for each in more[MOST:]] == ["BEHAVIOR_TYPE_NOT_SUPPORTED"] * 2
+    assert too_many[MOST:] == (Unread(message="1 more part is ignored"),)
 
 
 def test_an_encoding_that_nobody_knows_is_refused_by_its_name() -> None:

@@ -11,7 +11,6 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from select import select
 
 import zenoh
 
@@ -118,31 +117,11 @@ class Denials:
             self._tell(f"{news} ({times} times)")
 
 
-class Unhurried:
-    """Teller that never waits for a reader: one who stops reading the router's lines must not stop the router.
-
-    file: where `tell` writes to.
-    """
-
-    def __init__(self, tell: Callable[[str], None], file: int) -> None:
-        self._tell = tell
-        self._file = file
-        self._lost = 0
-
-    def __call__(self, line: str) -> None:
-        if not select([], [self._file], [], 0)[1]:
-            self._lost += 1
-            return
-        lost, self._lost = self._lost, 0
-        self._tell(f"{line} ({lost} lines before it are lost: nobody read)" if lost else line)
-
-
 @contextmanager
-def telling_denials(tell: Callable[[str], None]) -> Iterator[Callable[[str], None]]:
+def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
     """Tell what is refused while the body of `with` runs; Zenoh sessions are opened in it. Once in a process.
 
-    Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. Gives a `tell` that
-    waits for no reader.
+    Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. tell: waits for no reader.
     """
     loop, rest = asyncio.get_running_loop(), b""
     coming, going = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
@@ -161,8 +140,7 @@ def telling_denials(tell: Callable[[str], None]) -> Iterator[Callable[[str], Non
 
     before, kept = sys.stdout, os.dup(1)
     before.flush()
-    unhurried = Unhurried(tell, kept)
-    denials = Denials(unhurried)
+    denials = Denials(tell)
     levels = os.environ.get("RUST_LOG")
     os.environ["RUST_LOG"] = LEVELS
     zenoh.init_log_from_env_or(LEVELS)
@@ -174,7 +152,7 @@ def telling_denials(tell: Callable[[str], None]) -> Iterator[Callable[[str], Non
     sys.stdout = open(kept, "w", closefd=False)  # noqa: SIM115 - closed below
     loop.add_reader(coming, read)
     try:
-        yield unhurried
+        yield
     finally:
         loop.remove_reader(coming)
         os.dup2(kept, 1)

@@ -24,15 +24,15 @@ async def routing(
     """Route while the body of `async with` runs.
 
     listen: endpoints at which others connect. connect: other routers. tell: called with a line for each participant
-    that comes or goes, and for what is refused. keys_of_router: the router lets in only those that its keys name, and
-    passes on only what the table of access allows them. Raises InputRefused when an endpoint is misspelled or does
-    not go with the keys, RunFailed when one is taken.
+    that comes or goes, and for what is refused; it waits for no reader. keys_of_router: the router lets in only those
+    that its keys name, and passes on only what the table of access allows them. Raises InputRefused when an endpoint
+    is misspelled or does not go with the keys, RunFailed when one is taken.
     """
     with ExitStack() as stack:
         more: dict[str, object] = {}
         if keys_of_router is not None:
             more = _closed(keys_of_router, (*listen, *connect))
-            tell = stack.enter_context(telling_denials(tell))
+            stack.enter_context(telling_denials(tell))
             own = keys_of_router.holder
             stack.enter_context(closing(Expiry(own.common_name, own.until, LOG.warning)))
         async with _passing_on(open_router(connect, listen, more), tell):
