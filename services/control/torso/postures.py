@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import Gaze, Pointing
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.world import World
 from engage_hri.services.control.torso import choreography
@@ -31,10 +32,15 @@ class _Open(Struct, frozen=True):
     asked: Asked
 
 
+def is_brief(item: EstimateItem) -> bool:
+    """True if only the posture is asked, of a motion that can be known without its path."""
+    return item.only == "posture" and isinstance(item.behavior, Gaze | Pointing)
+
+
 def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps[list[Estimate]]:
     """Estimate each motion by itself, as `Torso.estimate` does but for the phases, with pauses.
 
-    torso: one whose clock stands still.
+    torso: one whose clock stands still. items: brief ones.
     """
     questions = _Questions(torso, world)
     told: dict[int, Estimate] = {}
