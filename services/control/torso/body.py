@@ -108,7 +108,7 @@ class SimulatedBody(Body):
         if moving:
             going = Clock(clock.at)
             copy = beside(self._torso, going, world)
-            told |= zip(map(id, moving), rehearsed(copy, going, moving, others), strict=True)
+            told |= zip(map(id, moving), (yield from rehearsed(copy, going, moving, others)), strict=True)
         brief = [item for item in items if is_mine and is_brief(item) and id(item) not in told]
         told |= zip(map(id, brief), (yield from postures(still, brief, world)), strict=True)
         for item in items:

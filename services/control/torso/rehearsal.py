@@ -25,6 +25,7 @@ from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.waiting import EARLY
+from engage_hri.services.runtime.steps import Steps
 
 START, RELEASE, BEGIN = "start", 0, 1
 """Name of the first sync point; and the two kinds of events, in the order in which those of one instant happen."""
@@ -34,6 +35,8 @@ HURRIED: Seconds = 0.0005
 """Seconds by which a point comes too early for a behavior that does not hurry."""
 SAME: Seconds = 0.1
 """Seconds by which a behavior may have begun at another time than who asks says."""
+ELEMENTS, ELEMENTS_OF_A_PART = 128, 16
+"""Elements that an event counts for (see `runtime.steps`), and each behavior under way at it."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
 
@@ -171,8 +174,8 @@ class _Part:
 
 def rehearsed(
     torso: Torso, clock: Clock, items: Sequence[EstimateItem], others: Sequence[EstimateItem] = ()
-) -> tuple[Estimate, ...]:
-    """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made.
+) -> Steps[tuple[Estimate, ...]]:
+    """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made; with pauses.
 
     A pose counts for the parts that none of the others moves before. others: behaviors that move the torso, too, and
     are not told.
@@ -231,6 +234,7 @@ def rehearsed(
             if (due := part.next_due()) is not None and due != awaited.get(each):
                 awaited[each] = due
                 heappush(events, (max(due, clock.at), RELEASE, each, ""))
+        yield ELEMENTS + ELEMENTS_OF_A_PART * len(parts)
     told |= {number: part.told() for number, part in parts.items() if number < count}
     return tuple([told[number] for number in range(count)])
 
