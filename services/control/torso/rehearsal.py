@@ -296,8 +296,8 @@ def _begin(
         )
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
-        _place(torso, item.pose, [part for part in course.parts if part not in moved])
-        course = choreography.plan(behavior, torso.situation(torso.world))
+        if _place(torso, item.pose, [part for part in course.parts if part not in moved]):
+            course = choreography.plan(behavior, torso.situation(torso.world))
     except Impossible:
         return torso.estimate(behavior, None, torso.world)
     estimate = torso.estimate(behavior, None, torso.world)
@@ -352,14 +352,17 @@ def _paced(
     return paced
 
 
-def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> None:
-    """Put parts to rest where `pose` has them, or leave them where they are if it does not say."""
+def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> bool:
+    """Put parts to rest where `pose` has them; they stay where they are if it does not say. True if any is put."""
+    is_put = False
     angles = {joint.joint: joint.angle for joint in pose.joints} if pose is not None else {}
     for part in parts:
         track = torso.tracks[part]
         if part != "nod" and all(joint in angles for joint in track.joints):
             start = resting([angles[joint] for joint in track.joints])
             track.play(Motion(Path(start, (), tracks.LIMITS[part]), torso.clock.time()))
+            is_put = True
+    return is_put
 
 
 def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> None:
