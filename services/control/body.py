@@ -316,7 +316,7 @@ class Body(ABC):
     def rehearse_in_steps(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
     ) -> Steps[Sequence[Estimate]]:
-        """Rehearse as a generator does: at each `yield` other work may get its turn.
+        """Estimate as `rehearse` does, as a generator: at each `yield` other work may get its turn.
 
         Not overridden, behaviors that are each by themselves are estimated one by one. A plan is one step, and so are
         all where `rehearse` is overridden.

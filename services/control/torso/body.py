@@ -37,7 +37,7 @@ from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
-from engage_hri.services.control.torso.postures import postures
+from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire, extended
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
@@ -122,8 +122,8 @@ class SimulatedBody(Body):
         if moving:
             going = Clock(clock.at)
             copy = beside(self._torso, going, world)
-            told |= zip(map(id, moving), rehearsed(copy, going, moving, others), strict=True)
-        brief = [item for item in items if is_mine and item.only == "posture" and id(item) not in told]
+            told |= zip(map(id, moving), (yield from rehearsed(copy, going, moving, others)), strict=True)
+        brief = [item for item in items if is_mine and is_brief(item) and id(item) not in told]
         told |= zip(map(id, brief), (yield from postures(still, brief, world)), strict=True)
         for item in items:
             if id(item) not in told:

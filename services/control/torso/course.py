@@ -1,6 +1,7 @@
 """A behavior worked out for the simulated torso: where its joints go, and its sync points on the way."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 from msgspec import Struct
@@ -89,6 +90,7 @@ def course(
     )  # fmt: skip
 
 
+@cache
 def held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
     """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
     before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
@@ -96,7 +98,8 @@ def held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
     return (*points, CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end"))
 
 
-def held_around_stroke(strokes: Sequence[str] = ()) -> tuple[CoursePoint, ...]:
+@cache
+def held_around_stroke(strokes: tuple[str, ...] = ()) -> tuple[CoursePoint, ...]:
     """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
     number = SYNC_POINTS.index("stroke_end")
     syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])

@@ -96,7 +96,7 @@ def head(behavior: Head, situation: Situation) -> Course:
         (_direction(way, size), []) if path.hold else _swing(way, size, behavior.repetition, path.back, path.again)
     )
     return Course(
-        parts=("nod",), joints=NOD_JOINTS, legs=legs, points=held_around_stroke(strokes), note=found.note,
+        parts=("nod",), joints=NOD_JOINTS, legs=legs, points=held_around_stroke(tuple(strokes)), note=found.note,
         is_resizable=True,
     )  # fmt: skip
 

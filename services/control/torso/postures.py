@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import Gaze, Pointing
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.world import World
 from engage_hri.services.control.torso import choreography
@@ -15,8 +16,8 @@ from engage_hri.services.runtime.steps import Steps, portions
 
 AT_ONCE = 64
 """Motions whose outlines are drawn in one go: about a millisecond."""
-ELEMENTS, OF_A_PATH = 24, 256
-"""Elements that a motion counts for (see `steps`), and one whose path has to be laid."""
+ELEMENTS, OF_AN_OUTLINE, OF_A_PATH = 40, 12, 256
+"""Elements that the planning of a motion counts for (see `runtime.steps`), its outline, and its path."""
 
 State = tuple[tuple[float, ...], tuple[float, ...]]
 """Angles and speeds of joints."""
@@ -31,10 +32,15 @@ class _Open(Struct, frozen=True):
     asked: Asked
 
 
+def is_brief(item: EstimateItem) -> bool:
+    """True if only the posture is asked, of a motion that can be known without its path."""
+    return item.only == "posture" and isinstance(item.behavior, Gaze | Pointing)
+
+
 def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps[list[Estimate]]:
     """Estimate each motion by itself, as `Torso.estimate` does but for the phases, with pauses.
 
-    torso: one whose clock stands still.
+    torso: one whose clock stands still. items: brief ones.
     """
     questions = _Questions(torso, world)
     told: dict[int, Estimate] = {}
@@ -52,7 +58,7 @@ def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps
             if degrees is not None:
                 both = poses(each.course, each.situation.pose)
                 told[each.number] = posture_estimate(items[each.number].behavior, each.course, degrees, both)
-        yield ELEMENTS * len(portion)
+        yield OF_AN_OUTLINE * len(portion)
     for number, item in enumerate(items):
         if number not in told:
             told[number] = torso.estimate(item.behavior, item.pose, world)

@@ -25,6 +25,7 @@ from engage_hri.services.control.torso.path import Path, resting
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.waiting import EARLY
+from engage_hri.services.runtime.steps import Steps
 
 START, RELEASE, BEGIN = "start", 0, 1
 """Name of the first sync point; and the two kinds of events, in the order in which those of one instant happen."""
@@ -34,6 +35,8 @@ HURRIED: Seconds = 0.0005
 """Seconds by which a point comes too early for a behavior that does not hurry."""
 SAME: Seconds = 0.1
 """Seconds by which a behavior may have begun at another time than who asks says."""
+ELEMENTS, ELEMENTS_OF_A_PART = 128, 16
+"""Elements that an event counts for (see `runtime.steps`), and each behavior under way at it."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
 
@@ -171,8 +174,8 @@ class _Part:
 
 def rehearsed(
     torso: Torso, clock: Clock, items: Sequence[EstimateItem], others: Sequence[EstimateItem] = ()
-) -> tuple[Estimate, ...]:
-    """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made.
+) -> Steps[tuple[Estimate, ...]]:
+    """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made; with pauses.
 
     A pose counts for the parts that none of the others moves before. others: behaviors that move the torso, too, and
     are not told.
@@ -231,6 +234,7 @@ def rehearsed(
             if (due := part.next_due()) is not None and due != awaited.get(each):
                 awaited[each] = due
                 heappush(events, (max(due, clock.at), RELEASE, each, ""))
+        yield ELEMENTS + ELEMENTS_OF_A_PART * len(parts)
     told |= {number: part.told() for number, part in parts.items() if number < count}
     return tuple([told[number] for number in range(count)])
 
@@ -292,8 +296,8 @@ def _begin(
         )
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
-        _place(torso, item.pose, [part for part in course.parts if part not in moved])
-        course = choreography.plan(behavior, torso.situation(torso.world))
+        if _place(torso, item.pose, [part for part in course.parts if part not in moved]):
+            course = choreography.plan(behavior, torso.situation(torso.world))
     except Impossible:
         return torso.estimate(behavior, None, torso.world)
     estimate = torso.estimate(behavior, None, torso.world)
@@ -348,14 +352,17 @@ def _paced(
     return paced
 
 
-def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> None:
-    """Put parts to rest where `pose` has them, or leave them where they are if it does not say."""
+def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> bool:
+    """Put parts to rest where `pose` has them; they stay where they are if it does not say. True if any is put."""
+    is_put = False
     angles = {joint.joint: joint.angle for joint in pose.joints} if pose is not None else {}
     for part in parts:
         track = torso.tracks[part]
         if part != "nod" and all(joint in angles for joint in track.joints):
             start = resting([angles[joint] for joint in track.joints])
             track.play(Motion(Path(start, (), tracks.LIMITS[part]), torso.clock.time()))
+            is_put = True
+    return is_put
 
 
 def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> None:

@@ -81,7 +81,7 @@ class Shown(Struct, frozen=True):
 
 
 def shown(targets: Sequence[str], scene: ReferenceScene, motions: Motions) -> dict[str, Shown]:
-    """What gazes and points at the targets may seem to mean."""
+    """Objects that gazes and points at the targets may seem to mean."""
     gazes = {each: ray for each in targets if (ray := motions.gaze(CURRENT_POSE, each).ray) is not None}
     points = {each: ray for each in targets if (ray := motions.point(CURRENT_POSE, each).ray) is not None}
     cones = in_gaze_cones(list(gazes.values()), scene.half_angle, scene.layout)

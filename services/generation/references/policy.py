@@ -86,7 +86,7 @@ def choice(
     config: GenerationConfig,
     apart: Collection[str] = (),
 ) -> Steps[Choices]:
-    """Do what `choose` does, with tables from `weigh`. Raises NotAsked, too: the body is to be asked for more."""
+    """Choose as `choose` does, with tables from `weigh`. Raises NotAsked, too: the body is to be asked for more."""
     best = yield from cheapest(tables, motions, config, apart)
     explained: list[ReferenceChoice] = []
     for table, pair, posture in zip(tables, best.pairs, best.postures, strict=False):

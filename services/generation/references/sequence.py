@@ -38,7 +38,7 @@ class Sequel(Struct, frozen=True):
 
 
 class Movements:
-    """What each gesture at a target takes from a posture: each way of head and arm is looked up once.
+    """Cost and obstacles of each gesture at a target, by posture: each way of head and arm is looked up once.
 
     arm: the one that points at it.
     """
