@@ -74,6 +74,15 @@ class Recording:
         """Speeds from sample to sample, radians per second."""
         return np.asarray(np.diff(self.angles, axis=0) / np.diff(self.times)[:, None])
 
+    @property
+    def scatter(self) -> Array:
+        """Standard deviation of the readings of each joint, radians. Slow motion counts for nothing."""
+        samples = self.angles
+        fresh = np.flatnonzero(np.any(np.diff(samples, axis=0) != 0.0, axis=1)) + 1
+        if len(fresh) < 3:
+            return np.zeros(len(self.joints))
+        return np.asarray(np.diff(samples[fresh], axis=0).std(axis=0) / math.sqrt(2.0))
+
     def at(self, time: Seconds) -> dict[str, Radians]:
         """Angle of each joint at an instant, between the two samples about it."""
         columns = self.angles.T if self.samples else np.empty((0, 0))

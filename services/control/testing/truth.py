@@ -45,7 +45,7 @@ class TruthLaws(Suite):
             await asyncio.sleep(1.0)
         if not recording.joints:
             does_not_apply("its behaviors move no joints")
-        scatter = recording.angles.std(axis=0)
+        scatter = recording.scatter
         worst, most = int(scatter.argmax()), 1.5 * self.noise + STILL / 5
         if scatter[worst] > most:
             broken(
