@@ -291,16 +291,22 @@ def _joined(members: Sequence[Member]) -> Capabilities:
     for member in members:
         own = _own_joints(member)
         limits += [limit for limit in member.body.capabilities.joints if own is None or limit.joint in own]
+    none = Capabilities(body="", types=(), parts=())
     return Capabilities(
         body="+".join(one.body for one in each),
         types=tuple(dict.fromkeys(name for member in members for name in member.types)),
         parts=tuple(part for member in members for part in member.parts),
         joints=tuple(limits),
-        reach=max(one.reach for one in each),
+        reach=max((one.reach for one in each), default=0.0),
         no_point_zones=tuple(dict.fromkeys(zone for one in each for zone in one.no_point_zones)),
+<<<<<<< ours
         gaze_half_angle=max(one.gaze_half_angle for one in each),
         pointing_radius=max(one.pointing_radius for one in each),
         faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
+=======
+        gaze_half_angle=max((one.gaze_half_angle for one in each), default=none.gaze_half_angle),
+        pointing_radius=max((one.pointing_radius for one in each), default=none.pointing_radius),
+>>>>>>> theirs
     )
 
 

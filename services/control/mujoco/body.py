@@ -147,7 +147,8 @@ class MujocoBody(SimulatedBody):
         looked = self._torso.attention.fixated(now)
         return BodyState(
             pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=arms[0], right_arm=arms[1],
-            moving=self._voice.is_busy or self._are_moving(tracks.LIMITS), looking_at=looked if self._rests_on(looked) else "",
+            moving=self._voice.is_busy or self._are_moving(tracks.LIMITS),
+            looking_at=looked if self._rests_on(looked) else "",
             speaking=self._voice.saying,
         )  # fmt: skip
 
@@ -170,8 +171,6 @@ class MujocoBody(SimulatedBody):
         super().switch_faults([fault for fault in faults if fault.kind in SHARED])
         self._faults = tuple(ours)
         self.bench.suffer(ours)
-        moved = {fault.part for fault in faults if fault.kind == "displaced"}
-        self.bench.displace({joint: angle for joint, angle in self._plan().items() if joint in moved})
         self.pulse.wake()
 
     # -- steps --------------------------------------------------------------------------------------------------
@@ -324,7 +323,8 @@ class MujocoBody(SimulatedBody):
         """Describe joints that do not come: which one, how far it is off, and what is known of its motor."""
         here, there = math.degrees(off.here), math.degrees(off.there)
         known = self.bench.suspicion(off.joint)
-        reason = f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be, and has made no way for {waited:.1f} s"
+        where_it_is = f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be"
+        reason = f"{where_it_is}, and has made no way for {waited:.1f} s"
         return Fault(reason=f"{reason}: {known}" if known else reason, where=where, service="control")
 
 

@@ -1,7 +1,7 @@
 """Descriptions of other people's robots: which joints of a model are head, arms and trunk, where eyes and hands are.
 
-A description is a TOML file beside, or apart from, the model it names: a URDF or an MJCF file, which may lie inside an
-installed package (`icub-models:share/iCub/robots/iCubGazeboV2_7/model.urdf`). `docs/mujoco.md` shows one.
+A description is a TOML file. It names a model, a URDF or an MJCF file, which may lie inside an installed package
+ (`icub-models:share/iCub/robots/iCubGazeboV2_7/model.urdf`). `docs/mujoco.md` shows one.
 """
 
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ class Description(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     name: as the robot is called. model: URDF or MJCF; relative to the description, or `PACKAGE:PATH` of an installed
     package. position, yaw: where the model stands, so that it looks along x at the table. home: angles of the safe
-    pose, degrees, 0 unless given. stiffness: of its position servos, as the frequency in Hz at which they would swing.
+    pose, degrees, 0 unless given. stiffness: of its servos, as the frequency in Hz at which they would swing.
     """
 
     name: str

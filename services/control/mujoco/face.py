@@ -1,4 +1,4 @@
-"""The face of the torso as its screen shows it: shapes of eyes, brows and mouth from the angles of its joints. Pure."""
+"""The face of the torso as its screen shows it: shapes of eyes, brows and mouth from its joints. Pure."""
 
 from collections.abc import Mapping
 from math import cos, radians, sin

@@ -19,8 +19,8 @@ SHARED = ("displaced", "mute", "voiceless", "lost")
 """Kinds that the simulated torso plays for it."""
 OURS: Mapping[str, FaultKind] = {
     "slow": FaultKind(
-        does="The gears are stiff with old grease: joints move at a share of their speed. Points come late, and what is "
-        "tied to them waits.",
+        does="The gears are stiff with old grease: joints move at a share of their speed. Points come late, and what "
+        "is tied to them waits.",
         on="part or joint", amount="factor of time at full speed", usual=2.0, low=1.0, high=20.0,
     ),
     "sticky": FaultKind(
@@ -32,8 +32,8 @@ OURS: Mapping[str, FaultKind] = {
         on="part or joint",
     ),
     "weak": FaultKind(
-        does="The motor has a share of its torque: joints sag under what they carry. A behavior that cannot be held on "
-        "target fails by the name of the joint.",
+        does="The motor has a share of its torque: joints sag under what they carry. A behavior that cannot be held "
+        "on target fails by the name of the joint.",
         on="part or joint", amount="share of its torque", usual=0.05, high=1.0,
     ),
     "hot": FaultKind(
@@ -52,8 +52,8 @@ OURS: Mapping[str, FaultKind] = {
         does="The encoders are noisy.", on="part or joint", amount="degrees, standard deviation", usual=0.3, high=5.0,
     ),
     "miscalibrated": FaultKind(
-        does="The joint is beside the angle that it measures: looks and points are beside their targets, which people "
-        "see and the body does not know.",
+        does="The joint is beside the angle that it measures: looks and points are beside their targets, which "
+        "people see and the body does not know.",
         on="part or joint", amount="degrees by which its true angle is greater", usual=4.0, low=-45.0, high=45.0,
     ),
 }  # fmt: skip

@@ -172,8 +172,8 @@ def _write_mp4(path: Path, frames: Sequence[Frame], pictures: Iterator[Picture],
         if program is None:
             height, width, _ = picture.shape
             program = subprocess.Popen(
-                ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-                 "-r", f"{1 / interval:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)],
+                ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+                 "-s", f"{width}x{height}", "-r", f"{1 / interval:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)],
                 stdin=subprocess.PIPE,
             )  # fmt: skip
         until = frames[number + 1].at if number + 1 < len(frames) else frame.at + interval

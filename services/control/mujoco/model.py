@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - XML
 """The torso at its table as a MuJoCo model: the XML, made from the kinematics and from the tangram table. Pure.
 
 Joints, lengths and ranges are those of `torso.kinematics`; masses, motors and gears are of a robot of this size made

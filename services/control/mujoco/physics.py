@@ -22,6 +22,10 @@ STILL = math.radians(0.02)
 """rad/s: a joint that is slower stands."""
 MOVING = math.radians(1.0)
 """rad/s from which on a joint is said to move."""
+BEND: Radians = math.radians(0.15)
+"""By which a sticky gear gives before it slips."""
+SLIPPING, SLIP_SPEED = 0.3, math.radians(3.0)
+"""Share of the friction that is left while a sticky gear slips; rad/s from which on it does."""
 STEPS_AT_ONCE = 50
 """Most steps in one call. A loop that was late catches up in several."""
 
@@ -56,15 +60,14 @@ class Physics:
         self._error = np.zeros(len(motors))
         self._offset = np.zeros(len(motors))
         ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + joint) for joint in motors]
-        self._q = np.array([model.jnt_qposadr[each] for each in ids])
-        self._v = np.array([model.jnt_dofadr[each] for each in ids])
-        self._u = np.array(
-            [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + joint) for joint in motors]
-        )
+        self._q = np.array([model.jnt_qposadr[each] for each in ids], dtype=int)
+        self._v = np.array([model.jnt_dofadr[each] for each in ids], dtype=int)
+        servos = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + joint) for joint in motors]
+        self._u = np.array(servos, dtype=int)
         self._lead = np.array([motor.damping / motor.stiffness for motor in motors.values()])
         self._drag = np.array([motor.drag for motor in motors.values()])
         self._limit = np.array([motor.limit for motor in motors.values()])
-        self._stick = np.zeros(len(motors))
+        self._stick, self._bent = np.zeros(len(motors)), np.zeros(len(motors))
         self._friction = np.array([motor.friction for motor in motors.values()])
         self._reference = np.zeros(len(motors))
 
@@ -111,7 +114,10 @@ class Physics:
 
     def is_at_rest(self, reference: Array) -> bool:
         """True if nothing moves, and the plan does not, either."""
-        if np.max(np.abs(reference - self._reference)) > 1e-9 or np.max(np.abs(self.speeds)) > STILL:
+        if (
+            np.max(np.abs(reference - self._reference), initial=0.0) > 1e-9
+            or np.max(np.abs(self.speeds), initial=0.0) > STILL
+        ):
             return False
         hot = any(each.heating > 1.0 for each in self.conditions.values())
         return not hot and float(np.max(np.abs(self.data.qvel), initial=0.0)) < 0.02
@@ -158,7 +164,7 @@ class Physics:
         servo = before - self._offset  # a servo believes its encoder
         for number in range(1, steps + 1):
             self.data.ctrl[self._u] = servo + slope * (number * step) + self._lead * slope
-            self._stick_or_slip()
+            self._stick_or_slip(step)
             mujoco.mj_step(self.model, self.data)
             squares += self.torques**2
         self._reference = before + slope * (steps * step)
@@ -168,12 +174,19 @@ class Physics:
             self._error = self.noise * self._chance.standard_normal(len(self.joints))
         return steps == count
 
-    def _stick_or_slip(self) -> None:
-        """Friction of a sticky gear falls as it begins to move (Stribeck)."""
+    def _stick_or_slip(self, step: Seconds) -> None:
+        """Friction of sticky gears: bristles that bend until they slip, and then hold less (LuGre).
+
+        de Wit et al. 1995. MuJoCo's own friction of joints creeps under any torque, and so never sticks.
+        """
         if not self._stick.any():
             return
-        ratio = self.speeds / math.radians(3.0)
-        self.model.dof_frictionloss[self._v] = self._friction + self._stick * np.exp(-(ratio**2))
+        speeds, stiffness = self.speeds, self._stick / BEND
+        holds = self._stick * (SLIPPING + (1.0 - SLIPPING) * np.exp(-((speeds / SLIP_SPEED) ** 2)))
+        change = speeds - stiffness * np.abs(speeds) / np.maximum(holds, 1e-9) * self._bent
+        self._bent = np.clip(self._bent + step * change, -BEND, BEND)
+        torque = stiffness * self._bent + 0.003 * stiffness * change
+        self.data.qfrc_applied[self._v] = -np.clip(torque, -self._stick, self._stick)
 
     def _heat(self, squares: Array, seconds: Seconds) -> None:
         """Warm the motors by the squares of their torques, and let a hot one give less."""
@@ -195,6 +208,8 @@ class Physics:
             self._drag[number] = motor.drag + condition.drag
             self._friction[number] = motor.friction + condition.friction
             self._stick[number] = condition.stiction
+            if not condition.stiction:
+                self._bent[number] = self.data.qfrc_applied[self._v[number]] = 0.0
             self._offset[number] = condition.offset
             if condition.warm > self.temperatures[number]:
                 self.temperatures[number] = condition.warm

@@ -147,5 +147,5 @@ def _motors(described: Description, scene: mujoco.MjSpec) -> dict[str, Motor]:
 
 
 def _pedestal(described: Description) -> str:
-    x, y, z = described.position
+    x, y, _ = described.position
     return f' <geom class="looks" type="cylinder" pos="{x} {y} 0.01" size="0.22 0.01" material="dark"/>\n'

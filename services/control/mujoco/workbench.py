@@ -67,11 +67,6 @@ class Workbench:
         self._raise_table(table_rise(faults))
         self._measure()
 
-    def displace(self, angles: Mapping[str, Radians]) -> None:
-        """Move joints by hand to where they are now."""
-        self.physics.place({joint: angle for joint, angle in angles.items() if joint in self.physics.joints})
-        self._measure()
-
     def _raise_table(self, by: float) -> None:
         """Put the table, with what lies on it, higher by so much than the body believes."""
         if abs(by - self.room.rise) > 1e-9:

@@ -237,8 +237,9 @@ class ReachyMini(Body):
 
     async def _pass_points(self, run: Run) -> AsyncGenerator[Progress, None]:
         """Report the sync points of `run` as its joints pass them. Raises Revoked or BodyFailed."""
+        at: Seconds = -inf
         for instant in run.course.instants:
-            at = came = await self._come(run, instant)
+            at = came = max(at, await self._come(run, instant))
             if not run.may_pass(instant.hold):
                 run.waits = True
                 yield Arrived(instant.hold, came)
@@ -263,13 +264,13 @@ class ReachyMini(Body):
             is_due = due is not None and run.bell.is_past(due)
             if not is_due and run.course.arrival in instant.syncs and self._moves.follows(run, now):
                 if self._moves.off_run(run, instant, now).share <= 1.0:
-                    return now
-            elif is_due:
+                    return self._last_frame
+            elif due is not None and is_due:
                 if not run.motion.path.marks[instant.syncs[0]] and instant is run.course.instants[0]:
                     return now  # it begins: nothing has to be anywhere
                 off = self._moves.off_run(run, instant, now)
                 if off.share <= 1.0:
-                    return now
+                    return max(due, self._last_frame)  # when that was measured
                 self._check(watch, off, run.behavior.id, instant.syncs[-1])
             await run.bell.wait(inf if due is None or is_due else due)
         return self._loop.time()

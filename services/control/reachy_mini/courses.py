@@ -146,7 +146,7 @@ def seconds(track: str, here: Sequence[float], goal: Sequence[float]) -> Seconds
         case "head":
             return 0.12 + math.degrees(way) / 110.0
         case "face":
-            return 0.15 + math.degrees(way) / 300.0
+            return 0.25 + math.degrees(way) / 300.0
         case _:
             return 0.3 + math.degrees(way) / 60.0
 

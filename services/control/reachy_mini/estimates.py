@@ -26,9 +26,9 @@ def motion_estimate(
     if track != "nod":
         after[track] = course.goal
     end = after if course.stays or track == "nod" else {**after, track: around.base[track]}
-    if track == "torso" and not course.is_swing:  # the head keeps looking where it does; the body turns under it
-        yaw, pitch, follow = after["head"]
-        after["head"] = (yaw, pitch, joints.follow(yaw, after["torso"][0]) or follow)
+    if track == "torso":  # the head keeps looking where it does; the body turns under it
+        yaw, pitch, _ = after["head"]
+        after["head"] = (yaw, pitch, joints.follow(yaw, after["torso"][0]))
     degrees = 0.0
     if track == "head":
         turned = zip(around.tracks[track][:2], course.goal[:2], strict=True)

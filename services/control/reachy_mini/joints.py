@@ -63,7 +63,7 @@ LIMITS = (
     _joint("head_pitch", "head", -41, 40, 280, 3200),
     _joint("head_roll", "head", -12, 12, 110, 1500),
     _joint("body_yaw", "torso", -145, 145, 170, 1100),
-    _LEAN,
+    _joint("body_lean", "torso", -4.2, 4.2, 40, 250),
     *_ANTENNAS,
 )
 """Joints as they are measured."""

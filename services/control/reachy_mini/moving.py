@@ -258,6 +258,8 @@ class Moves:
     def follow(self, now: Seconds) -> None:
         """Turn the head after what it looks at, or is about to look at, and the body after the head."""
         track, around = self.tracks["head"], self.circumstances(now, self.world)
+        yaw, pitch, _ = track.base
+        track.base = (yaw, pitch, joints.follow(yaw, around.tracks["torso"][0]))
         if self.look is not None:
             with suppress(Impossible):
                 track.base = _goal(self.look, around)

@@ -7,10 +7,9 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 pytest.importorskip("icub_models", reason="needs the package icub-models, which has the model")
 
-from tests.control.contract import BodyContract
-
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.mujoco.described import DescribedBody
+from engage_hri.services.control.testing import BodyContract
 
 ICUB = Path(__file__).parent / "robots" / "icub.toml"
 

@@ -4,10 +4,9 @@ import pytest
 
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
-from tests.control.contract import BodyContract
-
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.mujoco.body import MujocoBody
+from engage_hri.services.control.testing import BodyContract
 
 STATED = 0.05
 """Seconds by which a healthy body may come later than it predicts, at any sync point."""

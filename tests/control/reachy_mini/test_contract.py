@@ -1,56 +1,44 @@
 """The driver of Reachy Mini, held to the contract of bodies on a daemon that lags as the real one does."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from random import Random
-
-import pytest
-from tests.control.contract import BodyContract
-from tests.control.suite import Stage
+import math
+from collections.abc import Callable, Mapping
 
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.reachy_mini.body import ReachyMini
+from engage_hri.services.control.testing import BodyContract
 from tests.control.reachy_mini.fake import FakeDaemon
-from tests.control.reachy_mini.limits import too_much
 
 
 class TestReachyMini(BodyContract):
     tolerance = 0.06
 
-    @pytest.fixture
-    async def daemon(self) -> FakeDaemon:
-        return FakeDaemon()
+    def make(self) -> Body:
+        return ReachyMini(connect=FakeDaemon())
 
-    @pytest.fixture
-    async def body(self, daemon: FakeDaemon) -> AsyncIterator[Body]:
-        body = ReachyMini(connect=daemon)
-        body.see(self.world)
-        async with body.connected():
-            yield body
+    def faults(self) -> Mapping[str, Callable[[], Body]]:
+        return {
+            "a stuck motor": lambda: faulty(lambda daemon: daemon.stuck.add("pitch")),
+            "a head that sags": lambda: faulty(lambda daemon: setattr(daemon, "sag", math.radians(2.0))),
+            "slow motors": lambda: faulty(lambda daemon: setattr(daemon, "slow", math.radians(30.0))),
+            "motors off": lambda: faulty(lambda daemon: setattr(daemon, "mode", "disabled")),
+            "a frozen daemon": lambda: faulty(FakeDaemon.freeze),
+            "a killed daemon": lambda: faulty(FakeDaemon.kill),
+        }
 
-    async def test_keeps_its_limits_whatever_comes(self, body: Body, daemon: FakeDaemon):
-        for behavior in self.able(body):
-            stage = Stage(body, behavior)
-            await asyncio.sleep(0.3)
-            stage.authority.extend("end")
-            other = Stage(body, behavior, "end")
-            await asyncio.sleep(0.25)
-            other.authority.revoke()
-            await asyncio.gather(stage.task, other.task, return_exceptions=True)
-        await body.home()
 
-        assert too_much(daemon.commands, body.capabilities.joints) == []
+class TestNoisyReachyMini(BodyContract):
+    tolerance = 0.06
+    noise = math.radians(0.3)
 
-    @pytest.mark.parametrize("seed", range(3))
-    async def test_holding_keeps_the_limits_of_the_joints(self, body: Body, daemon: FakeDaemon, seed: int):
-        chance = Random(seed)
-        for behavior in self.moving(body):
-            stage = Stage(body, behavior, "end")
-            for _ in range(4):
-                await asyncio.sleep(chance.uniform(0.0, 0.4))
-                stage.authority.hold()
-                await asyncio.sleep(chance.choice((0.02, 0.1, 1.0)))
-                stage.authority.go_on()
-            await stage.over()
+    def make(self) -> Body:
+        daemon = FakeDaemon()
+        daemon.noise = self.noise
+        return ReachyMini(connect=daemon)
 
-        assert too_much(daemon.commands, body.capabilities.joints) == []
+
+def faulty(suffer: Callable[[FakeDaemon], None]) -> Body:
+    """A body whose daemon suffers something once it is at home, and just as something is under way."""
+    daemon = FakeDaemon()
+    asyncio.get_running_loop().call_later(3.2, suffer, daemon)
+    return ReachyMini(connect=daemon)

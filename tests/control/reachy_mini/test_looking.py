@@ -6,7 +6,6 @@ from collections.abc import AsyncIterator
 
 import pytest
 from msgspec.structs import replace
-from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift
 from engage_hri.schemas.units import Vector
@@ -14,6 +13,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import Reached
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 

@@ -7,13 +7,13 @@ from contextlib import asynccontextmanager
 from itertools import pairwise
 
 import pytest
-from tests.control.suite import ON_AXIS, WORLD, Stage, aside, performed
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Head
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.services.control.body import BehaviorRefused, BodyFailed
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 
