@@ -299,14 +299,9 @@ def _joined(members: Sequence[Member]) -> Capabilities:
         joints=tuple(limits),
         reach=max((one.reach for one in each), default=0.0),
         no_point_zones=tuple(dict.fromkeys(zone for one in each for zone in one.no_point_zones)),
-<<<<<<< ours
-        gaze_half_angle=max(one.gaze_half_angle for one in each),
-        pointing_radius=max(one.pointing_radius for one in each),
-        faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
-=======
         gaze_half_angle=max((one.gaze_half_angle for one in each), default=none.gaze_half_angle),
         pointing_radius=max((one.pointing_radius for one in each), default=none.pointing_radius),
->>>>>>> theirs
+        faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
     )
 
 
