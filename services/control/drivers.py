@@ -30,6 +30,7 @@ GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
 BUILT_IN = {
     "simulated": "engage_hri.services.control.torso.body:SimulatedBody",
+    "silent": "engage_hri.services.control.voice.silent:SilentVoice",
     "mujoco": "engage_hri.services.control.mujoco.body:MujocoBody",
     "reachy_mini": "engage_hri.services.control.reachy_mini.body:ReachyMini",
 }

@@ -56,7 +56,7 @@ def robot(tmp_path: Path) -> str:
 
 def test_it_looks_while_another_driver_speaks(engage: Engage, tmp_path: Path, robot: str) -> None:
     ask = tmp_path / "ask.xml"
-    result = engage("play", ask, "--embedded", "--virtual-time", "--body", robot, "--voice", "simulated")
+    result = engage("play", ask, "--embedded", "--virtual-time", "--body", robot, "--voice", "silent")
 
     assert result.code == 0, result.err
     assert "robot looks at blue-square" in result.out
@@ -78,7 +78,7 @@ def test_without_a_voice_the_turn_has_failed_and_is_told_what_to_do(
 def test_it_is_asked_for_estimates_without_a_connection(
     engage: Engage, tmp_path: Path, robot: str, command: str
 ) -> None:
-    result = engage(command, tmp_path / "ask.xml", "--body", robot, "--voice", "simulated")
+    result = engage(command, tmp_path / "ask.xml", "--body", robot, "--voice", "silent")
 
     assert result.code == 0, result.err
     assert "AssertionError" not in result.err
@@ -111,7 +111,7 @@ def test_what_is_no_body_is_refused(
 @pytest.mark.parametrize("in_one", [True, False])
 async def test_it_is_put_on_by_up(tmp_path: Path, robot: str, in_one: bool) -> None:
     endpoint = free_endpoint()
-    options = ("--body", robot, "--voice", "simulated", "--robot", "pan", *(("--in-one",) if in_one else ()))
+    options = ("--body", robot, "--voice", "silent", "--robot", "pan", *(("--in-one",) if in_one else ()))
     up = await start("up", "--listen", endpoint, *options)
     try:
         async with asyncio.timeout(40.0), connect("pan", connect=[endpoint]) as client:

@@ -35,7 +35,7 @@ from engage_hri.services.control.torso import choreography, displacing, kinemati
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
-from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
+from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
@@ -43,6 +43,7 @@ from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire, e
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.voice import speaking
+from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.waiting import Bell

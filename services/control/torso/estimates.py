@@ -8,8 +8,7 @@ from math import inf
 import numpy as np
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
+from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Degrees, Seconds
@@ -18,7 +17,6 @@ from engage_hri.services.control.torso.course import Course, CoursePoint, Imposs
 from engage_hri.services.control.torso.motion import SLOWEST
 from engage_hri.services.control.torso.path import Array, Path
 from engage_hri.services.control.torso.sizing import quickest
-from engage_hri.services.control.voice.timeline import Utterance
 
 Added = Callable[[Seconds], Array]
 """What the trunk adds to the joints of a path so many seconds after it began."""
@@ -27,17 +25,6 @@ Added = Callable[[Seconds], Array]
 def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
     fault = Fault(reason=impossible.reason, where=behavior.id, advice=impossible.advice, service="control")
     return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=impossible.kind)
-
-
-def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose) -> Estimate:
-    """Estimate a speech. The voice can wait at the marks between two words."""
-    times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
-    times["end"] = utterance.seconds
-    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
-    phases = _phases([CoursePoint(sync, sync if sync in gaps else "") for sync in sync_points(behavior)], times)
-    return Estimate(
-        behavior=behavior.id, feasible=True, parts=("voice",), phases=phases, pose_after=pose, pose_end=pose
-    )
 
 
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
