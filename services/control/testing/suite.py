@@ -155,6 +155,10 @@ class Suite:
             parts |= set(body.estimate(behavior, None, self.world).parts)
         return {limit.joint for limit in body.capabilities.joints if limit.part in parts}
 
+    def half(self, body: Body, behavior: BlockBehavior) -> Seconds:
+        """Half of the time that it takes by itself from here."""
+        return sum(phase.natural for phase in body.estimate(behavior, None, self.world).phases) / 2
+
     def position(self, entity: str) -> Vector:
         """Look up where an entity of the world is, metres."""
         found = self.world.entity(entity)
