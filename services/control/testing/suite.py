@@ -108,19 +108,14 @@ class Suite:
     # -- what is there to judge ----------------------------------------------------------------------------------
 
     def able(self, body: Body) -> list[BlockBehavior]:
-        """List the suite's behaviors that the body says it can do."""
+        """List the suite's behaviors that the body says it can do. If there are none, no law applies."""
         able = [
             each
             for each in self.behaviors
             if type_name(each) in body.capabilities.types and body.estimate(each, None, self.world).feasible
         ]
         if not able:
-            broken(
-                expected="at least one behavior that the suite can ask for",
-                measured=f"it can do none of those that it is asked for; its types are "
-                f"{', '.join(body.capabilities.types) or 'none'}",
-                advice="set `behaviors` and `world` of the suite to what this robot can do where it stands",
-            )
+            does_not_apply("it can do nothing of what it is asked for")
         return able
 
     def cases(
