@@ -4,7 +4,7 @@ import math
 import shutil
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -68,8 +68,9 @@ def main(options: Options) -> int:
         tolerance=options.tolerance, noise=math.radians(options.noise), accuracy=math.radians(options.accuracy),
         real_time=options.real_time, world=read_world(options.world) if options.world else None,
     )  # fmt: skip
-    make = maker(options.body, options.load().control)
-    with _told_progress() as progress:
+    # What a driver prints is no part of the report.
+    with redirect_stdout(sys.stderr), _told_progress() as progress:
+        make = maker(options.body, options.load().control)
         report = check(make, stated, driver=options.body, law=options.law, progress=progress)
     if options.json:
         print(as_json(report), flush=True)

@@ -43,15 +43,16 @@ class EndingLaws(Suite):
         for case in self.cases(body, is_overlay, "nothing that goes back to rest by itself"):
             async with case as behavior:
                 for how in HOWS:
+                    after = min(0.35, self.half(body, behavior))
                     stage = Stage(body, behavior, "end")
-                    await asyncio.sleep(0.35)
+                    await asyncio.sleep(after)
                     stage.authority.revoke(how)
                     await stage.over(AT_ONCE)
                     if "end" in stage.passed:
                         broken(
                             behavior,
                             "end",
-                            expected="no `end` of what was aborted after 350 ms",
+                            expected=f"no `end` of what was aborted after {ms(after)}",
                             measured=f"passed {listed(stage.passed)}",
                         )
                     await self.check_rest(body, home, behavior, f"after an abort ({how})")

@@ -29,7 +29,14 @@ class PointsLaws(Suite):
         Usually the targets of the suite's `world` are out of this robot's range, or its lexemes have other names:
         set `world` and `behaviors` to what it can do.
         """
-        self.able(body)
+        kinds = body.capabilities.types
+        known = [each for each in self.behaviors if type_name(each) in kinds]
+        if not any(body.estimate(each, None, self.world).feasible for each in known):
+            broken(
+                expected="at least one behavior that the suite can ask for",
+                measured=f"none; its types are {listed(kinds)}",
+                advice="set `behaviors` and `world` of the suite to what this robot can do where it stands",
+            )
         for kind in body.capabilities.types:
             asked = [each for each in self.behaviors if type_name(each) == kind]
             estimates = [body.estimate(each, None, self.world) for each in asked]

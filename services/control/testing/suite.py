@@ -108,19 +108,14 @@ class Suite:
     # -- what is there to judge ----------------------------------------------------------------------------------
 
     def able(self, body: Body) -> list[BlockBehavior]:
-        """List the suite's behaviors that the body says it can do."""
+        """List the suite's behaviors that the body says it can do. If there are none, no law applies."""
         able = [
             each
             for each in self.behaviors
             if type_name(each) in body.capabilities.types and body.estimate(each, None, self.world).feasible
         ]
         if not able:
-            broken(
-                expected="at least one behavior that the suite can ask for",
-                measured=f"it can do none of those that it is asked for; its types are "
-                f"{', '.join(body.capabilities.types) or 'none'}",
-                advice="set `behaviors` and `world` of the suite to what this robot can do where it stands",
-            )
+            does_not_apply("it can do nothing of what it is asked for")
         return able
 
     def cases(
@@ -154,6 +149,10 @@ class Suite:
         for behavior in behaviors or self.able(body):
             parts |= set(body.estimate(behavior, None, self.world).parts)
         return {limit.joint for limit in body.capabilities.joints if limit.part in parts}
+
+    def half(self, body: Body, behavior: BlockBehavior) -> Seconds:
+        """Half of the time that it takes by itself from here."""
+        return sum(phase.natural for phase in body.estimate(behavior, None, self.world).phases) / 2
 
     def position(self, entity: str) -> Vector:
         """Look up where an entity of the world is, metres."""

@@ -110,7 +110,7 @@ class TakeoverLaws(Suite):
         self._needs_looks(body)
         there, first = self._targets(body)[:2]
         shift = Stage(body, GazeShift(id="shift", target=there), "end")
-        await self._half_way(body, shift.behavior)
+        await asyncio.sleep(min(0.1, self.half(body, shift.behavior)))
         look = Stage(body, Gaze(id="look", target=first), "end")
         await shift.over()
         await look.over()
@@ -129,7 +129,7 @@ class TakeoverLaws(Suite):
         if "gazeShift" not in body.capabilities.types or len(targets) < 2:
             does_not_apply("it has no two gazeShifts")
         one = Stage(body, GazeShift(id="one", target=targets[0]), "end")
-        await self._half_way(body, one.behavior)
+        await asyncio.sleep(min(0.1, self.half(body, one.behavior)))
         other = Stage(body, GazeShift(id="other", target=targets[1]), "end")
         await one.over()
         await other.over()
@@ -157,11 +157,6 @@ class TakeoverLaws(Suite):
             if estimate.feasible:
                 times[entity.id] = sum(phase.natural for phase in estimate.phases)
         return sorted(times, key=lambda each: -times[each])
-
-    async def _half_way(self, body: Body, behavior: BlockBehavior) -> None:
-        """Wait until a behavior that has just begun is on its way."""
-        estimate = body.estimate(behavior, None, self.world)
-        await asyncio.sleep(min(0.1, sum(phase.natural for phase in estimate.phases) / 2))
 
     def _check_looks(self, body: Body, target: str, behavior: BlockBehavior) -> None:
         gaze = self.observed(body).gaze

@@ -1,0 +1,197 @@
+"""`engage check-body`: what it prints of a body that keeps the contract, of one that breaks it, and of none."""
+
+import json
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+
+from tests.cli.command import Engage
+
+DRIVERS = '''
+import asyncio
+
+from msgspec.structs import replace
+
+from engage_hri.services.control.torso.body import SimulatedBody
+
+print("a driver that prints as it is imported")
+
+
+class Good(SimulatedBody):
+    async def home(self, parts=()):
+        print("and in what it does")
+        await super().home(parts)
+
+
+class Hurried(SimulatedBody):
+    """Takes twice as long as it says."""
+
+    def estimate(self, behavior, pose, world):
+        told = super().estimate(behavior, pose, world)
+        return replace(told, phases=tuple(replace(one, natural=one.natural / 2, shortest=0.0) for one in told.phases))
+
+
+class Idle(SimulatedBody):
+    def __init__(self):
+        super().__init__()
+        self.capabilities = replace(self.capabilities, body="idle", types=("locomotion",), joints=())
+
+
+class Clumsy(SimulatedBody):
+    def perform(self, behavior, authority):
+        raise KeyError("joint 7")
+
+
+class Waiting(SimulatedBody):
+    async def home(self, parts=()):
+        await asyncio.get_running_loop().create_future()
+
+
+class Silent(SimulatedBody):
+    def __init__(self):
+        super().__init__()
+        self.capabilities = replace(self.capabilities, types=("gaze", "locomotion"))
+'''
+
+
+@pytest.fixture
+def drivers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder whose settings of pytest are none of its business, and the file in it."""
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --no-such-option\n")
+    (tmp_path / "conftest.py").write_text("raise SystemExit('not ours')\n")
+    (tmp_path / "drivers.py").write_text(DRIVERS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--no-such-option")
+    monkeypatch.setenv("COLUMNS", "150")
+    return tmp_path / "drivers.py"
+
+
+def test_a_body_that_keeps_the_contract(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Good")
+
+    assert ended.code == 0, ended.out
+    assert "simulated (drivers.py:Good), held to the contract of bodies in virtual time" in ended.out
+    assert "neck_yaw              head        -85          85        500" in ended.out
+    stated = "estimates within 100 ms; encoders scatter by 0.00 degrees; on target within 1.0 degrees"
+    assert f"stated       {stated}" in ended.out
+    assert "holds   takes the time that it predicted" in ended.out
+    assert "BROKEN" not in ended.out
+    assert "--      with a fault it passes or names the fault: no faults are named" in ended.out
+    assert "laws hold, none is broken, 1 law does not apply. It took" in ended.out
+    assert "and in what it does" not in ended.out + ended.err
+    assert ended.err == "a driver that prints as it is imported\n"
+
+
+def test_a_broken_law_says_what_was_measured_where_and_what_it_usually_is(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Hurried", "--law", "takes the time")
+
+    assert ended.code == 1
+    assert "BROKEN  takes the time that it predicted" in ended.out
+    expected, measured = "287 ms from stroke_start, within 100 ms", "574 ms"
+    assert f"- gaze at near-right, stroke: expected: {expected}; measured: {measured}" in ended.out
+    assert "more; --json has all" in ended.out
+    assert "usually: the estimate is the time of the command, and the joints arrive later" in ended.out
+    assert "1 law is broken, 0 laws hold, 0 laws do not apply." in ended.out
+    assert "Traceback" not in ended.out
+
+
+def test_what_is_stated_is_allowed_for(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Hurried", "--law", "takes the time", "--tolerance", "0.5")
+
+    assert ended.code == 0, ended.out
+    assert "estimates within 500 ms" in ended.out
+
+
+def test_an_error_of_the_driver_is_told_with_its_place(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Clumsy", "--law", "every sync point")
+
+    assert ended.code == 1
+    assert "gaze at near-right: expected: no error but BehaviorRefused and BodyFailed" in ended.out
+    line = 1 + DRIVERS.splitlines().index('        raise KeyError("joint 7")')
+    assert f"measured: KeyError: 'joint 7' at drivers.py, line {line}" in " ".join(ended.out.split())
+
+
+def test_a_body_that_can_do_nothing_has_not_passed(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Idle")
+
+    assert ended.code == 1
+    assert "not checked  locomotion: the suite has no such behavior" in ended.out
+    assert "none; its types are locomotion" in ended.out
+    assert "it can do nothing of what it is asked for" in ended.out
+
+
+def test_a_body_that_never_comes_home_is_told_so_by_one_law(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Waiting", "--law", "home is reached")
+
+    assert ended.code == 1
+    assert "expected: that `home` returns within 30.0 s; measured: it does not" in ended.out
+
+
+def test_the_json_has_all(engage: Engage, drivers: Path) -> None:
+    ended = engage("check-body", "drivers.py:Hurried", "--law", "predicted", "--json")
+    report = json.loads(ended.out)
+
+    assert ended.code == 1
+    assert not report["good"]
+    assert report["capabilities"]["body"] == "simulated"
+    (law,) = report["laws"]
+    assert (law["law"], law["verdict"], law["trials"]) == ("takes the time that it predicted", "broken", 1)
+    assert len(law["findings"]) > 10
+    assert law["findings"][0] == {
+        "expected": "287 ms from stroke_start, within 100 ms", "measured": "574 ms",
+        "behavior": "gaze at near-right", "sync": "stroke",
+    }  # fmt: skip
+
+
+def test_a_world_of_ones_own_is_looked_at(engage: Engage, drivers: Path) -> None:
+    entities = [
+        {"id": "cup", "kind": "object", "position": [0.5, 0.2, 0.8]},
+        {"id": "box", "kind": "object", "position": [0.5, -0.2, 0.8]},
+    ]
+    Path("world.json").write_text(json.dumps({"entities": entities}))
+
+    ended = engage("check-body", "drivers.py:Silent", "--world", "world.json")
+
+    assert ended.code == 0, ended.out
+    assert "asked for    gaze at cup" in ended.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("drivers.py:Nobody",), "body drivers.py:Nobody"),
+        (("nowhere.py:Mine",), "body nowhere.py:Mine"),
+        (("drivers.py:Good", "--law", "thermodynamics"), "no law has 'thermodynamics' in its name"),
+        (("drivers.py:Good", "--world", "nowhere.json"), "nowhere.json"),
+    ],
+)
+def test_what_cannot_be_checked_is_refused(
+    engage: Engage, drivers: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    ended = engage("check-body", *arguments)
+
+    assert ended.code == 2
+    assert words in ended.err
+    assert len([line for line in ended.err.splitlines() if line != "a driver that prints as it is imported"]) == 1
+
+
+def test_without_pytest_it_names_the_extra(engage: Engage, drivers: Path) -> None:
+    with patch("engage_hri.services.commandline.check_body.find_spec", lambda name: None):
+        ended = engage("check-body", "drivers.py:Good")
+
+    assert ended.code == 2
+    assert "check-body needs pytest and pytest-asyncio" in ended.err
+    assert "(install the extra: pip install 'engage-hri[check]')" in ended.err
+
+
+def test_nothing_else_of_the_package_imports_pytest(engage: Engage) -> None:
+    root = Path(__file__).parents[2]
+    importing = {
+        str(path.relative_to(root).parent)
+        for folder in ("services", "schemas")
+        for path in (root / folder).rglob("*.py")
+        if any(line.startswith(("import pytest", "from pytest")) for line in path.read_text().splitlines())
+    }
+
+    assert importing == {"services/control/testing"}
