@@ -4,10 +4,12 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 
+import pytest
+
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from tests.control.reachy_mini.fake import FakeDaemon
-from tests.control.reachy_mini.suite import BodyContract
+from tests.control.reachy_mini.suite import IS_INSTALLED, BodyContract
 
 
 class TestReachyMini(BodyContract):
@@ -27,6 +29,7 @@ class TestReachyMini(BodyContract):
         }
 
 
+@pytest.mark.skipif(not IS_INSTALLED, reason="the suite of a clone compares measurements bit by bit")
 class TestNoisyReachyMini(BodyContract):
     tolerance = 0.06
     noise = math.radians(0.3)
