@@ -44,12 +44,15 @@ EXCUSED = {
     "engage up --body head,face=reachy.py:Head --body left_arm,right_arm=simulated --voice silent": "the same",
     ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
     ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",
+    ".venv/bin/python -m pip install -e '.[reachy-mini]'": "the same",
+    "make reachy-mini": "takes a minute and a half; .ci/run does it",
 }
 """Commands that do not run here, and why."""
 ELSEWHERE = {
     ("docs/control.md", "python"): "tests/control/test_docs.py",
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
+    ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
     ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }

@@ -34,6 +34,8 @@ FOLLOWING: Seconds = 0.3
 """A look on a target that moves may be so far behind it."""
 ASTRAY = radians(6.0)
 """Joints that are further than this from where they were sent have been moved by somebody else."""
+BEHIND: Seconds = 0.1
+"""How far behind a sync point the joints may be measured to have passed it: measurements come now and then."""
 SAMPLES = 6
 """Places of a path between a sync point and where the plan is, at which the joints may be to have come there."""
 
@@ -315,8 +317,9 @@ class Moves:
         if track == "head":
             look = self.look if run.is_homeward else run.behavior
             return self.off_target(look if isinstance(look, courses.Looks) else None, now)
-        path, s = run.motion.path, run.motion.s(now)
+        path = run.motion.path
         mark = path.marks[instant.syncs[0]]
+        s = min(run.motion.s(now), mark + BEHIND)  # later it may be where a stuck joint is
         places = np.linspace(mark, s, SAMPLES).tolist() if s - mark > 1e-6 else [mark]
         offs = [self.off(track, now, path.at(place).q.tolist()) for place in places]
         return min(offs, key=lambda off: off.share)
