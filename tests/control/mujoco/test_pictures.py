@@ -10,14 +10,13 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 image = pytest.importorskip("PIL.Image", reason="needs the extra `mujoco`")
 
-from tests.control.suite import WORLD, Stage, performed
-
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Pointing
 from engage_hri.schemas.faults import InputRefused, RunFailed
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.film import check, show_face
 from engage_hri.services.control.mujoco.pictures import Beam, Camera, Cone, Picture
 from engage_hri.services.control.mujoco.settings import MujocoSettings
+from engage_hri.services.control.testing import WORLD, Stage, performed
 
 
 @pytest.fixture
