@@ -28,11 +28,11 @@ from engage_hri.services.control.body import (
     Reached,
 )
 from engage_hri.services.control.config import Variability
-from engage_hri.services.control.torso import choreography, displacing, kinematics, tracks
+from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
-from engage_hri.services.control.torso.estimates import infeasible, speech_estimate, wait_estimate
+from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, speech_estimate, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.rehearsal import rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
@@ -83,7 +83,9 @@ class SimulatedBody(Body):
                 return speech_estimate(behavior, utter(text), self._torso.pose(world, pose))
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, self._torso.pose(world, pose))
-        return self._torso.estimate(behavior, pose, world)
+        estimate = self._torso.estimate(behavior, pose, world)
+        is_beneath = pose is None and head.is_shift(behavior) and self._torso.is_overlaid()
+        return beneath_a_look(estimate) if is_beneath else estimate
 
     def rehearse(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
