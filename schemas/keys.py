@@ -51,6 +51,7 @@ HELD = f"{PREFIX}/state/realizer/held"
 BODY_HELD = f"{PREFIX}/state/control/held"
 BODY_FAULTS = f"{PREFIX}/state/control/faults"
 ROBOT_STATE = f"{PREFIX}/state/control/robot_state"
+ROBOT_SEEN = f"{PREFIX}/state/control/seen"
 
 ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 """The same as `ROBOT_STATE`, many times a second, while somebody listens."""

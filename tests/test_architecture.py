@@ -74,8 +74,8 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > config journal keyring",
-    "services/control": "service > torso > voice > shown > actions estimates switching unheard waiting > live > body"
-    " > variability > config",
+    "services/control": "measuring service > torso > voice > shown > actions estimates switching unheard waiting"
+    " > live > body > calibration > extras fitting > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check pipeline > block head"
     " > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",

@@ -33,6 +33,7 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
+    from engage_hri.services.control.calibration import calibrated
     from engage_hri.services.control.torso.body import SimulatedBody
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.generation.head.inhibitions import Leases
@@ -43,11 +44,12 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     from engage_hri.services.generation.turns.policy import TurnPolicy
 
     body = SimulatedBody(config.control.no_point_zones, config.control.variability)
+    calibration = calibrated(body, config.control.calibration)
     permits = Leases(config.generation).permits()
     turns = TurnPolicy(config.robot, config.generation)
 
     def estimated(items: Sequence[EstimateItem]) -> list[Estimate]:
-        return [body.estimate(item.behavior, item.pose, world) for item in items]
+        return [calibration.stated(body.estimate(item.behavior, item.pose, world)) for item in items]
 
     plans = []
     discourse = NO_DISCOURSE

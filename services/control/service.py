@@ -44,6 +44,7 @@ from engage_hri.services.control.body import (
     Reached,
     Spoke,
 )
+from engage_hri.services.control.calibration import calibrated
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.live import LiveBehavior
@@ -116,7 +117,8 @@ class _Control:
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
-        self.shown = Shown(bus, body, self._actions, config.state_rate)
+        self._calibration = calibrated(body, config.calibration)
+        self.shown = Shown(bus, body, self._actions, config.state_rate, self._calibration)
         self.switch = FaultSwitch(bus, body, self.desk)
 
     # -- reads --------------------------------------------------------------------------------------------------
@@ -127,7 +129,8 @@ class _Control:
         refused = [_refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
         others = [item for item in question.others if _refused(item.behavior) is None]
-        estimates = iter(self._estimates.take(known, self._body.rehearse(known, self._world, others)))
+        made = self._estimates.take(known, self._body.rehearse(known, self._world, others))
+        estimates = map(self._calibration.stated, made)
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def describe(self, question: Message) -> Message:

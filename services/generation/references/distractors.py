@@ -52,26 +52,28 @@ def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[st
     """Ids of the objects that have their centre or a corner of their footprint in the cone around the gaze axis.
 
     The angle between axis and eye-to-point decides: the same set as the ellipse the cone cuts from the table
-    (decision B4).
+    (decision B4). A gaze that is not known exactly has as much wider a cone.
     """
     reach = layout.places - np.asarray(gaze.origin)
     along = reach @ _unit(gaze.axis)
     distance = np.linalg.norm(reach, axis=1)
     angle_rad = np.arccos(np.clip(along / np.maximum(distance, TOLERANCE), -1.0, 1.0))
-    inside = (angle_rad <= half_angle + TOLERANCE) | (distance <= TOLERANCE)
+    inside = (angle_rad <= half_angle + gaze.error + TOLERANCE) | (distance <= TOLERANCE)
     return frozenset(layout.ids[index] for index in np.unique(layout.owner[inside]))
 
 
 def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozenset[str]:
     """Ids of the objects in the half-cylinder ahead of the hand, around the axis from elbow to hand (decision B5).
 
-    An object of radius r counts when its centre is within `radius` + r of the axis.
+    An object of radius r counts when its centre is within `radius` + r of the axis. A forearm that is not known
+    exactly has a cylinder that widens from the elbow on, by as much as it may be beside.
     """
     reach = layout.centres - np.asarray(forearm.tip if forearm.tip is not None else forearm.origin)
     axis = _unit(forearm.axis)
     along = reach @ axis
     off_axis = np.linalg.norm(reach - np.outer(along, axis), axis=1)
-    inside = (along >= -TOLERANCE) & (off_axis <= radius + layout.radii + TOLERANCE)
+    beside = math.tan(forearm.error) * ((layout.centres - np.asarray(forearm.origin)) @ axis).clip(min=0.0)
+    inside = (along >= -TOLERANCE) & (off_axis <= radius + beside + layout.radii + TOLERANCE)
     return frozenset(layout.ids[index] for index in np.flatnonzero(inside))
 
 
