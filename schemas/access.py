@@ -126,14 +126,15 @@ TABLE: tuple[Row, ...] = (
     ),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,
-        keys.BODY_HELD, keys.BODY_FAULTS, heard=(keys.WORLD,), served=(keys.ESTIMATE, keys.DESCRIBE),
+        keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD,),
+        served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
     *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, _OWN_ONGOING, *_RAW)),
     Row("perception", "publishes", _OWN_FAULT, _RARELY),
     *(
         Row("perception", "subscribes", key)
         for key in (keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
-                    keys.ROBOT_MOTION)
+                    keys.ROBOT_MOTION, keys.ROBOT_SEEN)
     ),
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),

@@ -106,7 +106,7 @@ KINDS: Mapping[str, FaultKind] = {
     ),
     "miscalibrated": FaultKind(
         does="The joint is beside the angle that it measures: looks and points are beside their targets, which "
-        "people see and the body does not know.",
+        "people see and the body does not know. `engage calibrate body` measures it.",
         on="part or joint", amount="degrees by which its true angle is greater; of a part: of each of its joints",
         usual=4.0, low=-45.0, high=45.0,
     ),

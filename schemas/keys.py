@@ -53,6 +53,7 @@ BODY_FAULTS = f"{PREFIX}/state/control/faults"
 ROBOT_ONGOING = f"{PREFIX}/state/control/ongoing_actions"
 """`OngoingActions` of the robot."""
 ROBOT_STATE = f"{PREFIX}/state/control/robot_state"
+ROBOT_SEEN = f"{PREFIX}/state/control/seen"
 
 ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 """The same as `ROBOT_STATE`, many times a second, while somebody listens."""

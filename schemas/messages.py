@@ -29,6 +29,7 @@ from engage_hri.schemas.body import (
     GoHome,
     HomeReached,
     PerformBehavior,
+    RobotSeen,
     RobotState,
     SyncPointArrived,
     SyncPointReached,
@@ -65,7 +66,7 @@ Message = (
     | PerformanceSteered | Held | BodyHeld | NetPlanned | NetMarked | NetWaiting
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
-    | SyncPointArrived | SyncPointReached | WordSpoken | RobotState
+    | SyncPointArrived | SyncPointReached | WordSpoken | RobotState | RobotSeen
     | SwitchFaults | FaultsSwitched | BodyFaults | DescribeBody | Capabilities | EstimateBehaviors | Estimates
     | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | HeadPose | VoiceActivity
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics

@@ -149,7 +149,7 @@ def note(log: logging.Logger, key: str, message: Message) -> None:
 
 def _is_measured(key: str) -> bool:
     """True for what comes many times a second and says nothing new by itself."""
-    return keys.key_class(key) == "stream" or key == keys.ROBOT_STATE
+    return keys.key_class(key) == "stream" or key in (keys.ROBOT_STATE, keys.ROBOT_SEEN)
 
 
 def note_presence(message: PeerAlive | PeerGone, viewer: str = "") -> None:

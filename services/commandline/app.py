@@ -32,6 +32,8 @@ COMMANDS = {
     "Exit 2 if it is not being performed.",
     "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. "
     "Exit 2 if it cannot play them.",
+    "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate body). "
+    "Exit 2 if nobody sees where it points.",
     "hostile": "Attack the whole robot, in memory and virtual time only. "
     "Exit 1 if anything came of it that should not have.",
     "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",

@@ -33,6 +33,7 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
+    from engage_hri.services.control.calibration import calibrated
     from engage_hri.services.control.drivers import made
     from engage_hri.services.generation.fragment_check import checked
     from engage_hri.services.generation.head.inhibitions import Leases
@@ -43,11 +44,12 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
     from engage_hri.services.generation.turns.policy import TurnPolicy
 
     body = made(config.control)
+    calibration = calibrated(body, config.control.calibration)
     permits = Leases(config.generation).permits()
     turns = TurnPolicy(config.robot, config.generation)
 
     def estimated(items: Sequence[EstimateItem]) -> Sequence[Estimate]:
-        return body.rehearse(items, world)
+        return [calibration.stated(estimate) for estimate in body.rehearse(items, world)]
 
     plans = []
     discourse = NO_DISCOURSE

@@ -15,10 +15,10 @@ from msgspec import Struct
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Ray
-from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.extras import Extras
 from engage_hri.services.runtime.steps import Steps
 
 if TYPE_CHECKING:
@@ -252,7 +252,7 @@ class MouthShape(Struct, frozen=True):
     width: float = 0.0
 
 
-class Body(ABC):
+class Body(Extras, ABC):
     """A robot, or a simulation of one. Its methods are called on the event loop and must not block.
 
     capabilities: what it can do, for planners: types of behaviors, joints and their limits.
@@ -287,7 +287,7 @@ class Body(ABC):
         """
         yield
 
-    def move_lips(self, shapes: Sequence[MouthShape]) -> None:  # noqa: B027
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
         """Move the lips with a voice: replace all shapes that are to come. By default nothing.
 
         shapes: in time order; the last one closes the mouth. Empty: the voice has fallen silent.
@@ -353,23 +353,6 @@ class Body(ABC):
 
         parts: names of parts, as in `capabilities`; empty: all.
         """
-
-    @property
-    def faults(self) -> tuple[BodyFault, ...]:
-        """Faults that it plays now; a real body plays none."""
-        return ()
-
-    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
-        """Play exactly these faults from now on, in what is under way, too. By default it can play none.
-
-        faults: each of a kind in `capabilities.faults`, with what `schemas.body_faults.KINDS` lets it have.
-
-        Raises:
-            InputRefused: it cannot play one of them, or not now. Nothing has changed.
-        """
-        if faults:
-            reason, advice = f"this body cannot play {faults[0].kind!r}", "only simulated bodies play faults"
-            raise InputRefused(Fault(reason=reason, where=faults[0].kind, advice=advice, service="control"))
 
     @abstractmethod
     def state(self) -> BodyState:

@@ -5,7 +5,7 @@ knows only its own joints; what one says of poses is completed with where the ot
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Radians
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     BehaviorRefused,
@@ -25,6 +26,7 @@ from engage_hri.services.control.body import (
     MovementAuthority,
     Progress,
 )
+from engage_hri.services.control.extras import Seen
 from engage_hri.services.control.refusals import unsupported
 from engage_hri.services.runtime.steps import Steps, finished
 
@@ -221,6 +223,33 @@ class ComposedBody(Body):
                 if member.body.capabilities.faults:
                     member.body.switch_faults(played)
             raise
+
+    # -- where it really points -----------------------------------------------------------------------------------
+
+    def seen(self) -> Seen | None:
+        told = [(member, member.body.seen()) for member in self._members]
+        if all(seen is None for _, seen in told):
+            return None
+        state = self.state()
+        rays = {"gaze": state.gaze, "left_arm": state.left_arm, "right_arm": state.right_arm}
+        parts = {"gaze": GAZE_PART, "left_arm": "left_arm", "right_arm": "right_arm"}
+        for member, seen in told:
+            for name, part in parts.items():
+                if seen is not None and member.has(part) and getattr(seen, name) is not None:
+                    rays[name] = getattr(seen, name)
+        return Seen(**rays)
+
+    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
+        return _first(member.body.ray_at(part, pose) for member in self._members if member.has(part))
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        for member in self._members:
+            own = {limit.joint for limit in member.body.capabilities.joints if limit.part in member.parts}
+            member.body.calibrate({joint: angle for joint, angle in offsets.items() if joint in own})
+        known = {limit.joint for limit in self.capabilities.joints}
+        if unknown := [joint for joint in offsets if joint not in known]:
+            reason, advice = f"no joint {', '.join(unknown)}", f"it has {', '.join(sorted(known))}"
+            raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
 
     # -- measurements -------------------------------------------------------------------------------------------
 

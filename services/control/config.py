@@ -19,6 +19,16 @@ class Displaced(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     angle: Degrees
 
 
+class Miscalibrated(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A joint that is beside the angle that it measures, which people see and the body does not know. Thesis 5.4.3.
+
+    part: a joint, or a body part, whose joints are all so. angle: by which the true angle is greater.
+    """
+
+    part: str
+    angle: Degrees
+
+
 class Stall(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A part stops half-way to a sync point.
 
@@ -48,7 +58,7 @@ class Variability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     seed: same seed, same deviations, whatever the order in which behaviors come.
     noise: standard deviation of the logarithm of each behavior's duration; 0.1 is about 10 %.
-    slow, stall, displaced: see their types.
+    slow, stall, displaced, miscalibrated: see their types.
     overheated: parts whose motor fails half-way through every motion (thesis 4.5.3).
     mute: `silent`: the voice makes no sound and reports its words all the same (thesis 5.4.3);
         `refuse`: the voice refuses to speak.
@@ -60,6 +70,7 @@ class Variability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     slow: tuple[Slow, ...] = ()
     stall: tuple[Stall, ...] = ()
     displaced: tuple[Displaced, ...] = ()
+    miscalibrated: tuple[Miscalibrated, ...] = ()
     overheated: tuple[str, ...] = ()
     mute: Literal["", "silent", "refuse"] = ""
     lost: Probability = 0.0
@@ -86,6 +97,8 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
     no_point_zones: spheres that no body ever points into.
     variability: deviations of the simulated body.
+    calibration: file with the offsets of joints, and how well looks and points are known, as `engage calibrate body`
+        makes it. Empty: the body is as it measures.
     repertoire: files with lexemes of the simulated body, one name or a list; see docs/control.md.
     """
 
@@ -93,6 +106,7 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     dead_man: Seconds = 5.0
     no_point_zones: tuple[NoPointZone, ...] = ()
     variability: Variability = Variability()
+    calibration: str = ""
     repertoire: str | tuple[str, ...] = ()
     body: str | tuple[str, ...] = "simulated"
     voice: str = ""

@@ -45,6 +45,7 @@ from engage_hri.services.control.body import (
     Reached,
     Spoke,
 )
+from engage_hri.services.control.calibration import calibrated
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
 from engage_hri.services.control.estimates import IncomingEstimates
@@ -120,7 +121,8 @@ class _Control:
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
         body.on_fault = self._tell_fault
-        self.shown = Shown(bus, body, self._actions, config.state_rate)
+        self._calibration = calibrated(body, config.calibration)
+        self.shown = Shown(bus, body, self._actions, config.state_rate, self._calibration)
         self.switch = FaultSwitch(bus, body, self.desk)
 
     # -- reads --------------------------------------------------------------------------------------------------
@@ -135,7 +137,7 @@ class _Control:
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
         others = [item for item in question.others if self._refused(item.behavior) is None]
         told = yield from self._body.rehearse_in_steps(known, world, others)
-        estimates = iter(self._estimates.take(known, told))
+        estimates = map(self._calibration.stated, self._estimates.take(known, told))
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def _refused(self, behavior: BlockBehavior) -> Estimate | None:

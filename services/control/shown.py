@@ -4,11 +4,13 @@ from math import inf
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import OngoingActions
-from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.body import RobotSeen, RobotState
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.body import Body
+from engage_hri.services.control.calibration import Calibration
+from engage_hri.services.control.extras import Seen
 from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
 
@@ -25,8 +27,11 @@ class Shown:
     Whether somebody listens to `keys.ROBOT_MOTION` changes nothing else: the eyes are watched as often in any case.
     """
 
-    def __init__(self, bus: Bus, body: Body, actions: ActionReporter, rate: float) -> None:
-        """rate: looks a second while anything moves."""
+    def __init__(
+        self, bus: Bus, body: Body, actions: ActionReporter, rate: float, calibration: Calibration | None = None
+    ) -> None:
+        """rate: looks a second while anything moves. calibration: says how far what is measured may be beside."""
+        self._calibration = calibration or Calibration()
         self._bus = bus
         self._body = body
         self._actions = actions
@@ -34,6 +39,8 @@ class Shown:
         self._interval = 1.0 / rate
         self._next = Timer(self.look)
         self._looked: Seconds = -inf
+        self._is_beside = False
+        """True if it was told last that the body is elsewhere than it measures."""
         self._told: tuple[Seconds, tuple[str, str, bool]] = (-inf, ("", "", False))
         """Time of the last message on `keys.ROBOT_STATE`; what it looked at and said, and whether it moved."""
 
@@ -47,9 +54,11 @@ class Shown:
         now, state = self._bus.now(), self._body.state()
         self._looked = now
         self.tell(self._actions.looks_at(state.looking_at, "", now))
+        widened = self._calibration.widened
         message = RobotState(
-            at=self._bus.stamp(now), pose=state.pose, gaze=state.gaze, left_arm=state.left_arm,
-            right_arm=state.right_arm, looking_at=state.looking_at, speaking=state.speaking,
+            at=self._bus.stamp(now), pose=state.pose, gaze=widened(state.gaze, "head"),
+            left_arm=widened(state.left_arm, "left_arm"), right_arm=widened(state.right_arm, "right_arm"),
+            looking_at=state.looking_at, speaking=state.speaking,
         )  # fmt: skip
         (at, before), news = self._told, (state.looking_at, state.speaking, state.moving)
         if news != before or now >= at + (MOVING if state.moving else IDLE) - EPSILON:
@@ -57,7 +66,19 @@ class Shown:
             self._bus.publish(keys.ROBOT_STATE, message)
         if self._bus.is_heard(keys.ROBOT_MOTION):
             self._bus.publish(keys.ROBOT_MOTION, message)
+        self._tell_seen(now)
         self._next.set(now + (self._interval if state.moving else IDLE))
+
+    def _tell_seen(self, now: Seconds) -> None:
+        """Publish where a simulated body really is, as long as that is not where it measures."""
+        seen = self._body.seen()
+        if seen is not None or self._is_beside:
+            rays = seen or Seen()
+            message = RobotSeen(
+                at=self._bus.stamp(now), gaze=rays.gaze, left_arm=rays.left_arm, right_arm=rays.right_arm
+            )
+            self._bus.publish(keys.ROBOT_SEEN, message)
+        self._is_beside = seen is not None
 
     def look_soon(self) -> None:
         """Bring the next look forward, as something has begun to move."""

@@ -40,6 +40,7 @@ def configured(variability: Variability) -> Deviations:
     ]
     faults += [BodyFault(kind="overheated", part=part) for part in variability.overheated]
     faults += [BodyFault(kind="displaced", part=it.joint, amount=it.angle) for it in variability.displaced]
+    faults += [BodyFault(kind="miscalibrated", part=it.part, amount=it.angle) for it in variability.miscalibrated]
     if variability.noise:
         faults.append(BodyFault(kind="noise", amount=variability.noise))
     if variability.mute:

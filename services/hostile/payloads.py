@@ -9,7 +9,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner, InhibitionEnded
 from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, PerformanceSteered
-from engage_hri.schemas.body import RobotState, SyncPointArrived, SyncPointReached, WordSpoken
+from engage_hri.schemas.body import RobotSeen, RobotState, SyncPointArrived, SyncPointReached, WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
@@ -41,7 +41,7 @@ FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
     NetPlanned: keys.NET, NetMarked: keys.NET, NetWaiting: keys.NET, Held: keys.HELD,
-    BodyHeld: keys.BODY_HELD, BodyFaults: keys.BODY_FAULTS,
+    BodyHeld: keys.BODY_HELD, BodyFaults: keys.BODY_FAULTS, RobotSeen: keys.ROBOT_SEEN,
 }  # fmt: skip
 """Key of each type of message that always has the same."""
 

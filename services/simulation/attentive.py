@@ -35,11 +35,11 @@ class AttentiveHuman(ListeningHuman):
 
     def feed(self, message: Message, now: Seconds) -> None:
         match message:
-            case ActionBegan(actor=self._robot, action="look" | "point", targets=(target, *_)):
+            case ActionBegan(actor=self._robot, action="look" | "point" as action, targets=(target, *_)):
                 if target == self._person:
                     self._react((LookAt(FACE),), self.FOLLOWS, now)
                 elif target in self._sees:
-                    self._react((LookAt(target),), self.FOLLOWS, now)
+                    self._react((LookAt(target, pointed=action == "point"),), self.FOLLOWS, now)
         self._listen(message, now)
 
     def _answer(self, utterance: HeardSpeech) -> tuple[Act, ...]:

@@ -7,9 +7,9 @@ so does the world if a fault makes it unsteady.
 from collections.abc import Iterator
 
 from engage_hri.schemas.actions import ActorFound, ActorLost
-from engage_hri.schemas.body import Ray, RobotState
+from engage_hri.schemas.body import Ray, RobotSeen, RobotState
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.faults import Chances, FaceLoss, TableVision
@@ -39,6 +39,8 @@ class Cameras:
         )
         self._face = FaceLoss(faults, chances("faces"))
         self._vision = TableVision(faults, chances("table"))
+        self._seen_eyes: Vector | None = None
+        """Place of the robot's eyes, if it is not where the robot measures it."""
         self._entities: tuple[Entity, ...] = ()
         self._next_frame: Seconds | None = None
         """Time of the next frame; None while only changes are reported."""
@@ -53,6 +55,12 @@ class Cameras:
 
     def feed(self, message: Message, now: Seconds) -> None:
         match message:
+            case RobotSeen(gaze=gaze):
+                self._seen_eyes = None if gaze is None else gaze.origin
+                self._sightlines.robot_eyes = self._seen_eyes or self._sightlines.robot_eyes
+                self._exact.feed(message, now)
+            case RobotState() if self._seen_eyes is not None:
+                pass  # people see where its eyes are, not where it measures them
             case RobotState(gaze=Ray(origin=eyes)):
                 self._sightlines.robot_eyes = eyes
             case RobotState():

@@ -32,9 +32,13 @@ TABLE = "table"
 
 
 class LookAt(Struct, frozen=True):
-    """Look at `target`: an entity, `FACE`, or `AWAY`."""
+    """Look at `target`: an entity, `FACE`, or `AWAY`.
+
+    pointed: true if the robot points at it: then at what its arm is really on.
+    """
 
     target: str
+    pointed: bool = False
 
 
 class Sit(Struct, frozen=True):

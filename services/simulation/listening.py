@@ -59,7 +59,7 @@ class ListeningHuman(Human):
     def feed(self, message: Message, now: Seconds) -> None:
         match message:
             case ActionBegan(actor=self._robot, action="point", targets=(target,)):
-                self._react((LookAt(target),), self.FOLLOWS, now)
+                self._react((LookAt(target, pointed=True),), self.FOLLOWS, now)
         self._listen(message, now)
 
     def _listen(self, message: Message, now: Seconds) -> None:

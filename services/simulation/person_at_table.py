@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.body import RobotSeen
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
@@ -25,6 +26,7 @@ from engage_hri.services.simulation.human import (
     Stop,
     Withdraw,
 )
+from engage_hri.services.simulation.seen_arms import SeenArms
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import PiecePose, overlap, poses_touching
 
@@ -44,6 +46,7 @@ class PersonAtTable:
         self._frame = frame
         self._stamp = stamp
         self._actor = table.layout.person.id
+        self._arms = SeenArms()
         self._look: str | None = None
         self._last_world: Seconds | None = None
 
@@ -59,7 +62,10 @@ class PersonAtTable:
         self._human.enter(now)
 
     def feed(self, message: Message, now: Seconds) -> None:
-        self._human.feed(message, now)
+        if isinstance(message, RobotSeen):
+            self._arms.see(message)
+        else:
+            self._human.feed(message, now)
 
     def world(self, now: Seconds) -> World:
         self._last_world = now
@@ -80,6 +86,11 @@ class PersonAtTable:
     def _do(self, act: Act, then: tuple[Act, ...], now: Seconds) -> Iterator[Message]:
         following = now
         match act:
+            case LookAt(pointed=True) if self._arms.are_moving(now):
+                self._human.schedule((act, *then), now + self._frame)
+                return
+            case LookAt(target=target, pointed=True):
+                yield from self._looks_at(self._arms.meant(target, self._table.pieces(now)), now)
             case LookAt(target=target):
                 yield from self._looks_at(self._robot if target == FACE else target, now)
             case Sit():

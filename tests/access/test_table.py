@@ -67,7 +67,7 @@ async def visit(flows: set[Flow]) -> None:
                 await asyncio.sleep(2.0)
                 await guard.hold()
                 await guard.resume()
-                await guard.switch_faults([BodyFault(kind="slow", part="voice", amount=1.5)])
+                await guard.switch_faults([BodyFault(kind="miscalibrated", part="right_arm")])
                 await alice.interrupt("b", "s")
                 await speaking
             await alice.perform(TurnFragment(id="whole", behaviors=(SPEECH,)))

@@ -43,7 +43,8 @@ def test_they_look_where_the_robot_looks_and_points(action: Action, target: str,
     human.feed(robot_does(action, target), 1.0)
 
     assert human.deadline == 1.0 + AttentiveHuman.FOLLOWS
-    assert acts(human, 1.0 + AttentiveHuman.FOLLOWS) == (LookAt(where),)
+    pointed = action == "point" and where == "cup"
+    assert acts(human, 1.0 + AttentiveHuman.FOLLOWS) == (LookAt(where, pointed=pointed),)
 
 
 def test_they_see_only_what_there_is_and_mind_only_the_robot() -> None:

@@ -5,7 +5,7 @@ next sync point, or until its authority changes. So a part needs no task to go h
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import aclosing
 from math import inf, radians
 from pathlib import Path
@@ -16,7 +16,7 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.control import variability
@@ -31,11 +31,12 @@ from engage_hri.services.control.body import (
     Reached,
 )
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.torso import choreography, displacing, kinematics, tracks
+from engage_hri.services.control.extras import Seen
+from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
-from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
+from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, wait_estimate
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
@@ -78,6 +79,8 @@ class SimulatedBody(Body):
         self._torso = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
+        self._offsets: dict[str, float] = {}
+        """Radians by which the true angle of a joint is more than what it measures, as its calibration says."""
         self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
         """The last pose, as a message, and the rays of eyes and arms in it: often nothing has moved since."""
 
@@ -99,7 +102,9 @@ class SimulatedBody(Body):
                 return speech_estimate(behavior, utter(text), torso.pose(world, pose))
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
-        return torso.estimate(behavior, pose, world)
+        estimate = torso.estimate(behavior, pose, world)
+        is_beneath = pose is None and head.is_shift(behavior) and torso.is_overlaid()
+        return beneath_a_look(estimate) if is_beneath else estimate
 
     def rehearse(
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
@@ -178,6 +183,42 @@ class SimulatedBody(Body):
     def see(self, world: World) -> None:
         self._torso.world = world
         self._torso.follow()
+
+    # -- what it does not measure -------------------------------------------------------------------------------
+
+    def seen(self) -> Seen | None:
+        if not (beside := self._beside()):
+            return None
+        told = tracks.pose_at(self._torso.tracks, self._loop.time())
+        angles = {joint: angle + beside.get(joint, 0.0) for joint, angle in told.items()}
+        arms = kinematics.arm(angles, "left"), kinematics.arm(angles, "right")
+        return Seen(gaze=kinematics.gaze(angles), left_arm=arms[0], right_arm=arms[1])
+
+    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
+        angles = tracks.updated(kinematics.HOME, pose)
+        match part:
+            case "head":
+                return kinematics.gaze(angles)
+            case "left_arm":
+                return kinematics.arm(angles, "left")
+            case "right_arm":
+                return kinematics.arm(angles, "right")
+        return None
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        if unknown := [joint for joint in offsets if kinematics.LIMIT.get(joint) is None]:
+            reason, advice = f"no joint {', '.join(unknown)}", f"its joints are {', '.join(kinematics.LIMIT)}"
+            raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
+        self._offsets = dict(offsets)
+
+    def _beside(self) -> dict[str, float]:
+        """Radians by which joints are beside the angles that it tells: each that is miscalibrated, or corrected."""
+        beside = {joint: -offset for joint, offset in self._offsets.items()}
+        for fault, amount in self._deviations.of("miscalibrated"):
+            for joint in [limit.joint for limit in kinematics.JOINTS if fault.part in ("", limit.part, limit.joint)]:
+                if kinematics.LIMIT[joint].part != "face":
+                    beside[joint] = beside.get(joint, 0.0) + radians(amount)
+        return {joint: angle for joint, angle in beside.items() if angle}
 
     # -- faults -------------------------------------------------------------------------------------------------
 

@@ -84,6 +84,28 @@ def poses(course: Course, pose: Mapping[str, float]) -> tuple[BodyPose, BodyPose
     return kinematics.pose_message({**pose, **course.on_target}), kinematics.pose_message({**pose, **dict(moved)})
 
 
+def beneath_a_look(shift: Estimate) -> Estimate:
+    """The estimate of a shift of the head that begins under a look: nothing moves, and it ends at once."""
+    phases = tuple([replace(phase, shortest=0.0, natural=0.0, longest=None) for phase in shift.phases])
+    return replace(shift, phases=phases, head_degrees=0.0)
+
+
+def going_home(estimate: Estimate, leaves: str, back: Path) -> Estimate:
+    """The estimate of a behavior that goes home by another path than the one it was laid with.
+
+    leaves: the sync point from which the path `back` leads home.
+    """
+    syncs = [phase.since for phase in estimate.phases]
+    number = syncs.index(leaves)
+    at = {leaves: 0.0, **back.marks}
+    homeward = []
+    for phase in estimate.phases[number:]:
+        natural = at[phase.to] - at[phase.since]
+        longest = None if phase.hold or not natural else _longest(natural, SLOWEST, inf)
+        homeward.append(replace(phase, natural=natural, shortest=natural / back.fastest, longest=longest))
+    return replace(estimate, phases=(*estimate.phases[:number], *homeward))
+
+
 def _travel(path: Path, until: Seconds, added: Added) -> float:
     """Way of all joints along `path` to which the trunk adds its share."""
     seen = [path.at(s).q + added(s) for s in np.linspace(0.0, until, 9).tolist()]

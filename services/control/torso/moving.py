@@ -18,7 +18,7 @@ from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
 from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.estimates import Added, infeasible, motion_estimate, poses
+from engage_hri.services.control.torso.estimates import Added, going_home, infeasible, motion_estimate, poses
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
@@ -77,7 +77,14 @@ class Torso:
         course = choreography.plan(behavior, situation)
         path = self.path(course, None if moving and not self.misbelieved else situation)
         added = self._added(course) if moving and not self.misbelieved else None
-        return motion_estimate(behavior, course, path, *poses(course, situation.pose), added)
+        estimate = motion_estimate(behavior, course, path, *poses(course, situation.pose), added)
+        leaves = next((point.sync for point in course.points if is_last_on_target(behavior, point.sync)), "")
+        if added is None or not leaves:
+            return estimate
+        # The trunk has the part elsewhere by then, so its way home is another one.
+        now, run = self.clock.time(), Run(behavior, course, MovementAuthority(behavior, leaves), Deviations(), 0)
+        back = self.way_home(run, Motion(path, now), now + path.marks[leaves])
+        return estimate if back is None else going_home(estimate, leaves, back)
 
     def _added(self, course: Course) -> Added | None:
         """Tell what the trunk adds to a path that begins now; None: nothing."""

@@ -19,6 +19,7 @@ from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, head, tracks
 from engage_hri.services.control.torso.copied import Clock
 from engage_hri.services.control.torso.course import Course, Impossible
+from engage_hri.services.control.torso.estimates import beneath_a_look
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.path import Path, resting
@@ -290,10 +291,7 @@ def _begin(
             torso.set_base(behavior, course, MovementAuthority(behavior, START))
             torso.follow()
         # Nothing moves: it ends at once, or whenever it is asked to.
-        return replace(
-            estimate,
-            phases=tuple([replace(each, natural=0.0, shortest=0.0, longest=None) for each in estimate.phases]),
-        )
+        return beneath_a_look(estimate)
     try:
         course = choreography.plan(behavior, torso.situation(torso.world))
         if _place(torso, item.pose, [part for part in course.parts if part not in moved]):

@@ -52,13 +52,14 @@ def in_gaze_cones(gazes: Sequence[Ray], half_angle: Radians, layout: Layout) -> 
     """Ids of the objects that have their centre or a corner of their footprint in the cone around each gaze axis.
 
     The angle between axis and eye-to-point decides: the same set as the ellipse the cone cuts from the table
-    (decision B4).
+    (decision B4). A gaze that is not known exactly has as much wider a cone.
     """
     reach = layout.places - _vectors([gaze.origin for gaze in gazes])[:, None]
     along = np.einsum("gpx,gx->gp", reach, _units(gazes))
     distance = np.sqrt(np.einsum("gpx,gpx->gp", reach, reach))
     angle_rad = np.arccos(np.clip(along / np.maximum(distance, TOLERANCE), -1.0, 1.0))
-    inside = (angle_rad <= half_angle + TOLERANCE) | (distance <= TOLERANCE)
+    errors = np.array([gaze.error for gaze in gazes])
+    inside = (angle_rad <= half_angle + errors[:, None] + TOLERANCE) | (distance <= TOLERANCE)
     return [frozenset(layout.ids[index] for index in layout.owner[each].tolist()) for each in inside]
 
 
@@ -70,14 +71,17 @@ def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[st
 def in_pointing_cylinders(forearms: Sequence[Ray], radius: Meters, layout: Layout) -> list[frozenset[str]]:
     """Ids of the objects in the half-cylinder ahead of each hand, around the axis from elbow to hand (decision B5).
 
-    An object of radius r counts when its centre is within `radius` + r of the axis.
+    An object of radius r counts when its centre is within `radius` + r of the axis. A forearm that is not known
+    exactly has a cylinder that widens from the elbow on, by as much as it may be beside.
     """
     tips = [forearm.tip if forearm.tip is not None else forearm.origin for forearm in forearms]
     reach, axes = layout.centres - _vectors(tips)[:, None], _units(forearms)
     along = np.einsum("fox,fx->fo", reach, axes)
-    beside = reach - along[..., None] * axes[:, None]
-    off_axis = np.sqrt(np.einsum("fox,fox->fo", beside, beside))
-    inside = (along >= -TOLERANCE) & (off_axis <= radius + layout.radii + TOLERANCE)
+    off_axis = reach - along[..., None] * axes[:, None]
+    off_axis = np.sqrt(np.einsum("fox,fox->fo", off_axis, off_axis))
+    from_elbow = np.einsum("fox,fx->fo", layout.centres - _vectors([each.origin for each in forearms])[:, None], axes)
+    wider = np.tan([forearm.error for forearm in forearms])[:, None] * from_elbow.clip(min=0.0)
+    inside = (along >= -TOLERANCE) & (off_axis <= radius + wider + layout.radii + TOLERANCE)
     return [frozenset(layout.ids[index] for index in np.flatnonzero(each).tolist()) for each in inside]
 
 

@@ -1,0 +1,68 @@
+"""What a body may offer besides its contract: faults that it plays, where it really points, and how to mend that."""
+
+from collections.abc import Mapping, Sequence
+
+from msgspec import Struct
+
+from engage_hri.schemas.body import BodyPose, Capabilities, Ray
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Radians
+
+
+class Seen(Struct, frozen=True, kw_only=True):
+    """What people see of a body, and cameras: rays as in `BodyState`."""
+
+    gaze: Ray | None = None
+    left_arm: Ray | None = None
+    right_arm: Ray | None = None
+
+
+class Extras:
+    """The part of `Body` that no body needs to have."""
+
+    capabilities: Capabilities
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        """Faults that it plays now; a real body plays none."""
+        return ()
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        """Play exactly these faults from now on, in what is under way, too. By default it can play none.
+
+        faults: each of a kind in `capabilities.faults`, with what `schemas.body_faults.KINDS` lets it have.
+
+        Raises:
+            InputRefused: it cannot play one of them, or not now. Nothing has changed.
+        """
+        if faults:
+            reason, advice = f"this body cannot play {faults[0].kind!r}", "only simulated bodies play faults"
+            raise InputRefused(Fault(reason=reason, where=faults[0].kind, advice=advice, service="control"))
+
+    def seen(self) -> Seen | None:
+        """Tell where a simulated body really looks and points, if that is not where it measures.
+
+        None: it is as it measures; and a real body, which everybody sees.
+        """
+        return None
+
+    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
+        """Tell where the gaze (`head`) or a forearm is with the joints so; None: it does not know.
+
+        part: `head`, `left_arm` or `right_arm`. pose: angles of all its joints, radians.
+        """
+        return None
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct the angles of joints from now on: as told, asked for and estimated they are the true ones.
+
+        offsets: to be added to what a joint measures, by joint.
+
+        Raises:
+            InputRefused: it corrects none, or has no such joint. By default it corrects none.
+        """
+        if offsets:
+            reason = f"the body {self.capabilities.body} does not correct the angle of {', '.join(offsets)}"
+            advice = "leave [offsets] out of the calibration; its [errors] count all the same"
+            raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
