@@ -34,6 +34,7 @@ generate: $(READY)
 	@$(BIN)/python -m engage_hri.schemas.export
 	@$(BIN)/python docs/site/configuration.py
 	@$(BIN)/python docs/site/types_table.py
+	@$(BIN)/python docs/site/laws_table.py
 	@$(BIN)/python docs/site/vocabulary_table.py
 
 bench: $(READY)
