@@ -175,7 +175,8 @@ def test_a_body_is_checked_from_its_own_repository(installed: Path, repository: 
 
 
 def test_the_suite_costs_nothing_where_nobody_names_it(installed: Path, tmp_path: Path) -> None:
-    test = "import sys\n\n\ndef test_others():\n    assert not [each for each in sys.modules if each.startswith('engage')]\n"
+    test = "assert not [one for one in sys.modules if one.startswith('engage')]"
+    test = f"import sys\n\n\ndef test_others():\n    {test}\n"
     (tmp_path / "test_others.py").write_text(test)
 
     ended = run(installed, tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_others.py")

@@ -22,7 +22,16 @@ TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "tests/REA
 CONTENTS = {
     "Using it": ("commands", "configuration", "deploy", "security", "scenario", "study", "language-models"),
     "From other programs": ("reference", "connection-events", "protocol", "messages", "bml", "vocabulary"),
-    "How it works": ("architecture", "generation", "realizer", "recognition", "control", "bus", "hostile"),
+    "How it works": (
+        "architecture",
+        "generation",
+        "realizer",
+        "recognition",
+        "control",
+        "contract",
+        "bus",
+        "hostile",
+    ),
     "Words and reasons": ("glossary", "decisions/README"),
     "The project": ("../CHANGELOG", "../CONTRIBUTING", "../tests/README", "../SECURITY", "README"),
 }
