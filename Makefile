@@ -35,6 +35,7 @@ generate: $(READY)
 	@$(BIN)/python docs/site/configuration.py
 	@$(BIN)/python docs/site/types_table.py
 	@$(BIN)/python docs/site/faults_table.py
+	@$(BIN)/python docs/site/laws_table.py
 	@$(BIN)/python docs/site/vocabulary_table.py
 
 bench: $(READY)

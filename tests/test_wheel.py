@@ -81,6 +81,109 @@ def test_a_robot_runs_from_it(installed: Path, tmp_path: Path) -> None:
     assert "block b: done" in ended.stdout
 
 
+DRIVER = '''
+from msgspec.structs import replace
+
+from engage_hri.services.control.torso.body import SimulatedBody
+
+
+class Head(SimulatedBody):
+    """A head without a body."""
+
+    def __init__(self):
+        super().__init__()
+        joints = tuple(each for each in self.capabilities.joints if each.part == "head")
+        types = ("gaze", "gazeShift", "head")
+        self.capabilities = replace(self.capabilities, body="head", types=types, parts=("head",), joints=joints)
+
+    def state(self):
+        return replace(super().state(), left_arm=None, right_arm=None)
+
+
+class Liar(Head):
+    def estimate(self, behavior, pose, world):
+        told = super().estimate(behavior, pose, world)
+        return replace(told, pose_end=told.pose_after)
+'''
+TESTS = """
+import asyncio
+
+import pytest
+
+from driver import Head, Liar
+from engage_hri.services.control.testing import BodyContract
+
+
+class TestHead(BodyContract):
+    def make(self):
+        return Head()
+
+    async def test_a_law_of_its_own(self, body):
+        await asyncio.sleep(1000.0)  # no test waits for that: the clock is virtual
+
+        assert body.capabilities.body == "head"
+
+
+class TestLiar(BodyContract):
+    seeds = 1
+
+    def make(self):
+        return Liar()
+
+
+@pytest.mark.asyncio
+async def test_what_is_no_body_has_the_loop_that_it_had():
+    assert type(asyncio.get_running_loop()).__module__.startswith("asyncio.")
+"""
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A driver's own repository, somewhere."""
+    (tmp_path / "driver.py").write_text(DRIVER)
+    (tmp_path / "test_driver.py").write_text(TESTS)
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers -p no:hypothesispytest\n")
+    (tmp_path / "conftest.py").write_text('pytest_plugins = ["engage_hri.services.control.testing.plugin"]\n')
+    return tmp_path
+
+
+def test_a_driver_runs_the_contract_suite_from_its_own_repository(installed: Path, repository: Path) -> None:
+    ended = run(installed, repository, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    failed = re.findall(r"^FAILED (.*?)(?: - .*)?$", ended.stdout, re.MULTILINE)
+
+    assert failed == ["test_driver.py::TestLiar::test_ends_where_it_said"], ended.stdout
+    assert "gaze at near-right, end: expected where `pose_end` said: neck_" in ended.stdout
+    assert ended.returncode == 1
+
+
+def test_without_its_plugin_the_suite_says_what_is_missing(installed: Path, repository: Path) -> None:
+    (repository / "conftest.py").unlink()
+
+    ended = run(installed, repository, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "TestHead and home")
+
+    assert (
+        'the suite needs its plugin: pytest_plugins = ["engage_hri.services.control.testing.plugin"]' in ended.stdout
+    )
+
+
+def test_a_body_is_checked_from_its_own_repository(installed: Path, repository: Path) -> None:
+    ended = run(installed, repository, "-P", "-m", "engage_hri", "check-body", "driver.py:Liar", "--law", "end")
+
+    assert ended.returncode == 1, ended.stderr
+    assert "head (driver.py:Liar), held to the contract of bodies in virtual time" in ended.stdout
+    assert re.search(r"1 law is broken, \d laws hold", ended.stdout)
+
+
+def test_the_suite_costs_nothing_where_nobody_names_it(installed: Path, tmp_path: Path) -> None:
+    test = "assert not [one for one in sys.modules if one.startswith('engage')]"
+    test = f"import sys\n\n\ndef test_others():\n    {test}\n"
+    (tmp_path / "test_others.py").write_text(test)
+
+    ended = run(installed, tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_others.py")
+
+    assert ended.returncode == 0, ended.stdout
+
+
 def test_every_python_that_it_promises_is_tried_before_it_is_released() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     promised = re.findall(r":: Python :: (3\.\d+)", "\n".join(project["classifiers"]))

@@ -29,6 +29,7 @@ CONTENTS = {
         "recognition",
         "control",
         "reachy-mini",
+        "contract",
         "bus",
         "hostile",
     ),

@@ -10,12 +10,16 @@ from unittest.mock import patch
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.services.control.body import Body
+from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import JointMotion, Leg, resting
 from engage_hri.services.control.torso.path import Path as Way
+from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.control.liars_by_deed import Noisy
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
+CONTRACT = PAGE.with_name("contract.md")
 
 
 CODE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
@@ -68,6 +72,31 @@ class TestPanTilt(BodyContract):
         body = driver().PanTilt()
         assert isinstance(body, Body)
         return body
+
+
+class Robot(Noisy):
+    """What the page on the contract calls MyRobot."""
+
+    def __init__(self, *, simulated: bool, stalled: str = "") -> None:
+        assert simulated
+        super().__init__(deviations=Variability(stall=(Stall(part="head", before="stroke"),) if stalled else ()))
+
+
+def test_the_suite_on_the_page_is_one():
+    (code,) = re.findall(r"```python\n(.*?)```", CONTRACT.read_text(encoding="utf-8"), re.DOTALL)
+    theirs, module = types.ModuleType("my_robot"), types.ModuleType("test_my_robot")
+    theirs.MyRobot = Robot  # type: ignore[attr-defined]
+    with patch.dict(sys.modules, {"my_robot": theirs}):
+        exec(compile(code, str(CONTRACT), "exec"), module.__dict__)
+    suite = module.TestMyRobot()
+
+    async def judge() -> None:
+        async with suite.connected(suite.make) as body:
+            await suite.test_measures_all_its_joints_within_their_noise(body)
+        await suite.test_with_a_fault_it_passes_or_names_the_fault(*suite.faults())
+
+    assert isinstance(suite, BodyContract)
+    run_virtual(judge())
 
 
 def test_a_newcomers_driver_is_short():

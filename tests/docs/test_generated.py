@@ -34,6 +34,15 @@ def test_the_table_of_faults_is_not_stale(monkeypatch: pytest.MonkeyPatch) -> No
     del sys.modules["faults_table"]
 
 
+def test_the_table_of_laws_is_not_stale(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
+    import laws_table
+
+    text = laws_table.PAGE.read_text(encoding="utf-8")
+    assert laws_table.page(text) == text, "make generate"
+    del sys.modules["laws_table"]
+
+
 def test_make_generate_writes_all_of_it() -> None:
     """Compared elsewhere: the schemas (tests/schemas/test_export.py), docs/vocabulary.md (tests/realizer)."""
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\ngenerate:")[2].partition("\n\n")[0]
@@ -41,5 +50,6 @@ def test_make_generate_writes_all_of_it() -> None:
     assert "engage_hri.schemas.export" in recipe
     assert "docs/site/configuration.py" in recipe
     assert "docs/site/types_table.py" in recipe
+    assert "docs/site/laws_table.py" in recipe
     assert "docs/site/vocabulary_table.py" in recipe
     assert "docs/site/faults_table.py" in recipe

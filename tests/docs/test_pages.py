@@ -50,6 +50,7 @@ EXCUSED = {
 """Commands that do not run here, and why."""
 ELSEWHERE = {
     ("docs/control.md", "python"): "tests/control/test_docs.py",
+    ("docs/contract.md", "python"): "tests/control/test_docs.py",
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
