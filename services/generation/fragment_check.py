@@ -68,9 +68,10 @@ def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
         if target not in known and target != robot:
             advice = suggestion(target, known, EMPTY)
             raise _refused(fragment, path, f"the world does not know {target!r}", line, advice)
+    objects = {id: entity for id, entity in known.items() if entity.kind == "object"}
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Reference):
-            _check_objects(fragment, index, behavior, known)
+            _check_objects(fragment, index, behavior, objects)
 
 
 def lacks_people(fragment: TurnFragment, world: World) -> bool:
@@ -110,13 +111,14 @@ def _delay_target(fragment: TurnFragment, world: World) -> str:
     return next((entity.id for entity in world.entities if entity.kind == "surface"), "")
 
 
-def _check_objects(fragment: TurnFragment, index: int, reference: Reference, known: Mapping[str, Entity]) -> None:
-    objects = {id: entity for id, entity in known.items() if entity.kind == "object"}
+def _check_objects(fragment: TurnFragment, index: int, reference: Reference, objects: Mapping[str, Entity]) -> None:
     if reference.target not in objects:
         reason = f"the world does not know the object {reference.target!r}"
         path = f"$.behaviors[{index}].target"
         raise _refused(fragment, path, reason, reference.line, suggestion(reference.target, objects, EMPTY))
     for number, option in enumerate(reference.options or ()):
+        if objects.keys() >= set(option.distractors):
+            continue
         for place, distractor in enumerate(option.distractors):
             if distractor not in objects:
                 path = f"$.behaviors[{index}].options[{number}].distractors[{place}]"

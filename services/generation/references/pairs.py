@@ -25,7 +25,6 @@ from engage_hri.services.generation.references.reliability import channel_reliab
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
 """All gestures, the set J of the thesis, from fewer movements to more."""
 POINT: GestureChoice = "directed_gaze_with_pointing"
-DIRECTED: tuple[GestureChoice, ...] = ("directed_gaze", POINT)
 ROUNDING = 9
 """Decimals of costs and reliabilities that count: sums of the same numbers in another order are equal."""
 _RANK = {gesture: number for number, gesture in enumerate(GESTURES)}
@@ -63,6 +62,8 @@ class Pair(Struct, frozen=True, kw_only=True):
     channel: Probability
     reliability: Probability
     ruled_out: str = ""
+    is_short: bool = False
+    """True if its reliability is below what is asked for."""
 
     @property
     def preference(self) -> tuple[bool, float, int, int]:
@@ -106,6 +107,8 @@ def considered(
         universe.intersection(option.distractors) if option.text and not option.deictic else universe
         for option in reference.options or ()
     ]
+    minimum = minimum_of(reference, config)
+    reliabilities: dict[tuple[int, Probability], tuple[Probability, bool]] = {}
     pairs = []
     for gesture in GESTURES:
         points = gesture == POINT
@@ -115,6 +118,10 @@ def considered(
         for order, option in enumerate(reference.options or ()):
             channel = channels["words" if option.text else ""]
             distractors = left & said[order]
+            counted = len(distractors), channel
+            if (known := reliabilities.get(counted)) is None:
+                value = reliability(*counted)
+                known = reliabilities[counted] = value, below(value, minimum)
             ruled_out = obstacle
             if option.deictic and not points:
                 ruled_out = "a deictic phrase needs a point"
@@ -127,8 +134,9 @@ def considered(
                     option=option,
                     distractors=distractors,
                     channel=channel,
-                    reliability=reliability(len(distractors), channel),
+                    reliability=known[0],
                     ruled_out=ruled_out,
+                    is_short=known[1],
                 )
             )
     return tuple(pairs)
@@ -137,14 +145,13 @@ def considered(
 class Table:
     """The pairs of a reference, and those that may win.
 
-    minimum: the reliability that is asked for. points: why the body cannot point at the target, empty: it can.
+    minimum: the reliability that is asked for.
     """
 
     def __init__(self, reference: Reference, pairs: tuple[Pair, ...], config: GenerationConfig) -> None:
-        given = reference.minimum_reliability
         self.reference = reference
         self.pairs = pairs
-        self.minimum = config.minimum_reliability if given is None else given
+        self.minimum = minimum_of(reference, config)
         self._config = config
         self._left: Sequence[Pair] = [pair for pair in pairs if not pair.ruled_out]
         self._choices: list[Mapping[GestureChoice, Pair]] = []
@@ -155,20 +162,18 @@ class Table:
         level: 0 for the best; each next one for what is left if the body can do none of those before it.
         """
         while level >= len(self._choices) and self._left:
-            best = candidates(self._left, self.minimum, self._config)
+            best = candidates(self._left, self._config)
             self._left = [pair for pair in self._left if pair.gesture not in best]
             self._choices.append(best)
         return self._choices[level] if level < len(self._choices) else {}
 
 
-def candidates(
-    possible: Sequence[Pair], minimum: Probability, config: GenerationConfig
-) -> Mapping[GestureChoice, Pair]:
+def candidates(possible: Sequence[Pair], config: GenerationConfig) -> Mapping[GestureChoice, Pair]:
     """The pair of each gesture that may win, whatever the posture: the one with the best phrase.
 
-    Only pairs that reach `minimum` count or, if there are none, the most reliable ones (decision B10).
+    Only pairs that are reliable enough count or, if there are none, the most reliable ones (decision B10).
     """
-    good = [pair for pair in possible if not below(pair.reliability, minimum)]
+    good = [pair for pair in possible if not pair.is_short]
     if not good:
         most = max(round(pair.reliability, ROUNDING) for pair in possible)
         good = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
@@ -176,6 +181,12 @@ def candidates(
     for pair in sorted(good, key=lambda pair: (round(speaking(pair, config), ROUNDING), pair.preference)):
         best.setdefault(pair.gesture, pair)
     return best
+
+
+def minimum_of(reference: Reference, config: GenerationConfig) -> Probability:
+    """The reliability that is asked for."""
+    given = reference.minimum_reliability
+    return config.minimum_reliability if given is None else given
 
 
 def speaking(pair: Pair, config: GenerationConfig) -> Seconds:

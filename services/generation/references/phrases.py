@@ -9,6 +9,7 @@ the order of preference decides between equals, and what is not known of an obje
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import get_args
 
@@ -120,10 +121,20 @@ class _Objects:
     """The world's objects and the words that hold of them."""
 
     def __init__(self, world: World) -> None:
-        self._objects = {entity.id: entity for entity in world.objects}
-        self._sizes = _sizes(world.objects)
+        self._world = world
         self._holders: dict[Property, frozenset[str]] = {}
-        self.ids = frozenset(self._objects)
+
+    @cached_property
+    def _objects(self) -> dict[str, Entity]:
+        return {entity.id: entity for entity in self._world.objects}
+
+    @cached_property
+    def _sizes(self) -> dict[str, str]:
+        return _sizes(self._world.objects)
+
+    @cached_property
+    def ids(self) -> frozenset[str]:
+        return frozenset(self._objects)
 
     def distance(self, id: str) -> float:
         """Metres from the robot, along the floor."""

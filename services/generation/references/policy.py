@@ -20,7 +20,6 @@ from engage_hri.services.generation.references.pairs import (
     Pair,
     ReferenceScene,
     Table,
-    below,
     considered,
     deictic_warnings,
     shown,
@@ -98,7 +97,7 @@ def choice(
     for table, pair, made in zip(tables, best.pairs, choices, strict=True):
         if pair is None:
             raise Unreferable(_unreferable(table), choices)
-        if below(pair.reliability, table.minimum):
+        if pair.is_short:
             warnings.append(
                 f"{table.reference.id}: nothing reaches the minimum reliability {table.minimum:g}; chose "
                 f"{_pair_name(pair)} with R {pair.reliability:.4g}"
@@ -116,15 +115,13 @@ def _unreferable(table: Table) -> Fault:
 
 def _explain(table: Table, chosen: Pair | None, posture: HeadAndArms, movements: Movements) -> ReferenceChoice:
     least = movements.cost(chosen, posture) if chosen else 0.0
-    minimum = table.minimum
-    fallback = chosen is not None and below(chosen.reliability, minimum)
+    minimum, made = table.minimum, movements.made(posture)
     rows = []
     for pair in table.pairs:
-        seconds = movements.cost(pair, posture)
-        short = below(pair.reliability, minimum)
-        hindrance = pair.ruled_out or movements.hindrance(pair.gesture, posture)
+        seconds, short = movements.cost(pair, posture), pair.is_short
+        hindrance = pair.ruled_out or made[pair.gesture].hindrance
         if pair is chosen:
-            reason = "most reliable: nothing reaches the minimum" if fallback else "least cost"
+            reason = "most reliable: nothing reaches the minimum" if short else "least cost"
         elif hindrance:
             reason = hindrance
         elif short:

@@ -19,7 +19,10 @@ class HeadAndArms(Struct, frozen=True):
     """(arm, target) of the arms that have moved, by arm."""
 
     def arm(self, arm: str) -> str:
-        return next((target for each, target in self.arms if each == arm), CURRENT_POSE)
+        for each, target in self.arms:
+            if each == arm:
+                return target
+        return CURRENT_POSE
 
     def afterwards(self, target: str, arm: str, motions: Motions) -> Mapping[GestureChoice, "HeadAndArms"]:
         """The postures that the gestures at `target` leave: what one does not use goes home. arm: that points."""

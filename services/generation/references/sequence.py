@@ -4,7 +4,8 @@ The same walk over the postures, without costs, says which motions the program w
 the program meets, as long as the body is asked until there is nothing left to ask.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -13,7 +14,7 @@ from engage_hri.schemas.fragments import GestureChoice
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, Way, arm_of
-from engage_hri.services.generation.references.pairs import DIRECTED, POINT, ROUNDING, Pair, Table, refusal, speaking
+from engage_hri.services.generation.references.pairs import POINT, ROUNDING, Pair, Table, refusal, speaking
 from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.runtime.steps import Steps
 
@@ -37,8 +38,21 @@ class Sequel(Struct, frozen=True):
         return self.postures[-1]
 
 
+class Made(NamedTuple):
+    """A gesture from some posture. hindrance: why the body cannot make it; empty: it can. costs: what adds up."""
+
+    hindrance: str
+    costs: tuple[Seconds, ...]
+
+    def cost(self, words: Seconds) -> Seconds:
+        """Cost with a phrase that costs `words`."""
+        for each in self.costs:  # `sum` rounds in another way from Python 3.12 on
+            words += each
+        return words
+
+
 class Movements:
-    """Cost and obstacles of each gesture at a target, by posture: each way of head and arm is looked up once.
+    """Cost and obstacles of each gesture at a target, by posture: each is worked out once.
 
     arm: the one that points at it.
     """
@@ -48,46 +62,35 @@ class Movements:
         self._motions = motions
         self._config = config
         self.arm = arm_of(motions.point(CURRENT_POSE, target))
-        self._waiting = config.wait_weight * config.expected_delay
-        self._heads: dict[str, tuple[str, Seconds]] = {}
-        self._arms: dict[str, tuple[str, Seconds]] = {}
+        self._made: dict[tuple[str, str], Mapping[GestureChoice, Made]] = {}
 
     def ways(self, posture: HeadAndArms) -> tuple[Way, Way]:
         return Way("head", posture.head, self._target), Way("arm", posture.arm(self.arm), self._target)
 
-    def hindrance(self, gesture: GestureChoice, posture: HeadAndArms) -> str:
-        """Reason why the body cannot make `gesture` from `posture`; empty if it can."""
-        if gesture == "none":
-            return ""
-        no_gaze, _ = self._head(posture)
-        return no_gaze or (self._point(posture)[0] if gesture == POINT else "")
+    def made(self, posture: HeadAndArms) -> Mapping[GestureChoice, Made]:
+        """Each gesture from a posture."""
+        start = posture.head, posture.arm(self.arm)
+        if (known := self._made.get(start)) is None:
+            known = self._made[start] = self._from(*start)
+        return known
 
     def cost(self, pair: Pair, posture: HeadAndArms) -> Seconds:
-        """Cost C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
-        seconds = speaking(pair, self._config)
-        if pair.gesture != "none":
-            seconds += self._head(posture)[1]
-        if pair.gesture in DIRECTED:
-            seconds += self._waiting
-        if pair.gesture == POINT:
-            seconds += self._point(posture)[1]
-        return seconds
+        """Cost C(j, s) in seconds, from `posture`: words, head, wait for shared gaze (decision B7), arm."""
+        return self.made(posture)[pair.gesture].cost(speaking(pair, self._config))
 
-    def _head(self, posture: HeadAndArms) -> tuple[str, Seconds]:
-        """Reason why the body cannot look from there, and what the look costs."""
-        if (known := self._heads.get(posture.head)) is None:
-            gaze = self._motions.gaze(posture.head, self._target)
-            known = refusal("look from there", gaze), self._config.head_cost(gaze.head_degrees)
-            self._heads[posture.head] = known
-        return known
-
-    def _point(self, posture: HeadAndArms) -> tuple[str, Seconds]:
-        since = posture.arm(self.arm)
-        if (known := self._arms.get(since)) is None:
-            point = self._motions.point(since, self._target)
-            known = refusal("point from there", point), self._config.arm_cost(point.arm_degrees)
-            self._arms[since] = known
-        return known
+    def _from(self, head: str, arm: str) -> Mapping[GestureChoice, Made]:
+        config = self._config
+        gaze, point = self._motions.gaze(head, self._target), self._motions.point(arm, self._target)
+        no_gaze = refusal("look from there", gaze)
+        look, wait = config.head_cost(gaze.head_degrees), config.wait_weight * config.expected_delay
+        return {
+            "none": Made("", ()),
+            "gaze": Made(no_gaze, (look,)),
+            "directed_gaze": Made(no_gaze, (look, wait)),
+            POINT: Made(
+                no_gaze or refusal("point from there", point), (look, wait, config.arm_cost(point.arm_degrees))
+            ),
+        }
 
 
 def unasked(
@@ -112,8 +115,9 @@ def unasked(
             level += 1
             for posture in postures:
                 after = posture.afterwards(reference.target, movements.arm, motions)
+                made = movements.made(posture) if is_known[posture] else None
                 for gesture in possible:
-                    if not (is_known[posture] and movements.hindrance(gesture, posture)):
+                    if made is None or not made[gesture].hindrance:
                         onward[after[gesture]] = None
         postures = onward or postures
     return tuple(wanted)
@@ -134,7 +138,7 @@ def cheapest(
         onward: list[Sequel] = []
         level = 0
         while not onward and (possible := table.candidates(level)):
-            onward = _continued(ways, list(possible.values()), movements, table.reference.target, motions)
+            onward = _continued(ways, list(possible.values()), movements, table.reference.target, motions, config)
             level += 1
         yield 4 * len(ways) * max(1, level)
         ways = onward or [
@@ -154,18 +158,23 @@ def _gone_home(ways: Sequence[Sequel], motions: Motions) -> list[Sequel]:
 
 
 def _continued(
-    ways: Sequence[Sequel], pairs: Collection[Pair], movements: Movements, target: str, motions: Motions
+    ways: Sequence[Sequel],
+    pairs: Collection[Pair],
+    movements: Movements,
+    target: str,
+    motions: Motions,
+    config: GenerationConfig,
 ) -> list[Sequel]:
     """The best way to each posture that one of `pairs` leads to from one of `ways`; none where the body cannot."""
     best: dict[HeadAndArms, Sequel] = {}
-    preferences = [(pair, pair.preference) for pair in pairs]
+    offered = [(pair, pair.preference, speaking(pair, config)) for pair in pairs]
     for way in ways:
-        posture = way.posture
-        after = posture.afterwards(target, movements.arm, motions)
-        for pair, preference in preferences:
-            if movements.hindrance(pair.gesture, posture):
+        after, all_made = way.posture.afterwards(target, movements.arm, motions), movements.made(way.posture)
+        for pair, preference, words in offered:
+            made = all_made[pair.gesture]
+            if made.hindrance:
                 continue
-            seconds = way.cost + movements.cost(pair, posture)
+            seconds = way.cost + made.cost(words)
             reached, least = after[pair.gesture], round(seconds, ROUNDING)
             if (other := best.get(reached)) is not None and other.rank[0] < least:
                 continue
