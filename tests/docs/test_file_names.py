@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 NAME = re.compile(r"`([\w/]+\.(?:py|toml))`")
-THEIRS = {"engage.toml", "mine.toml", "my_robot.py", "reachy.py"}
+THEIRS = {"engage.toml", "mine.toml", "calibration.toml", "poor.toml", "my_robot.py", "reachy.py"}
 """Files of whoever reads."""
 
 
