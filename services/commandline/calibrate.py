@@ -121,7 +121,10 @@ async def _calibrate(
         options.record.write_bytes(b"".join(msgspec.json.encode(each) + b"\n" for each in found))
     if not fits:
         raise RunFailed(
-            Fault(reason=f"no part was measured {FEWEST} times or more", where=str(options.world or "marks"))
+            Fault(
+                reason=f"no part was measured {FEWEST} times or more",
+                where=str(options.measurements or options.world or "marks"),
+            )
         )
     offsets = {joint: offset for each in fits for joint, offset in each.offsets.items()}
     errors = {each.part: min(each.error, WIDEST) for each in fits}

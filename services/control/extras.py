@@ -1,4 +1,4 @@
-"""What a body may offer besides its contract: faults that it plays, where it really points, and how to mend that."""
+"""Parts of a body besides its contract: faults that it plays, where it really points, and a correction of that."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Radians
 
 
 class Seen(Struct, frozen=True, kw_only=True):
-    """What people see of a body, and cameras: rays as in `BodyState`."""
+    """Rays as in `BodyState`, as people and cameras see them."""
 
     gaze: Ray | None = None
     left_arm: Ray | None = None

@@ -20,7 +20,7 @@ Geometry = Callable[[BodyPose], Ray | None]
 """Ray of a part by the angles of all joints; None: not known."""
 Array = NDArray[np.float64]
 
-UNLIKELY: Radians = math.radians(30.0)
+UNLIKELY: Radians = math.radians(5.0)
 """Standard deviation of the belief about an offset."""
 MEASURED: Radians = math.radians(0.3)
 """Standard deviation of a measured direction, against which that belief is weighed."""

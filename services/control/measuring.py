@@ -33,7 +33,7 @@ OTHER_ROWS: tuple[Meters, ...] = (0.45, 0.59)
 
 
 class Eyes(Protocol):
-    """Those who say where a part really looks or points."""
+    """Source of where a part really looks or points."""
 
     async def place(self, part: str, mark: Entity, state: BodyState) -> Vector | None:
         """A place in metres at which it really does; None: they cannot say. state: what the body measures."""
@@ -69,7 +69,7 @@ def marks(rows: Sequence[Meters] = ROWS, faces: Sequence[Vector] = FACES) -> Wor
 async def measured(
     body: Body, world: World, parts: Collection[str], eyes: Eyes, tell: Callable[[str], None]
 ) -> list[Measurement]:
-    """Have the body look and point at all of the world that it can reach, and return where it really did.
+    """Make the body look and point at all of the world that it can reach; returns where it really did.
 
     parts: head, left_arm, right_arm. tell: told what could not be done.
     """

@@ -251,7 +251,7 @@ async def test_exact_measurements_leave_nothing() -> None:
 
     for joint in ("right_shoulder_yaw", "left_shoulder_yaw", "neck_yaw", "neck_pitch"):
         assert corrected[joint] == pytest.approx(OFF[joint], abs=0.01)
-    assert all(each.after[1] < 0.01 for each in found)
+    assert all(each.after[1] < 0.05 for each in found)
     assert {each.error for each in found} == {0.1}
 
 
@@ -283,7 +283,7 @@ async def test_few_measurements_are_not_taken_for_good_ones() -> None:
     for part in PARTS:
         own, names = [each for each in found if each.part == part], joints(body, part)
         few = [fit(part, own[start::8], partial(body.ray_at, part), names).error for start in range(8)]
-        assert sum(few) / 8 > 1.2 * fit(part, own, partial(body.ray_at, part), names).error
+        assert sum(few) / 8 > 1.1 * fit(part, own, partial(body.ray_at, part), names).error
     one = await measured(
         body, World(entities=marks().objects[10:11]), ["head"], SimulatedEyes(body, 0.0), pytest.fail
     )
