@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from engage_hri.schemas.behaviors import Gaze, PostureShift, Wait
+from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.services.control.body import Arrived, Body, BodyFailed
 from engage_hri.services.control.reachy_mini import messages
@@ -34,6 +34,11 @@ SOME = (
     BodyContract.test_refuses_what_it_cannot_do_before_anything_moves,
 )
 """Claims of the contract that need no long waits."""
+FEW = (
+    Gaze(id="gaze", target="near-right"), GazeShift(id="gazeShift", target="far-left"), Head(id="head", lexeme="NOD"),
+    FaceLexeme(id="faceLexeme", lexeme="SMILE"), Posture(id="posture", lexeme="LEAN_FORWARD"),
+)  # fmt: skip
+"""One behavior of each kind, for these claims."""
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +68,7 @@ class TestAll(OnTheMockup):
 async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
     suite = OnTheMockup()
     suite.url = mockup.url
+    suite.behaviors = FEW
     body = suite.make()
     body.see(suite.world)
     async with body.connected():
@@ -141,7 +147,7 @@ async def test_without_a_daemon_it_says_where_it_looked_and_how_to_start_one() -
         async with body.connected():
             raise AssertionError("connected to nothing")
 
-    assert "the daemon at http://127.0.0.1:9 cannot be reached" in failed.value.fault.reason
+    assert "the daemon at http://127.0.0.1:9 cannot be reached: nothing listens there" in failed.value.fault.reason
     assert "reachy-mini-daemon" in failed.value.fault.advice
     assert "--set control.drivers.reachy_mini.url=" in failed.value.fault.advice
 
@@ -182,7 +188,7 @@ async def test_the_fake_daemon_is_no_better_than_the_real_one(mockup: Mockup) ->
 
 
 async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]:
-    """Answer each measurement for 2 s with a place of a smooth course.
+    """Answer each measurement for 1.5 s with a place of a smooth course.
 
     Returns the lag that explains what is measured best, seconds; how far that leaves it off at most, radians; and the
     median of the seconds between two measurements.
@@ -192,7 +198,7 @@ async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]
         assert hasattr(daemon, "measurement")
         await _go_home(daemon)
         began, seen = loop.time(), []
-        while (now := loop.time()) < began + 2.0:
+        while (now := loop.time()) < began + 1.5:
             yaw = messages.measured(await daemon.measurement()).pose["head_yaw"]
             now = loop.time()
             seen.append((now - began, yaw))
@@ -212,8 +218,8 @@ def _course(at: float) -> float:
 async def _go_home(daemon: Daemon) -> None:
     """Lead the head to where the course begins, slowly."""
     here = messages.measured(await daemon.measurement()).pose
-    for step in range(1, 31):
-        share = 1.0 - step / 30
+    for step in range(1, 16):
+        share = 1.0 - step / 15
         await daemon.command(_target(share * here["head_yaw"], share * here["head_pitch"]))
         await daemon.measurement()
 
