@@ -9,7 +9,14 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 NAME = re.compile(r"`([\w/]+\.(?:py|toml))`")
 THEIRS = {
-    "FILE.py", "engage.toml", "mine.toml", "calibration.toml", "poor.toml", "my_robot.py", "pan_tilt.py", "reachy.py"
+    "FILE.py",
+    "engage.toml",
+    "mine.toml",
+    "calibration.toml",
+    "poor.toml",
+    "my_robot.py",
+    "pan_tilt.py",
+    "reachy.py",
 }
 """Files of whoever reads."""
 
