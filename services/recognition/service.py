@@ -32,7 +32,7 @@ from engage_hri.services.recognition.perceive.reports import Told
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.ongoing_actions import ActionEvent
+from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent
 from engage_hri.services.runtime.service import Ready
 
 STRANGERS_KEPT = 256
@@ -104,7 +104,7 @@ class _Recognition:
         self._tell(self._reporters.advance(now))
         if isinstance(observation, OngoingActions | ActionEvent):
             name, life = self._reporter(received)
-            self._tell(self._reporters.hear(observation, name, life, now))
+            self._tell(self._reporters.hear(observation, name, life, now, past=received.past))
         elif isinstance(observation, PeerAlive | PeerGone):
             self._tell(self._reporters.feed(observation, now))
         elif isinstance(observation, Perceived):
@@ -156,8 +156,10 @@ class _Recognition:
         return True
 
     def _may_tell(self, received: Received) -> bool:
-        """True if a state of ongoing actions is on its proper key: that of its actor and its reporter."""
+        """True if a state of ongoing actions is not too long, and on the key of its actor and its reporter."""
         assert isinstance(received.message, OngoingActions)
+        if len(received.message.actions) > MOST:
+            return False
         actor, reporter = received.message.actor, keys.reporter_of(received.key)
         if not reporter:
             return actor == self._bus.robot

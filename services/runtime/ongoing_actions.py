@@ -8,6 +8,8 @@ from engage_hri.schemas.units import Seconds, Stamp
 
 ActionEvent = ActionBegan | ActionEnded | ActorFound | ActorLost
 Which = tuple[str, str, tuple[str, ...]]
+MOST = 256
+"""Number of actions of one actor that can go on: of more, the oldest are forgotten."""
 FORGOTTEN_AFTER: Seconds = 600.0
 """Time for which the state of somebody who is not seen any more is kept for late readers, if nothing goes on."""
 
@@ -38,6 +40,8 @@ class Ongoing:
             case ActionBegan():
                 self._actions.pop(which(event), None)
                 self._actions[which(event)] = event
+                if len(self._actions) > MOST:
+                    del self._actions[next(iter(self._actions))]
             case ActionEnded():
                 ended = [key for key, begun in self._actions.items() if _ends(event, begun)]
                 for key in ended:

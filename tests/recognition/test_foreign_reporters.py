@@ -8,6 +8,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.messages import Message, encode_json
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.runtime.ongoing_actions import MOST
 from tests.recognition.observations import ROBOT
 from tests.recognition.reporting import Actor, Belief, Running, Stage, all_of
 
@@ -94,3 +95,14 @@ async def test_nobody_tells_the_state_of_another_reporter(monkeypatch: pytest.Mo
         await asyncio.sleep(1.0)
 
         assert stage.believed(stage.ann) == Belief(True, looks=ROBOT)
+
+
+async def test_a_state_that_is_too_long_to_be_true_is_none(monkeypatch: pytest.MonkeyPatch):
+    async with Running(monkeypatch, "recognition", "control") as stage:
+        foreign, at = Foreign(stage), Foreign(stage).stamp
+        foreign.goes_on(
+            *(ActionBegan(actor="carl", action="point", at=at, targets=(f"t{n}",)) for n in range(MOST + 1))
+        )
+        await asyncio.sleep(1.0)
+
+        assert stage.believed(Actor("carl")) == Belief(False)

@@ -61,3 +61,17 @@ def test_several_persons_each_have_their_own_events():
 
     assert log.states("mfg-1") == ["started", "failed"]
     assert log.states("mfg-2")[:2] == ["started", "succeeded"]
+
+
+def test_who_is_found_at_a_time_after_which_they_were_lost_has_gone():
+    """Two reporters, of which one was cut off: the later loss was known before the return."""
+    log = Log("host")
+    log.found(HUMAN, 1.0)
+    log.lost(HUMAN, 2.0)
+    log.until(3.0)
+    log.lost(HUMAN, 10.0)
+    log.found(HUMAN, 5.0)
+    log.lost(HUMAN, 10.0)
+    log.until(20.0)
+
+    assert not log.session.persons[HUMAN].presence.here

@@ -272,6 +272,22 @@ def test_what_a_life_that_has_gone_said_counts_for_nothing():
     assert world.hears(found(3.2), life="two") == ["3.2 ann found"]
 
 
+def test_the_history_of_a_life_before_the_present_one_counts_for_nothing():
+    world = World()
+
+    assert told(world.reporters.hear(found(0.5), "cameras", "zero", 1.0, past=True)) == []
+    assert told(world.reporters.hear(found(0.6), "cameras", "one", 1.0, past=True)) == ["0.6 ann found"]
+
+
+def test_what_was_missed_of_a_short_loss_shows_when_the_person_is_found():
+    """The person has not left for recognition, so that nothing has ended by itself."""
+    world = World(found(1.0), began("look", 2.0, "robot"), state(2.0, began("look", 2.0, "robot")))
+    for said in (lost(3.0), state(3.0, began("look", 2.0, "robot"), seen=False), found(3.2)):
+        world.hears(said)
+
+    assert world.hears(state(3.2)) == ["3.2? ann -look robot"]
+
+
 def test_of_two_of_one_name_none_is_deaf_for_ever():
     """There was no news that the first had gone: both may be there."""
     world = watching()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.runtime.ongoing_actions import FORGOTTEN_AFTER, ActionEvent, OngoingActionTracker
+from engage_hri.services.runtime.ongoing_actions import FORGOTTEN_AFTER, MOST, ActionEvent, OngoingActionTracker
 from tests.ongoing import going_on, is_seen
 
 
@@ -72,3 +72,12 @@ def test_who_comes_back_is_not_forgotten():
         tracker.feed([kind(actor="ann", at=stamp(at))], stamp(at))
 
     assert tracker.forget(1e6) == []
+
+
+def test_an_actor_does_no_more_than_so_many_things_at_once():
+    tracker = OngoingActionTracker()
+    points = [ActionBegan(actor="ann", action="point", at=stamp(0.0), targets=(f"t{n}",)) for n in range(MOST + 2)]
+
+    [state] = tracker.feed(points, stamp(1.0))
+
+    assert state.actions == tuple(points[2:])

@@ -27,7 +27,7 @@ class Presence:
             return False
         self._seen_last = max(self._seen_last, at)
         if self._lost_at is None or at >= self._lost_at:
-            self.here, self._lost_at = True, None
+            self.here, self._lost_at = True, self._lost_last if at < self._lost_last else None
         return True
 
     def found(self, at: Seconds) -> None:

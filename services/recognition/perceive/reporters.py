@@ -185,14 +185,18 @@ class Reporters:
 
     # -- what they say ------------------------------------------------------------------------------------------
 
-    def hear(self, said: ActionEvent | OngoingActions, reporter: str, life: str, now: Seconds) -> list[Told]:
+    def hear(
+        self, said: ActionEvent | OngoingActions, reporter: str, life: str, now: Seconds, *, past: bool = False
+    ) -> list[Told]:
         """Take what a reporter says. Returns what follows for the recognizer, in order.
 
         reporter: empty: unknown; nothing holds then for longer than it is told. life: of its process; empty: unknown.
+        past: it is from the history, in which another life than the present one may speak.
         """
         one = self._reporter(reporter, now)
         told: list[Told] = []
-        if not life or life not in one.former:
+        is_over = life in one.former or (past and one.is_alive and life not in ("", one.run))
+        if not is_over:
             told += self._lives(one, life, now)
             more = self._corrected(one, said, now) if isinstance(said, OngoingActions) else self._event(one, said)
             one.floor = max(one.floor, now - OLDEST)
@@ -208,21 +212,30 @@ class Reporters:
         if not isinstance(event, ActorLost):
             self._report(one, event.actor).take(event)
             return [Told(event, at)]
-        report = one.reports.pop(event.actor, None)
-        if not self._is_seen(event.actor, one):
-            return [Told(event, at)]
-        return [] if report is None else self._ends(one, report, at)
+        told = [Told(event, at)]
+        if (report := one.reports.get(event.actor)) is not None:
+            if self._is_seen(event.actor, one):
+                told = self._ends(one, report, at)
+            report.take(event)
+            self._forget_empty(one, event.actor)
+        elif self._is_seen(event.actor, one):
+            told = []
+        return told
 
     def _corrected(self, one: _Reporter, state: OngoingActions, now: Seconds) -> list[Told]:
         known = one.reports.get(state.actor)
         if known is None and not (state.seen or (state.actions and state.seen is None)):
             return []
         told = self._report(one, state.actor).correct(state, now)
-        if state.seen is False and not one.reports[state.actor].actions:
-            del one.reports[state.actor]
+        if state.seen is False:
+            self._forget_empty(one, state.actor)
         if self._is_seen(state.actor, one):
             told = [each for each in told if not isinstance(each.observation, ActorLost)]
         return told
+
+    def _forget_empty(self, one: _Reporter, actor: str) -> None:
+        if one.reports[actor].is_empty:
+            del one.reports[actor]
 
     def _report(self, one: _Reporter, actor: str) -> Report:
         if actor not in one.reports:

@@ -8,7 +8,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.events.interrupted_looks import Symbolic
 from engage_hri.services.recognition.events.scene import GoesOn
-from engage_hri.services.runtime.ongoing_actions import Ongoing, which
+from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent, Ongoing, which
 
 
 class Told(NamedTuple):
@@ -29,6 +29,9 @@ class Report:
         """Time at which the person was last found."""
         self._latest: Stamp | None = None
         """Time of the newest event."""
+        self._tells_states = False
+        self._before_loss: dict[tuple[object, ...], ActionBegan] = {}
+        """What went on when the person was lost, until a state says what has become of it."""
 
     @property
     def actions(self) -> tuple[ActionBegan, ...]:
@@ -43,8 +46,19 @@ class Report:
         known = self._ongoing.get(action)
         return known is not None and known.targets == action.targets
 
-    def take(self, event: ActionBegan | ActionEnded | ActorFound) -> None:
-        """Take an event, which is told as it is."""
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing of it has to be remembered."""
+        return not (self.seen or self.actions or self._before_loss)
+
+    def take(self, event: ActionEvent) -> None:
+        """Take an event, which is told as it is. With a loss, all that the person does is unknown."""
+        if isinstance(event, ActorLost):
+            if self._tells_states:
+                self._before_loss = {
+                    _exactly(one): one for one in (*self._before_loss.values(), *self.actions)[-MOST:]
+                }
+            self._ongoing.become(())
         self._ongoing.take(event)
         if isinstance(event, ActorFound):
             self._found = self._local(event.at)
@@ -59,7 +73,7 @@ class Report:
         """
         if self._latest is not None and _is_before(state.at, self._latest):
             return []
-        at = self._local(state.at)
+        self._tells_states, at = True, self._local(state.at)
         told = [Told(ended, when, is_sure=False) for ended, when in self._ended(state, at)]
         was_seen, self._ongoing.seen = self.seen, state.seen
         if state.seen and not was_seen:
@@ -76,18 +90,20 @@ class Report:
 
     def _knows(self, action: ActionBegan) -> bool:
         known = self._ongoing.get(action)
-        return known is not None and (known.targets, known.at) == (action.targets, action.at)
+        return known is not None and _exactly(known) == _exactly(action)
 
     def _ended(self, state: OngoingActions, at: Seconds) -> list[tuple[ActionEnded, Seconds]]:
         """The ends that were missed, each with its time. at: local time of the state."""
-        still = {(which(action), action.targets, action.at) for action in state.actions}
+        still = {_exactly(action) for action in state.actions}
         ended = []
-        for known in self.actions:
-            if (which(known), known.targets, known.at) not in still:
+        for known in (*self._before_loss.values(), *self.actions):
+            if _exactly(known) not in still:
                 since = self._local(known.at)
                 next_ones = (self._local(each.at) for each in state.actions if each.action == known.action)
                 when = min((other for other in next_ones if since <= other <= at), default=at)
                 ended.append((_end(known), max(when, since)))
+        is_lost = state.seen is False
+        self._before_loss = {one: each for one, each in self._before_loss.items() if is_lost and one in still}
         return sorted(ended, key=lambda one: one[1])
 
     def _begun(self, action: ActionBegan, now: Seconds) -> Told:
@@ -103,6 +119,11 @@ class Report:
     def ends(self, is_over: Callable[[ActionBegan], bool]) -> list[ActionEnded]:
         """List the ends of what goes on, if `is_over`."""
         return [_end(action) for action in self.actions if is_over(action)]
+
+
+def _exactly(action: ActionBegan) -> tuple[object, ...]:
+    """Name an action among those of its actor, from its beginning on."""
+    return which(action), action.targets, action.at
 
 
 def _end(began: ActionBegan) -> ActionEnded:
