@@ -2,8 +2,9 @@
 
 The same blocks, planned alike from the same estimates, on the same simulated body, in virtual time. The fixed
 schedule sends every command at the instant that the plan had for it, as realizers do that take a clock for a body.
-The body varies: joints slower or faster than it believes, one that stalls, one that is there already.
-
+The body varies: joints slower or faster than it believes, one that stalls, one that is there already. With the extra
+`mujoco` also the same torso with physics: stiff gears, a motor without current for a second, an arm that is near
+already.
 Skew is from the first to the last point of an instant that behaviors share, as measured by the body.
 """
 
@@ -11,9 +12,10 @@ import argparse
 import asyncio
 import json
 import sys
-from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping, Sequence
+from contextlib import aclosing, asynccontextmanager
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from statistics import mean
 
@@ -37,10 +39,12 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, PerformBehavior, SyncPointReached
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.realizer.config import RealizerConfig
@@ -126,6 +130,30 @@ SWEEP: Mapping[str, Variability] = {
 }  # fmt: skip
 
 
+class Physical(Struct, frozen=True):
+    """The torso with physics. faults: that it has. seconds: how long each of the robot's pointings has them, from its
+    first moment on; None: all the time."""
+
+    faults: tuple[BodyFault, ...] = ()
+    seconds: Seconds | None = None
+
+
+Deviation = Variability | Physical
+if find_spec("mujoco"):
+    near = (
+        BodyFault(kind="displaced", part="right_shoulder_pitch", amount=20.0),
+        BodyFault(kind="displaced", part="right_elbow", amount=95.0),
+    )
+    SWEEP = {
+        **SWEEP,
+        "physics": Physical(),
+        "gears 2x": Physical((BodyFault(kind="slow", amount=2.0),)),
+        "gears 4x": Physical((BodyFault(kind="slow", amount=4.0),)),
+        "no current 1 s": Physical((BodyFault(kind="stalled", part="right_arm"),), seconds=1.0),
+        "near, physics": Physical(near),
+    }
+
+
 class Run(Struct, frozen=True):
     """skews: of every instant that is shared. total: from the first point to the last."""
 
@@ -174,8 +202,8 @@ def _until_next_hold(plan: Plan, point: Point) -> str:
 EXECUTORS = {"event-driven": in_closed_loop, "fixed schedule": by_the_clock}
 
 
-async def run(executor: str, block: Block, variability: Variability) -> Run:
-    async with stage(variability) as (bus, requests):
+async def run(executor: str, block: Block, deviation: Deviation) -> Run:
+    async with stage(deviation) as (bus, requests):
         plan = await planned(block, bus)
         times: dict[Point, Seconds] = {}
 
@@ -217,12 +245,16 @@ def skews(plan: Plan, times: Mapping[Point, Seconds]) -> list[Seconds]:
 
 
 @asynccontextmanager
-async def stage(variability: Variability) -> AsyncIterator[tuple[Bus, Requester]]:
+async def stage(deviation: Deviation) -> AsyncIterator[tuple[Bus, Requester]]:
+    config = ControlConfig(variability=deviation if isinstance(deviation, Variability) else Variability())
+    body = physical(deviation) if isinstance(deviation, Physical) else None
+    if body is not None:
+        await asyncio.sleep(2.0)  # somebody has moved an arm by then
     async with MemoryHub() as hub:
         eyes, bus = hub.join("simulation"), hub.join("benchmark")
         eyes.publish(keys.WORLD, WORLD)
         services = {
-            "control": partial(embody, config=ControlConfig(variability=variability)),
+            "control": partial(embody, config=config, body=body),
             "realizer": partial(realize, config=RealizerConfig()),
         }
         async with running(hub, services), Requester(bus) as requests:
@@ -231,11 +263,35 @@ async def stage(variability: Variability) -> AsyncIterator[tuple[Bus, Requester]
         await eyes.leave()
 
 
+def physical(deviation: Physical) -> Body:
+    """The torso with physics, and with what is wrong with it."""
+    from engage_hri.services.control.mujoco.body import MujocoBody
+
+    class Sick(MujocoBody):
+        """A body whose faults come with each pointing, and go."""
+
+        async def perform(
+            self, behavior: BlockBehavior, authority: MovementAuthority
+        ) -> AsyncGenerator[Progress, None]:
+            if deviation.seconds is not None and isinstance(behavior, Pointing):
+                loop = asyncio.get_running_loop()
+                loop.call_later(0.1, self.switch_faults, deviation.faults)
+                loop.call_later(0.1 + deviation.seconds, self.switch_faults, ())
+            async with aclosing(super().perform(behavior, authority)) as stream:
+                async for progress in stream:
+                    yield progress
+
+    body = Sick()
+    if deviation.seconds is None:
+        body.switch_faults(deviation.faults)
+    return body
+
+
 def measure() -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
-    for name, variability in SWEEP.items():
+    for name, deviation in SWEEP.items():
         for executor in EXECUTORS:
-            runs = [run_virtual(run(executor, block, variability)) for block in BLOCKS]
+            runs = [run_virtual(run(executor, block, deviation)) for block in BLOCKS]
             all_skews = [skew for each in runs for skew in each.skews]
             rows.append(
                 {
@@ -256,15 +312,20 @@ def plot(rows: Sequence[Mapping[str, object]], path: Path) -> None:
     from matplotlib import pyplot
 
     bodies = list(SWEEP)
-    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4))
+    figure, axes = pyplot.subplots(1, 2, figsize=(13, 4.6))
     for axis, column, title in ((axes[0], "max_skew_ms", "largest skew, ms"), (axes[1], "total_s", "total time, s")):
         for offset, executor in ((-0.2, "event-driven"), (0.2, "fixed schedule")):
             values = [row[column] for row in rows if row["executor"] == executor]
             axis.bar([number + offset for number in range(len(bodies))], values, 0.4, label=executor)
         axis.set_xticks(range(len(bodies)), bodies, rotation=40, ha="right")
         axis.set_title(title)
+        if "physics" in bodies:
+            axis.axvline(bodies.index("physics") - 0.5, color="gray", linewidth=0.8)
         axis.legend()
-    figure.suptitle("Joints slower or faster than estimated: three blocks, shared instants as the body measured them")
+    figure.suptitle(
+        "Joints slower or faster than estimated: three blocks, shared instants as the body measured them;"
+        " right of the line: the torso with physics"
+    )
     figure.tight_layout()
     figure.savefig(path, dpi=90)
 
@@ -280,10 +341,10 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    print(f"{'':14}{'':16}{'mean skew ms':>14}{'max skew ms':>14}{'total s':>10}")
+    print(f"{'':16}{'':16}{'mean skew ms':>14}{'max skew ms':>14}{'total s':>10}")
     for row in rows:
         print(
-            f"{row['body']:14}{row['executor']:16}{row['mean_skew_ms']:>14}{row['max_skew_ms']:>14}{row['total_s']:>10}"
+            f"{row['body']:16}{row['executor']:16}{row['mean_skew_ms']:>14}{row['max_skew_ms']:>14}{row['total_s']:>10}"
         )
 
 

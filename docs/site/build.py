@@ -28,6 +28,7 @@ CONTENTS = {
         "realizer",
         "recognition",
         "control",
+        "mujoco",
         "reachy-mini",
         "contract",
         "bus",
