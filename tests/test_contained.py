@@ -40,8 +40,8 @@ def breaking(attribute: str) -> Callable[..., Any]:
     ("place", "what"),
     [
         ("engage_hri.services.generation.fragment_runner.FragmentRunner.admit", "perform"),
-        ("engage_hri.services.generation.pipeline.plan", "perform"),
-        ("engage_hri.services.generation.fragment_runner.plan", "perform"),
+        ("engage_hri.services.generation.pipeline.weigh", "perform"),
+        ("engage_hri.services.generation.fragment_runner.planning", "perform"),
         ("engage_hri.services.realizer.perform.planning.plan_steps", "realize"),
         ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),

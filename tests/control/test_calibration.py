@@ -13,7 +13,6 @@ from random import Random
 
 import numpy as np
 import pytest
-from tests.control.suite import WORLD, Stage, performed, times
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
@@ -36,6 +35,7 @@ from engage_hri.services.control.config import ControlConfig, Miscalibrated, Var
 from engage_hri.services.control.fitting import Fit, fit
 from engage_hri.services.control.measuring import OTHER_ROWS, SimulatedEyes, marks, measured
 from engage_hri.services.control.service import embody
+from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.service import running
 from tests.control.directing import robot

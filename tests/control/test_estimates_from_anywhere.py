@@ -12,7 +12,6 @@ from random import Random
 from typing import NamedTuple
 
 import pytest
-from tests.control.suite import Stage, aside
 
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
@@ -34,6 +33,7 @@ from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import BodyState, MovementAuthority, Reached
+from engage_hri.services.control.testing import Stage, aside
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.tracks import Track

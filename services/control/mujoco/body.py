@@ -33,8 +33,9 @@ from engage_hri.services.control.mujoco.pulse import TICK, Pulse
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.workbench import Workbench
 from engage_hri.services.control.torso import kinematics, tracks
-from engage_hri.services.control.torso.body import SimulatedBody, repertoire_of
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.course import CoursePoint
+from engage_hri.services.control.torso.files import repertoire_of
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track

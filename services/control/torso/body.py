@@ -8,7 +8,6 @@ import asyncio
 from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import aclosing
 from math import inf, radians
-from pathlib import Path
 from typing import Self
 
 from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
@@ -17,7 +16,6 @@ from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import World
 from engage_hri.services.control import variability
 from engage_hri.services.control.body import (
@@ -37,10 +35,11 @@ from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, wait_estimate
+from engage_hri.services.control.torso.files import repertoire_of
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
-from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire, extended
+from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.voice import speaking
@@ -384,19 +383,6 @@ class SimulatedBody(Body):
 
 def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
     return {fault.part: radians(fault.amount or 0.0) for fault in faults if fault.kind == "displaced"}
-
-
-def repertoire_of(config: ControlConfig) -> Repertoire:
-    """The repertoire with what the files of the configuration add to it. Raises InputRefused."""
-    return extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
-
-
-def _read(file: str) -> str:
-    try:
-        return utf8(Path(file).read_bytes(), file)
-    except OSError as error:
-        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
 
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:

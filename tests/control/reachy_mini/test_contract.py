@@ -4,11 +4,9 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 
-import pytest
-from tests.control.reachy_mini.suite import IS_INSTALLED, BodyContract
-
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.reachy_mini.body import ReachyMini
+from engage_hri.services.control.testing import BodyContract
 from tests.control.reachy_mini.fake import FakeDaemon
 
 
@@ -29,7 +27,6 @@ class TestReachyMini(BodyContract):
         }
 
 
-@pytest.mark.skipif(not IS_INSTALLED, reason="the suite of a clone compares measurements bit by bit")
 class TestNoisyReachyMini(BodyContract):
     tolerance = 0.06
     noise = math.radians(0.3)
