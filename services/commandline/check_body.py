@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.options import Configured
 from engage_hri.services.commandline.outputs import Terminal
-from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.process import DONE, end_like_ctrl_c
 from engage_hri.services.commandline.sources import read_world
 
 if TYPE_CHECKING:
@@ -68,6 +68,7 @@ def main(options: Options) -> int:
         tolerance=options.tolerance, noise=math.radians(options.noise), accuracy=math.radians(options.accuracy),
         real_time=options.real_time, world=read_world(options.world) if options.world else None,
     )  # fmt: skip
+    end_like_ctrl_c()
     # What a driver prints is no part of the report.
     with redirect_stdout(sys.stderr), _told_progress() as progress:
         make = maker(options.body, options.load().control)

@@ -26,16 +26,21 @@ def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
     Ctrl-C and SIGTERM cancel `main`; when it has ended, KeyboardInterrupt is raised. A second Ctrl-C does not wait
     for that: it ends the process. A SIGTERM is ignored after either.
     """
-    # asyncio.Runner cancels `main` only if it finds this handler. A shell that starts us in the background has had
-    # Ctrl-C ignored.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    del _stopping[1:]
-    signal.signal(signal.SIGTERM, _terminate)
+    # asyncio.Runner cancels `main` only if it finds Python's handler. A shell that starts us in the background has
+    # had Ctrl-C ignored.
+    end_like_ctrl_c()
     try:
         with asyncio.Runner(loop_factory=VirtualTimeLoop if virtual_time else _fastest_loop()) as runner:
             return runner.run(_interruptible(main))
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def end_like_ctrl_c() -> None:
+    """Let a SIGTERM end what runs loops of its own as Ctrl-C does, with KeyboardInterrupt."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    del _stopping[1:]
+    signal.signal(signal.SIGTERM, _terminate)
 
 
 async def _interruptible(main: Coroutine[Any, Any, T]) -> T:

@@ -1,6 +1,10 @@
 """`engage check-body`: what it prints of a body that keeps the contract, of one that breaks it, and of none."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from unittest.mock import patch
 
@@ -10,6 +14,8 @@ from tests.cli.command import Engage
 
 DRIVERS = '''
 import asyncio
+from contextlib import asynccontextmanager
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -46,6 +52,16 @@ class Clumsy(SimulatedBody):
 class Waiting(SimulatedBody):
     async def home(self, parts=()):
         await asyncio.get_running_loop().create_future()
+
+
+class Leaving(SimulatedBody):
+    @asynccontextmanager
+    async def connected(self):
+        Path("diary").open("a").write("in\\n")
+        try:
+            yield
+        finally:
+            Path("diary").open("a").write("out\\n")
 
 
 class Silent(SimulatedBody):
@@ -195,3 +211,19 @@ def test_nothing_else_of_the_package_imports_pytest(engage: Engage) -> None:
     }
 
     assert importing == {"services/control/testing"}
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize(("stop", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_who_is_stopped_leaves_the_robot(drivers: Path, stop: signal.Signals, code: int) -> None:
+    os.mkfifo("diary")
+    with open(os.open("diary", os.O_RDWR)) as diary:  # for both, so that there is no end of it
+        command = (sys.executable, "-m", "engage_hri", "check-body", "drivers.py:Leaving", "--real-time")
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            told = [next(diary) for _ in range(3)]  # it is described, and then checked
+            process.send_signal(stop)
+
+            assert process.wait(60.0) == code
+        told.append(next(diary))
+
+    assert told == ["in\n", "out\n", "in\n", "out\n"]

@@ -64,7 +64,7 @@ WITH_FAULTS: tuple[tuple[type[SimulatedBody], str], ...] = (
     (liars_by_deed.Stalled, "beside it"),
     (liars_by_deed.Unnamed, "a fault with a reason"),
     (liars_by_deed.Raw, "ConnectionResetError: peer is gone at liars_by_deed.py, line"),
-    (liars_by_deed.Unending, "it goes on"),
+    (liars_by_deed.Unending, "gaze at near-right with a fault, ready: expected an end within 30.0 s of its abort"),
 )
 FAULTS = "with_a_fault_it_passes_or_names_the_fault"
 

@@ -6,6 +6,7 @@ from random import Random
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
@@ -148,7 +149,7 @@ class TruthLaws(Suite):
                 if witness is not None:
                     lies += await witness.close(may_fail=True, patience=PATIENCE_WITH_FAULTS)
         if lies:
-            raise LawBroken(lies)
+            raise LawBroken([replace(each, behavior=f"{each.behavior or 'the body'} with {fault}") for each in lies])
 
     async def _with_fault(self, body: Body, behavior: BlockBehavior) -> Sequence[Finding]:
         witness = Witness(self, body)
