@@ -27,9 +27,13 @@ _DENSE = 3
 
 
 class Piece(NamedTuple):
-    """A phrase with its place in the text. start, end: characters of the text. pause: seconds of silence after it."""
+    """A phrase with its place in the whole text, in characters.
+
+    text: as it is written there. pause: seconds of silence after it.
+    """
 
     phrase: Phrase
+    text: str
     start: int
     end: int
     pause: float
@@ -47,9 +51,7 @@ def pieces(speech: Speech, language: str = "") -> list[Piece]:
         inside = tuple(_inside(prosody, start, end))
         said = _heard(text[start:end])
         pause = max((PAUSE.get(each, 0.0) for each in text[start:end].rstrip()[-3:]), default=0.0)
-        found.append(Piece(Phrase(said, speech.language or language, inside), start, end, pause))
-    while len(found) > 1 and not has_words(found[-1].phrase.text):
-        found.pop()
+        found.append(Piece(Phrase(said, speech.language or language, inside), text[start:end], start, end, pause))
     return found
 
 

@@ -12,16 +12,21 @@ from engage_hri.services.control.waiting import Bell
 
 
 class Voice:
-    """A voice that refuses a text while it says another. saying: the text that is being said; empty: silence.
+    """A voice that refuses a text while it says another.
 
-    is_mute: it says nothing, and reports its words all the same.
+    is_mute: it makes no sound, and reports its words all the same; may be changed while it speaks.
     """
 
     def __init__(self, *, is_mute: bool = False) -> None:
-        self.saying = ""
-        self._is_mute = is_mute
+        self.is_mute = is_mute
+        self._text = ""
         self._utterance: MovementAuthority | None = None
         self._waiting: list[Bell] = []
+
+    @property
+    def saying(self) -> str:
+        """The text that is being said; empty: silence."""
+        return "" if self.is_mute else self._text
 
     @property
     def is_busy(self) -> bool:
@@ -47,19 +52,27 @@ class Voice:
     async def speak(
         self, behavior: Speech, authority: MovementAuthority, pace: float
     ) -> AsyncGenerator[Progress, None]:
-        """Say a text. pace: 2 takes twice as long. Raises BehaviorRefused: it says another."""
+        """Say a text in silence. pace: 2 takes twice as long. Raises BehaviorRefused: it says another."""
+        async with aclosing(self.say(behavior, authority, speaking.speak(behavior, authority, pace))) as utterance:
+            async for progress in utterance:
+                yield progress
+
+    async def say(
+        self, behavior: Speech, authority: MovementAuthority, words: AsyncGenerator[Progress, None]
+    ) -> AsyncGenerator[Progress, None]:
+        """Say a text. words: what is told of it as it is said. Raises BehaviorRefused: it says another."""
         if self._utterance is not None:
-            reason = f"the voice is busy with {self.saying!r}"
+            reason = f"the voice is busy with {self._text!r}"
             raise BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
-        self._utterance, self.saying = authority, "" if self._is_mute else behavior.text
+        self._utterance, self._text = authority, behavior.text
         try:
-            async with aclosing(speaking.speak(behavior, authority, pace)) as utterance:
+            async with aclosing(words) as utterance:
                 async for progress in utterance:
                     if isinstance(progress, Reached) and progress.sync == "end":
-                        self._utterance, self.saying = None, ""
+                        self._utterance, self._text = None, ""
                     yield progress
         finally:
             if self._utterance is authority:
-                self._utterance, self.saying = None, ""
+                self._utterance, self._text = None, ""
             for bell in self._waiting:
                 bell.ring()

@@ -1,0 +1,23 @@
+"""Estimates of speech: the voice can wait at the marks between two words. Pure."""
+
+from itertools import pairwise
+
+from engage_hri.schemas.behavior_types import sync_points
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.body import BodyPose, Estimate, Phase
+from engage_hri.services.control.voice.timeline import Utterance
+
+
+def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose | None) -> Estimate:
+    """Estimate a speech from its time line. pose: the one of the body that speaks, which it leaves as it is."""
+    times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
+    times["end"] = utterance.seconds
+    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
+    phases = []
+    for since, to in pairwise(sync_points(behavior)):
+        seconds = times[to] - times[since]
+        longest = None if to in gaps or not seconds else seconds
+        phases.append(Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=longest, hold=to in gaps))
+    return Estimate(
+        behavior=behavior.id, feasible=True, parts=("voice",), phases=tuple(phases), pose_after=pose, pose_end=pose
+    )
