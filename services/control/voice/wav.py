@@ -31,6 +31,12 @@ class WavFile:
         self._on_fault: list[Callable[[], None]] = []
         self._write(0, _header(0, rate, origin))
 
+    def __enter__(self) -> "WavFile":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
     def earliest(self) -> Seconds:
         return self._now()
 
