@@ -22,6 +22,9 @@ SHELLS = {
     "services/control/ordinary.py",  # a body that moves on the loop's clock
     "services/control/composed.py",  # takes several bodies home at once
     "services/control/torso/body.py",  # a body that moves on the loop's clock
+    "services/control/voice/player.py",  # runs the program that plays
+    "services/control/voice/studio.py",  # runs the process of the synthesizer
+    "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once
     "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer

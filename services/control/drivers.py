@@ -30,6 +30,7 @@ GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
 BUILT_IN = {
     "simulated": "engage_hri.services.control.torso.body:SimulatedBody",
+    "espeak": "engage_hri.services.control.voice.sounding:EspeakVoice",
 }
 """Drivers of this package, each imported only when it is asked for."""
 EXTRAS: dict[str, str] = {}
