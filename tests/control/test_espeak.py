@@ -34,7 +34,10 @@ class TestEspeakWithTheTorso(BodyContract):
         torso = SimulatedBody()
         parts = tuple(part for part in torso.capabilities.parts if part != "voice")
         return composed(
-            [Member("simulated", torso, parts), Member("espeak", EspeakVoice(EspeakSettings(device="none")), ("voice",))]
+            [
+                Member("simulated", torso, parts),
+                Member("espeak", EspeakVoice(EspeakSettings(device="none")), ("voice",)),
+            ]
         )
 
 
@@ -75,7 +78,9 @@ async def test_words_are_reported_where_the_file_sounds(tmp_path: Path):
     voice = EspeakVoice(EspeakSettings(file=str(file)))
     async with voice.connected():
         await asyncio.sleep(2.0)
-        speech = Speech(id="s", text=WORDS, marks=tuple(Mark(f"m{n}", t.end - len(t.text)) for n, t in enumerate(tokens(WORDS))))
+        speech = Speech(
+            id="s", text=WORDS, marks=tuple(Mark(f"m{n}", t.end - len(t.text)) for n, t in enumerate(tokens(WORDS)))
+        )
         progress = await said(voice, speech)
     begun = [item.at for item in progress if isinstance(item, Reached) and item.sync.startswith("m")]
     ended = [item.at for item in progress if isinstance(item, Spoke)]
@@ -106,6 +111,7 @@ async def test_a_held_voice_stands_at_the_next_word_and_goes_on(tmp_path: Path):
     async with voice.connected():
         speech = Speech(id="s", text="Many yellow lemons are lying near my window.")
         free = await said(voice, speech)
+        await asyncio.sleep(1.0)
         begin = asyncio.get_running_loop().time()
         progress = await said(voice, speech, hold=0.5, go_on=4.0)
     spoken = [item.at - begin for item in progress if isinstance(item, Spoke)]
@@ -115,7 +121,9 @@ async def test_a_held_voice_stands_at_the_next_word_and_goes_on(tmp_path: Path):
     assert len(spoken) == len([item for item in free if isinstance(item, Spoke)]) == 8
     assert held < 1.2
     # Nothing is lost and nothing said twice: the sound lasts as long, around a pause from the word's end to 4 s.
-    lasted = [sum(until - since for since, until in whole if low <= since < high) for low, high in ((0, begin), (begin, 99))]
+    lasted = [
+        sum(until - since for since, until in whole if low <= since < high) for low, high in ((0, begin), (begin, 99))
+    ]
     assert lasted[0] == pytest.approx(lasted[1], abs=0.1)
     assert not [1 for since, until in whole if until > begin + held + 0.1 and since < begin + 3.99]
 
@@ -226,7 +234,10 @@ LETTERS = "ab cde ,.!?—'1%世界，。かきゃー한국ขไม้สวั�
 
 
 @settings(max_examples=60)
-@given(text=st.text(st.sampled_from(list(LETTERS)), max_size=40), language=st.sampled_from(["en-us", "de", "zh", "ja", "th", "ru"]))
+@given(
+    text=st.text(st.sampled_from(list(LETTERS)), max_size=40),
+    language=st.sampled_from(["en-us", "de", "zh", "ja", "th", "ru"]),
+)
 def test_words_cover_the_text_in_order_and_within_the_sound(text: str, language: str):
     for piece in pieces(Speech(id="s", text=text, language=language)):
         made = clause(ENGINE, piece.phrase)

@@ -62,7 +62,10 @@ def laid_out(text: str, said: Said, rate: int) -> Clause:
         since, until = (min(max(each, begin), stop) - begin for each in (since, until))
         words.append(Word(token.text, since, until, token.end))
     return Clause(
-        np.ascontiguousarray(samples[first:last], "<i2").tobytes(), rate, tuple(words), _lips(said, loudness, begin, end)
+        np.ascontiguousarray(samples[first:last], "<i2").tobytes(),
+        rate,
+        tuple(words),
+        _lips(said, loudness, begin, end),
     )
 
 

@@ -18,7 +18,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.synthesis import Heard, Phone, Phrase, Said, Synthesizer, refused
 
-ADVICE = "pip install 'engage-hri[voice]' (eSpeak NG is under the GPL, version 3), or Debian: apt install libespeak-ng1"
+ADVICE = (
+    "pip install 'engage-hri[voice]' (eSpeak NG is under the GPL, version 3), or Debian: apt install libespeak-ng1"
+)
 
 _SYNCHRONOUS, _PHONES_IN_IPA, _DO_NOT_EXIT = 2, 0x0003, 0x8000
 _UTF8, _SSML = 1, 0x10

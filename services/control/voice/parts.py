@@ -75,9 +75,7 @@ def joined(parts: Sequence[Part], length: int) -> Utterance:
     words: list[Word] = []
     begin = 0.0
     for number, part in enumerate(parts):
-        words += [
-            replace(word, start=word.start + begin, end=word.end + begin) for word in part.utterance.words
-        ]
+        words += [replace(word, start=word.start + begin, end=word.end + begin) for word in part.utterance.words]
         is_last = number == len(parts) - 1
         begin += part.utterance.seconds + (0.0 if is_last else part.pause)
     return Utterance(tuple(words), begin)

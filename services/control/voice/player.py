@@ -32,11 +32,13 @@ PROBE: Seconds = 0.25
 """How long a player that is started has to live before it is believed to have a device."""
 ADVICE = "install one of them (Debian: alsa-utils, pulseaudio-utils, pipewire-bin or sox), or set device=none or file"
 
+
 class PlayerProgram(NamedTuple):
     """A program that plays raw samples from its standard input. latency: seconds, as measured or by its options."""
 
     command: tuple[str, ...]
     latency: Seconds
+
 
 PLAYERS: dict[str, PlayerProgram] = {
     "pacat": PlayerProgram(
@@ -56,6 +58,7 @@ PLAYERS: dict[str, PlayerProgram] = {
     ),
 }  # fmt: skip
 """Player programs by name, in the order in which they are tried."""
+
 
 class Player:
     """An outlet to a sound device. After a fault the next `revive` starts the player anew."""
@@ -136,10 +139,12 @@ class Player:
         unsent = self._transport.get_write_buffer_size() / 2 / self._rate
         ahead = max(0.0, self._heard_until - self._loop.time())
         if unsent > ahead + STUCK:
-            self._fail(f"the sound device takes no sound: {unsent:.1f} s of it wait", "is it held by another program?")
+            self._fail(
+                f"the sound device takes no sound: {unsent:.1f} s of it wait", "is it held by another program?"
+            )
 
     def _lost(self) -> None:
-        process = self._process
+        process, self._transport = self._process, None
         if process is None or self.fault is not None:
             return
         code = process.poll()
@@ -178,6 +183,7 @@ class Player:
             process.kill()
             process.wait()
 
+
 class _Ending(asyncio.BaseProtocol):
     """Tells when the other end of the pipe is closed."""
 
@@ -186,6 +192,7 @@ class _Ending(asyncio.BaseProtocol):
 
     def connection_lost(self, error: Exception | None) -> None:
         self._on_end()
+
 
 def found(settings: VoiceSettings) -> PlayerProgram | None:
     """Find the player that the settings ask for; None: no device. Raises InputRefused."""
@@ -200,6 +207,7 @@ def found(settings: VoiceSettings) -> PlayerProgram | None:
     if program is None:
         raise InputRefused(_refusal(f"no program here plays sound: tried {', '.join(names)}", ADVICE))
     return program if settings.latency is None else program._replace(latency=settings.latency)
+
 
 def _refusal(reason: str, advice: str) -> Fault:
     return Fault(reason=reason, where="control.drivers, device", advice=advice, service="control")

@@ -1,7 +1,7 @@
 """Voices that sound: a synthesizer in its own process, and a body of one part that says what it makes.
 
-    class MyVoice(SoundingVoice):
-        name, synthesizer = "mine", MySynthesizer      # a driver: --voice my_voice.py:MyVoice
+class MyVoice(SoundingVoice):
+    name, synthesizer = "mine", MySynthesizer      # a driver: --voice my_voice.py:MyVoice
 """
 
 import asyncio
@@ -211,4 +211,3 @@ class EspeakVoice(SoundingVoice):
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
     return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
-
