@@ -21,7 +21,7 @@ Emphasis = Literal["", "strong", "moderate", "reduced"]
 
 
 class Prosody(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """How a span of a text is to be said, against the rest of it.
+    """A span of a text that is to be said in another way than the rest of it.
 
     start, end: characters of the text. rate: of words per second, times the voice's own; 2 is twice as fast.
     pitch: fundamental frequency, times the voice's own. volume: amplitude, times the voice's own.
@@ -138,9 +138,9 @@ def _factor(kind: str, value: str, words: dict[str, float]) -> float:
     if unit == "%":
         return max(0.0, 1.0 + signed / 100.0) if sign or kind != "rate" else number / 100.0
     if unit == "st" and kind == "pitch":
-        return 2.0 ** (max(-12.0, min(12.0, signed)) / 12.0)
+        return math.pow(2.0, max(-12.0, min(12.0, signed)) / 12.0)
     if unit == "dB" and kind == "volume":
-        return 10.0 ** (max(-40.0, min(12.0, signed)) / 20.0)
+        return math.pow(10.0, max(-40.0, min(12.0, signed)) / 20.0)
     if unit is None and kind == "rate" and not sign:
         return number
     if unit is None and kind == "volume":

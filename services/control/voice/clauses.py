@@ -8,6 +8,7 @@ Pure.
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -75,15 +76,18 @@ def _samples(given: object) -> Samples:
     if isinstance(given, bytes | bytearray | memoryview):
         if len(given) % 2:
             raise refused("an odd number of bytes", advice)
-        return np.frombuffer(given, "<i2").astype(np.int16)
-    array = np.asarray(given)
+        sound: Samples = np.frombuffer(given, "<i2").astype(np.int16)
+        return sound
+    array: Any = np.asarray(given)
     if array.ndim != 1 or array.dtype.kind not in "fi" or (array.dtype.kind == "i" and array.dtype.itemsize != 2):
         raise refused(f"samples of {array.dtype} in the shape {array.shape}", advice)
     if array.dtype.kind == "i":
-        return array.astype(np.int16)
+        whole: Samples = array.astype(np.int16)
+        return whole
     if not np.isfinite(array).all():
         raise refused("samples that are no numbers", advice)
-    return (np.clip(array, -1.0, 1.0) * 32767.0).astype(np.int16)
+    scaled: Samples = (np.clip(array, -1.0, 1.0) * 32767.0).astype(np.int16)
+    return scaled
 
 
 def _lips(said: Said, loudness: Loudness, begin: Seconds, end: Seconds) -> tuple[Lips, ...]:
@@ -131,7 +135,7 @@ def _times(
 
 
 def _anchors(all_tokens: Sequence[Token], heard: Sequence[Heard]) -> dict[int, Seconds]:
-    """When the engine begins a token, by its number. What goes back in the text or in time is not believed."""
+    """Times at which the engine begins a token, by its number. What goes back in the text or in time is not believed."""
     begins = [token.end - len(token.text) for token in all_tokens]
     found: dict[int, Seconds] = {}
     latest, at = -1, -1.0

@@ -13,14 +13,17 @@ class Outlet(Protocol):
     lead: how long before a sound is to be heard it has to be played. fault: why nothing is heard any more.
     """
 
-    lead: Seconds
-    fault: Fault | None
+    @property
+    def lead(self) -> Seconds: ...
+
+    @property
+    def fault(self) -> Fault | None: ...
 
     def earliest(self) -> Seconds:
         """The earliest time at which sound that is played now is heard."""
 
     def play(self, samples: bytes, at: Seconds) -> None:
-        """Have samples sound from `at` on: 16 bit, little-endian, one channel. Calls come in the order of time."""
+        """Play samples so that they sound from `at` on: 16 bit, little-endian, one channel. Calls come in the order of time."""
 
     def rest(self) -> None:
         """Take note that silence follows what was played."""
@@ -78,4 +81,9 @@ class Several:
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         ends = [each.watch(on_fault) for each in self._outlets]
-        return lambda: [end() for end in ends] and None
+
+        def unwatch() -> None:
+            for end in ends:
+                end()
+
+        return unwatch

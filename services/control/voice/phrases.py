@@ -60,14 +60,14 @@ def _heard(text: str) -> str:
     if text.isascii() and text.isprintable():
         return text
     return "".join(
-        " " if unicodedata.category(each) in _UNHEARD and each not in _JOINERS or each == "\ufe0f" else each
+        " " if (unicodedata.category(each) in _UNHEARD and each not in _JOINERS) or each == "\ufe0f" else each
         for each in text
     )
 
 
 def _inside(prosody: Sequence[Prosody], start: int, end: int) -> Iterator[Prosody]:
     for span in prosody:
-        if span.end > start and span.start < end or span.start == span.end and start <= span.start < end:
+        if (span.end > start and span.start < end) or (span.start == span.end and start <= span.start < end):
             pause = span.pause if span.start >= start else 0.0
             low, high = max(0, span.start - start), min(end, span.end) - start
             yield replace(span, start=low, end=max(low, high), pause=pause)

@@ -16,9 +16,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.voice.settings import VoiceSettings
 
 try:
-    from fcntl import F_SETPIPE_SZ, fcntl
-except ImportError:  # not on Linux: there the pipe keeps its size
-    F_SETPIPE_SZ = 0
+    import fcntl
+except ImportError:  # on Windows the pipe keeps its size
+    fcntl = None  # type: ignore[assignment]
 
 MARGIN: Seconds = 0.04
 """How much earlier than needed sound is handed over: so late may the loop be."""
@@ -100,12 +100,12 @@ class Player:
             return
         pipe = self._process.stdin
         assert pipe is not None
-        if F_SETPIPE_SZ:
+        if fcntl is not None and hasattr(fcntl, "F_SETPIPE_SZ"):
             with suppress(OSError):
-                fcntl(pipe.fileno(), F_SETPIPE_SZ, PIPE)
+                fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, PIPE)
         self.fault, self._heard_until = None, 0.0
         self._transport, _ = await self._loop.connect_write_pipe(lambda: _Ending(self._lost), pipe)
-        self._transport.set_write_buffer_limits(high=2**40)  # type: ignore[attr-defined]
+        self._transport.set_write_buffer_limits(high=2**40)
 
     def earliest(self) -> Seconds:
         return max(self._heard_until, self._loop.time() + self.lead)

@@ -50,11 +50,11 @@ class SoundingVoice(Body):
 
     name: ClassVar[str] = "voice"
     synthesizer: ClassVar[type[Synthesizer]]
-    Settings = VoiceSettings
+    Settings: ClassVar[type[VoiceSettings]] = VoiceSettings
 
     def __init__(self, settings: Any = None) -> None:
         """Make the voice. settings: None: as they are by default."""
-        self._settings: VoiceSettings = (self.Settings or VoiceSettings)() if settings is None else settings
+        self._settings: VoiceSettings = self.Settings() if settings is None else settings
         self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",))
         self._loop = asyncio.get_running_loop()
         takes = self.synthesizer.Settings is not None
@@ -98,7 +98,7 @@ class SoundingVoice(Body):
     def _file(self) -> WavFile:
         name, origin = self._settings.file, self._loop.time() if self._is_real else 0.0
         try:
-            return WavFile(open(name, "wb", buffering=0), name, self._studio.rate, origin, self._loop.time)  # noqa: SIM115
+            return WavFile(open(name, "wb", buffering=0), name, self._studio.rate, origin, self._loop.time)
         except OSError as error:
             advice = "it is the `file` of the voice; a relative path counts from the folder of the process"
             raise RunFailed(Fault(reason=error.strerror or str(error), where=name, advice=advice)) from error
@@ -145,8 +145,8 @@ class SoundingVoice(Body):
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
         parts = _Phrases(behavior, self)
-        if (fault := parts.refused()) is not None:
-            raise BehaviorRefused(replace(fault, where=behavior.id))
+        if (refused := parts.refused()) is not None:
+            raise BehaviorRefused(replace(refused, where=behavior.id))
         words = utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
         async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
             async for progress in utterance:
@@ -179,7 +179,7 @@ class _Phrases(Parts):
         self._pieces = voice.parts_of(behavior)
 
     def refused(self) -> Fault | None:
-        """Why the first phrase cannot be said; None: it can, or it is not known yet."""
+        """The reason why the first phrase cannot be said; None: it can, or it is not known yet."""
         try:
             self.part(0)
         except BodyFailed as error:

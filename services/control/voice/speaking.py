@@ -77,7 +77,7 @@ class _More(Struct, frozen=True):
 
 
 class _Item(Struct, frozen=True):
-    """What is to come at `at`, seconds from the start of the utterance. is_gap: of a mark between two words."""
+    """A thing that is to come at `at`, seconds from the start of the utterance. is_gap: of a mark between two words."""
 
     at: Seconds
     what: Reached | Spoke | _Gap | _More
@@ -184,7 +184,7 @@ class _Utterance:
             self._do(item)
 
     def next_told(self) -> Progress | None:
-        """What is heard now; None: nothing new."""
+        """Take the next thing that is heard by now; None: nothing new."""
         if self._coming:
             if not self._bell.is_past(self._begin + self._coming[0].at):
                 return None

@@ -33,7 +33,7 @@ _STEP = 65536
 
 
 class _Asked(NamedTuple):
-    """What the process works on. phrase: None: the synthesizer is being made. at: since when, on the clock."""
+    """The phrase that the process works on. phrase: None: the synthesizer is being made. at: since when, on the clock."""
 
     phrase: Phrase | None
     at: Seconds
@@ -75,7 +75,7 @@ class Studio:
         return found
 
     def ask(self, phrases: Sequence[Phrase], wait: Seconds) -> None:
-        """Have phrases synthesized, in this order, and wait until they are there or the time is over.
+        """Ask for phrases to be synthesized, in this order, and wait until they are there or the time is over.
 
         phrases: those that are known cost nothing. wait: seconds by the clock.
         """
