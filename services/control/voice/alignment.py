@@ -6,6 +6,7 @@ the median and by 160 ms in nine of ten: measured by `tests/control/test_alignme
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +155,7 @@ def _shared(
     else:
         inner = [loudness.at_voiced(since + share * (until - since)) for share in _shares(weights)[1:-1]]
         cuts = [begin, *(min(end, max(begin, each)) for each in inner), end]
-    return list(zip(cuts, cuts[1:], strict=False))
+    return list(pairwise(cuts))
 
 
 def _shares(weights: Sequence[Seconds]) -> list[float]:

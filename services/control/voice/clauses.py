@@ -1,6 +1,7 @@
 """Lay-out of a synthesized phrase: its words in time, the shapes of the mouth, and its sound without silence around it.
 
-Word times come from the engine where it has them, and from the sound where it has not. What an engine says of words is
+Word times come from the engine where it has them, and from the sound where it has not. What an engine says of words
+is
 matched to the tokens of the text by its positions: a number may be five words, two words one, and a position wrong.
 Pure.
 """
@@ -135,7 +136,10 @@ def _times(
 
 
 def _anchors(all_tokens: Sequence[Token], heard: Sequence[Heard]) -> dict[int, Seconds]:
-    """Times at which the engine begins a token, by its number. What goes back in the text or in time is not believed."""
+    """Times at which the engine begins a token, by its number.
+
+    What goes back in the text or in time is not believed.
+    """
     begins = [token.end - len(token.text) for token in all_tokens]
     found: dict[int, Seconds] = {}
     latest, at = -1, -1.0

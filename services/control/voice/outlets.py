@@ -23,7 +23,10 @@ class Outlet(Protocol):
         """The earliest time at which sound that is played now is heard."""
 
     def play(self, samples: bytes, at: Seconds) -> None:
-        """Play samples so that they sound from `at` on: 16 bit, little-endian, one channel. Calls come in the order of time."""
+        """Play samples so that they sound from `at` on: 16 bit, little-endian, one channel.
+
+        Calls come in the order of time.
+        """
 
     def rest(self) -> None:
         """Take note that silence follows what was played."""

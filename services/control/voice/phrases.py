@@ -2,6 +2,7 @@
 
 import unicodedata
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from msgspec.structs import replace
@@ -77,7 +78,7 @@ def _cuts(text: str) -> Iterator[int]:
     """Places at which the text is cut, in characters."""
     since, length = 0, 0
     all_tokens = list(tokens(text))
-    for token, after in zip(all_tokens, all_tokens[1:], strict=False):
+    for token, after in pairwise(all_tokens):
         length += len(token.text) * (1 if token.script == "spaced" else _DENSE)
         pause = max((PAUSE.get(each, 0.0) for each in token.closing), default=0.0)
         ends = length >= ENOUGH and pause >= _SENTENCE and _is_end(token, after)

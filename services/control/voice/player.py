@@ -1,7 +1,8 @@
 """A sound device, by the player program of its system, fed through a pipe. Whatever blocks there blocks the player.
 
 A player starts as soon as it has a little sound, and then consumes what it has in real time. So the moment at which a
-sample is heard is known: where the pipe is empty `latency` after it was written, else right after the sample before it.
+sample is heard is known: where the pipe is empty `latency` after it was written, else right after the sample before
+it.
 """
 
 import asyncio
@@ -94,7 +95,10 @@ class Player:
             return
         await self._end()
         try:
-            self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+            # Not asyncio's own: it starts a thread for each child in Python 3.11.
+            self._process = subprocess.Popen(  # noqa: ASYNC220
+                self._command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL
+            )
         except OSError as error:
             self._fail(f"the player {self._command[0]} does not start: {error.strerror or error}", ADVICE)
             return

@@ -10,8 +10,8 @@ class VoiceSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     device: `auto`: the first player program that is installed; `none`: no sound device; else the name of one of
         `player.PLAYERS`. In virtual time there is no device.
-    player: the command of another player program, which takes raw samples on its standard input, 16 bit, little-endian,
-        one channel; `{rate}` stands for the samples per second.
+    player: the command of another player program, which takes raw samples on its standard input, 16 bit, little-
+    endian, one channel; `{rate}` stands for the samples per second.
     latency: seconds from the moment at which the player gets a sample until it sounds; None: what is usual for it.
     file: a WAV file for all that is said, each at its loop time; empty: none.
     language: a tag such as `de`, where the text does not name its language (`xml:lang`); empty: the voice's own.

@@ -77,7 +77,10 @@ class _More(Struct, frozen=True):
 
 
 class _Item(Struct, frozen=True):
-    """A thing that is to come at `at`, seconds from the start of the utterance. is_gap: of a mark between two words."""
+    """A thing that is to come at `at`, seconds from the start of the utterance.
+
+    is_gap: of a mark between two words.
+    """
 
     at: Seconds
     what: Reached | Spoke | _Gap | _More

@@ -33,7 +33,10 @@ _STEP = 65536
 
 
 class _Asked(NamedTuple):
-    """The phrase that the process works on. phrase: None: the synthesizer is being made. at: since when, on the clock."""
+    """The phrase that the process works on. phrase: None: the synthesizer is being made.
+
+    at: since when, on the clock.
+    """
 
     phrase: Phrase | None
     at: Seconds
@@ -218,7 +221,10 @@ class Studio:
             self._size -= _bytes(self._known.popitem(last=False)[1])
 
     def _lose(self, reason: str) -> None:
-        """The process is gone or is not to be trusted. What it was asked is not asked again; another one is started."""
+        """The process is gone or is not to be trusted.
+
+        What it was asked is not asked again; another one is started.
+        """
         asked = self._asked
         self.close()
         fault = Fault(reason=reason, service="control")

@@ -6,8 +6,8 @@
         def say(self, phrase: Phrase) -> Said:
             return Said(engine.speak(phrase.text))
 
-It runs in a process of its own (`studio.py`), and may block. Words and mouth shapes are laid out by `clauses.py`: from
-the times of `Said`, or from the sound alone where there are none.
+It runs in a process of its own (`studio.py`), and may block. Words and mouth shapes are laid out by `clauses.py`:
+from the times of `Said`, or from the sound alone where there are none.
 """
 
 from abc import ABC, abstractmethod
@@ -34,7 +34,10 @@ class Phrase(Struct, frozen=True):
 
 
 class Heard(Struct, frozen=True, array_like=True):
-    """The instant at which the engine begins a word. position: a character of the phrase that is in it. at: seconds."""
+    """The instant at which the engine begins a word. position: a character of the phrase that is in it.
+
+    at: seconds.
+    """
 
     position: int
     at: Seconds

@@ -2,10 +2,12 @@
 
 A sound is known by its first letter that is in a class; marks of stress, length and tone say nothing about the lips.
 Classes after the phonetic description of the sounds (International Phonetic Association, Handbook, 1999): lips closed
-for bilabials, the lower lip at the teeth for labiodentals, rounded for rounded vowels and [w], opening by vowel height.
+for bilabials, the lower lip at the teeth for labiodentals, rounded for rounded vowels and [w], opening by vowel
+height.
 """
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 from msgspec import Struct
 
@@ -57,7 +59,7 @@ def lips(phones: Iterable[tuple[str, Seconds]], end: Seconds) -> tuple[Lips, ...
     """
     timed = [*phones, ("", end)]
     found: list[Lips] = []
-    for (name, at), (_, until) in zip(timed, timed[1:], strict=False):
+    for (name, at), (_, until) in pairwise(timed):
         if not name:
             _add(found, at, (0.0, 0.0))
             continue

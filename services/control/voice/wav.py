@@ -1,8 +1,9 @@
 """A WAV file of all that is said, each sound at its loop time: a whole scenario can be heard, and aligned with its events.
 
-The file is valid after each sound, whatever ends the process then: the sizes in its header are brought up to date with
-the samples. Its second 0 is the loop time `origin`: 0 in virtual time, else when the voice was connected. A comment in
-the file (LIST INFO ICMT) says that.
+The file is valid after each sound, whatever ends the process then: the sizes in its header are brought up to date
+with
+the samples. Its second 0 is the loop time `origin`: 0 in virtual time, else when the voice was connected. A comment
+in the file (LIST INFO ICMT) says that.
 """
 
 import struct

@@ -2,7 +2,8 @@
 
     python -m engage_hri.services.control.voice.worker
 
-Each message is four bytes of length, little-endian, and MessagePack. It ends with its standard input. It is a process of
+Each message is four bytes of length, little-endian, and MessagePack. It ends with its standard input. It is a
+process of
 its own since engines block, some crash on odd texts, and one is under another license (docs/decisions/0062).
 """
 
