@@ -1,4 +1,4 @@
-"""Lay-out of a synthesized phrase: its words in time, the shapes of the mouth, and its sound without silence around it.
+"""Lay-out of a synthesized phrase: words in time, shapes of the mouth, and sound without silence around it.
 
 Word times come from the engine where it has them, and from the sound where it has not. What an engine says of words
 is

@@ -1,4 +1,4 @@
-"""Cutting of a text into phrases, each of which is said in one go: a long text is not synthesized all at once. Pure."""
+"""Cutting of a text into phrases, each said in one go: a long text is not synthesized all at once. Pure."""
 
 import unicodedata
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""A WAV file of all that is said, each sound at its loop time: a whole scenario can be heard, and aligned with its events.
+"""A WAV file of all that is said, each sound at its loop time: a whole scenario can be heard and aligned.
 
 The file is valid after each sound, whatever ends the process then: the sizes in its header are brought up to date
 with
