@@ -1,4 +1,4 @@
-"""A synthesizer of one's own joins by the file on the page, in its own process; words are aligned with sound alone."""
+"""A synthesizer of one's own joins by the file on the page; words are aligned with sound alone."""
 
 import asyncio
 import re
