@@ -1,8 +1,8 @@
 """Alignment of words with sound: by loudness and by how long words of their length take. No recognition. Pure.
 
 Pauses of the sound are matched to the punctuation of the text; between two pauses words have time by their letters.
-Against the word times of eSpeak NG, 77 words of six sentences in five languages, a word is off by 61 ms in the
-median and by 196 ms in nine of ten (`tests/control/test_own_synthesizer.py`). An engine that knows its words tells them better.
+Against the word times of eSpeak NG, 77 words of six sentences in five languages, a word is off by 61 ms in the median
+and by 196 ms in nine of ten (`tests/control/test_own_synthesizer.py`). An engine that knows its words tells better.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Prosody of the end of a turn: its last words are said lower, as a signal that the turn is over (thesis 3.3.1). Pure."""
+"""Prosody of the end of a turn: its last words are lower, a signal that it is over (thesis 3.3.1). Pure."""
 
 from collections.abc import Sequence
 
