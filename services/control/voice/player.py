@@ -25,7 +25,7 @@ MARGIN: Seconds = 0.04
 """How much earlier than needed sound is handed over: so late may the loop be."""
 FLUSH: Seconds = 0.06
 """Silence after the last sound: a player may keep a little until there is more."""
-STUCK: Seconds = 0.3
+STUCK: Seconds = 0.8
 """So much sound may be overdue in our own buffer before the device counts as dead."""
 PIPE = 4096
 """Bytes in the pipe: a tenth of a second. What does not fit there is seen to be stuck."""
