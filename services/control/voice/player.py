@@ -37,7 +37,7 @@ ADVICE = "install one of them (Debian: alsa-utils, pulseaudio-utils, pipewire-bi
 class PlayerProgram(NamedTuple):
     """A program that plays raw samples from its standard input.
 
-    latency: seconds from the first sample in an empty pipe until it is heard. The one of pacat is measured but for what
+    latency: seconds from the first sample in an empty pipe until it is heard. That of pacat is measured but for what
     the hardware adds, 0 to 50 ms: on a null sink, sound is where it is told within 12 ms for 0. Others are estimates.
     """
 
