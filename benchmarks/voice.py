@@ -1,4 +1,4 @@
-"""Synthesis of speech: milliseconds a sentence in its own process, with the lay-out of words, against the engine alone.
+"""Synthesis of speech: milliseconds a sentence in its own process, against the engine alone.
 
 python benchmarks/voice.py [--json]
 """
