@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 NAME = re.compile(r"`([\w/]+\.(?:py|toml))`")
-THEIRS = {"FILE.py", "engage.toml", "mine.toml", "my_robot.py", "pan_tilt.py", "reachy.py"}
+THEIRS = {"FILE.py", "engage.toml", "mine.toml", "my_robot.py", "my_voice.py", "pan_tilt.py", "reachy.py"}
 """Files of whoever reads."""
 
 
