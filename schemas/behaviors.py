@@ -237,12 +237,14 @@ class Speech(Behavior, frozen=True, kw_only=True, tag="speech", omit_defaults=Tr
 
     text: the words, as they are to be heard.
     marks: sync points inside the text.
-    markup: prosodic markup for the voice (the same words), passed through untouched.
+    markup: prosodic markup for the voice (the same words): SSML without its outer `speak`.
+    language: of the words, a tag such as `de` or `pt-BR`; empty: that of the voice.
     """
 
     text: str
     marks: tuple[Mark, ...] = ()
     markup: str = ""
+    language: str = ""
 
 
 class Wait(Behavior, frozen=True, kw_only=True, tag="wait", omit_defaults=True):

@@ -28,6 +28,9 @@ SHELLS = {
     "services/control/reachy_mini/body.py",  # a body that moves on the loop's clock
     "services/control/reachy_mini/link.py",  # keeps the connection to the robot
     "services/control/reachy_mini/connection.py",  # HTTP and WebSockets
+    "services/control/voice/player.py",  # runs the program that plays
+    "services/control/voice/studio.py",  # runs the process of the synthesizer
+    "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once
     "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer

@@ -33,6 +33,7 @@ BUILT_IN = {
     "silent": "engage_hri.services.control.voice.silent:SilentVoice",
     "mujoco": "engage_hri.services.control.mujoco.body:MujocoBody",
     "reachy_mini": "engage_hri.services.control.reachy_mini.body:ReachyMini",
+    "espeak": "engage_hri.services.control.voice.sounding:EspeakVoice",
 }
 """Drivers of this package, each imported only when it is asked for."""
 EXTRAS = {"mujoco": "mujoco", "reachy_mini": "reachy-mini"}

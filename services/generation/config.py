@@ -70,6 +70,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     turn_silence: Seconds = 10.0
     """Silence after which an open turn closes as aborted. Ours."""
+    low_end: bool = True
+    """Say the last two words of a turn lower, thesis 3.3.1: the block's last speech gets prosodic markup."""
     barge_in: Seconds = 0.8
     """Seconds that the addressee speaks into the robot's speech before the robot gives up the turn; shorter is a
     backchannel, as the longest of Table 2.1."""

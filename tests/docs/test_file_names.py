@@ -15,6 +15,7 @@ THEIRS = {
     "calibration.toml",
     "poor.toml",
     "my_robot.py",
+    "my_voice.py",
     "pan_tilt.py",
     "reachy.py",
 }

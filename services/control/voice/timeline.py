@@ -61,7 +61,7 @@ def utter(text: str, pace: float = 1.0) -> Utterance:
     now = pause = 0.0
     is_speaking = False
     for token in tokens(text):
-        seconds = _seconds(token)
+        seconds = natural(token)
         start = now + pause if is_speaking and seconds else now
         now = start + seconds * pace
         words.append(Word(token.text, start, now, token.end))
@@ -71,7 +71,8 @@ def utter(text: str, pace: float = 1.0) -> Utterance:
     return Utterance(tuple(words), now) if is_speaking else Utterance((), 0.0)
 
 
-def _seconds(token: Token) -> Seconds:
+def natural(token: Token) -> Seconds:
+    """Seconds that a token takes by itself, at natural pace."""
     if not token.letters:
         return 0.0
     return PER_TOKEN.get(token.script, BEFORE_WORD + PER_LETTER * token.letters)

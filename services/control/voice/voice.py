@@ -52,13 +52,21 @@ class Voice:
     async def speak(
         self, behavior: Speech, authority: MovementAuthority, pace: float
     ) -> AsyncGenerator[Progress, None]:
-        """Say a text. pace: 2 takes twice as long. Raises BehaviorRefused: it says another."""
+        """Say a text in silence. pace: 2 takes twice as long. Raises BehaviorRefused: it says another."""
+        async with aclosing(self.say(behavior, authority, speaking.speak(behavior, authority, pace))) as utterance:
+            async for progress in utterance:
+                yield progress
+
+    async def say(
+        self, behavior: Speech, authority: MovementAuthority, words: AsyncGenerator[Progress, None]
+    ) -> AsyncGenerator[Progress, None]:
+        """Say a text. words: what is told of it as it is said. Raises BehaviorRefused: it says another."""
         if self._utterance is not None:
             reason = f"the voice is busy with {self._text!r}"
             raise BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
         self._utterance, self._text = authority, behavior.text
         try:
-            async with aclosing(speaking.speak(behavior, authority, pace)) as utterance:
+            async with aclosing(words) as utterance:
                 async for progress in utterance:
                     if isinstance(progress, Reached) and progress.sync == "end":
                         self._utterance, self._text = None, ""

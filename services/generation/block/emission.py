@@ -31,6 +31,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
+from engage_hri.services.generation.block.lowering import lowered
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
 from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, from_there, same
@@ -123,6 +124,8 @@ class Emission:
         self._time_speeches_and_references()
         opening, closing = self._opening(), self._closing()
         behaviors = (*opening, *self._in_document_order(), *closing)
+        if self.turn.closes and self.config.low_end and self.speeches:
+            behaviors = lowered(behaviors, self.speeches[-1])
         return FragmentPlan(
             block=Block(
                 id=self.fragment.id,

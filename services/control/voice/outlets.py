@@ -1,0 +1,92 @@
+"""Outlets for sound: what a voice plays goes to a device, into a file, or nowhere, at loop times."""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+
+
+class Outlet(Protocol):
+    """A way for sound. All times are loop times, seconds.
+
+    lead: how long before a sound is to be heard it has to be played. fault: why nothing is heard any more.
+    """
+
+    @property
+    def lead(self) -> Seconds: ...
+
+    @property
+    def fault(self) -> Fault | None: ...
+
+    def earliest(self) -> Seconds:
+        """The earliest time at which sound that is played now is heard."""
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        """Play samples so that they sound from `at` on: 16 bit, little-endian, one channel.
+
+        Calls come in the order of time.
+        """
+
+    def rest(self) -> None:
+        """Take note that silence follows what was played."""
+
+    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
+        """Call `on_fault` when there is one, until the returned function is called."""
+
+
+class Nowhere:
+    """An outlet that nobody hears. Times are as with sound."""
+
+    lead: Seconds = 0.0
+    fault: Fault | None = None
+
+    def __init__(self, now: Callable[[], Seconds]) -> None:
+        self._now = now
+
+    def earliest(self) -> Seconds:
+        return self._now()
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        """Let the sound go."""
+
+    def rest(self) -> None:
+        """Need nothing."""
+
+    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
+        return lambda: None
+
+
+class Several:
+    """Several outlets as one: sound is heard at the same time in each."""
+
+    def __init__(self, outlets: Sequence[Outlet]) -> None:
+        self._outlets = outlets
+
+    @property
+    def lead(self) -> Seconds:
+        return max(each.lead for each in self._outlets)
+
+    @property
+    def fault(self) -> Fault | None:
+        return next((each.fault for each in self._outlets if each.fault is not None), None)
+
+    def earliest(self) -> Seconds:
+        return max(each.earliest() for each in self._outlets)
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        for each in self._outlets:
+            each.play(samples, at)
+
+    def rest(self) -> None:
+        for each in self._outlets:
+            each.rest()
+
+    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
+        ends = [each.watch(on_fault) for each in self._outlets]
+
+        def unwatch() -> None:
+            for end in ends:
+                end()
+
+        return unwatch

@@ -1,0 +1,213 @@
+"""Voices that sound: a synthesizer in its own process, and a body of one part that says what it makes.
+
+class MyVoice(SoundingVoice):
+    name, synthesizer = "mine", MySynthesizer      # a driver: --voice my_voice.py:MyVoice
+"""
+
+import asyncio
+import time
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from typing import Any, ClassVar
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Speech
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import (
+    BehaviorRefused,
+    Body,
+    BodyFailed,
+    BodyState,
+    MovementAuthority,
+    Progress,
+)
+from engage_hri.services.control.refusals import unsupported
+from engage_hri.services.control.voice import player
+from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
+from engage_hri.services.control.voice.estimate import speech_estimate
+from engage_hri.services.control.voice.outlets import Nowhere, Outlet, Several
+from engage_hri.services.control.voice.parts import Part, expected, joined, silent, sounding, unspeakable
+from engage_hri.services.control.voice.phrases import Piece, pieces
+from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.speaking import Parts, utter_parts
+from engage_hri.services.control.voice.studio import LONGEST, Studio
+from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
+from engage_hri.services.control.voice.timeline import utter
+from engage_hri.services.control.voice.voice import Voice
+from engage_hri.services.control.voice.wav import WavFile
+from engage_hri.services.control.waiting import Bell
+
+
+class SoundingVoice(Body):
+    """A voice with a synthesizer, as a body with one part. Subclass it, and say which.
+
+    name: of the body. synthesizer: its class, with the type of its settings, which are those of the body, too.
+    """
+
+    name: ClassVar[str] = "voice"
+    synthesizer: ClassVar[type[Synthesizer]]
+    Settings: ClassVar[type[VoiceSettings]] = VoiceSettings
+
+    def __init__(self, settings: Any = None) -> None:
+        """Make the voice. settings: None: as they are by default."""
+        self._settings: VoiceSettings = self.Settings() if settings is None else settings
+        self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",))
+        self._loop = asyncio.get_running_loop()
+        takes = self.synthesizer.Settings is not None
+        self._studio = Studio(self.synthesizer, self._settings if takes else None)
+        self._voice = Voice()
+        self._outlet: Outlet = Nowhere(self._loop.time)
+        self._player: player.Player | None = None
+        self._pace = 1.0
+        """How much longer this voice takes than the model of `timeline`, from what it has said so far."""
+
+    @property
+    def _is_real(self) -> bool:
+        """True if loop time is real time: in virtual time nobody waits by the clock, and nothing is played."""
+        return abs(self._loop.time() - time.monotonic()) < 1.0
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        async with AsyncExitStack() as stack:
+            stack.callback(self._studio.close)
+            try:
+                if self._is_real:
+                    self._studio.listen(self._loop)
+                    await self._studio.made()
+                else:
+                    self._studio.make(LONGEST)
+            except SynthesisFailed as error:
+                raise InputRefused(error.fault) from error
+            outlets: list[Outlet] = []
+            if self._settings.file:
+                outlets.append(stack.enter_context(self._file()))
+            program = player.found(self._settings) if self._is_real else None
+            if program is not None:
+                self._player = player.Player(program, self._studio.rate)
+                await stack.enter_async_context(self._player.connected())
+                outlets.append(self._player)
+                stack.callback(self._player.watch(self._tell_fault))
+            if outlets:
+                self._outlet = Several(outlets)
+            yield
+
+    def _file(self) -> WavFile:
+        name, origin = self._settings.file, self._loop.time() if self._is_real else 0.0
+        try:
+            return WavFile(open(name, "wb", buffering=0), name, self._studio.rate, origin, self._loop.time)
+        except OSError as error:
+            advice = "it is the `file` of the voice; a relative path counts from the folder of the process"
+            raise RunFailed(Fault(reason=error.strerror or str(error), where=name, advice=advice)) from error
+
+    def _tell_fault(self) -> None:
+        if self._player is not None and self._player.fault is not None:
+            self.on_fault(self._player.fault)
+
+    # -- planning -----------------------------------------------------------------------------------------------
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        if not isinstance(behavior, Speech):
+            return unsupported(behavior)
+        found = pieces(behavior, self._settings.language)
+        if not found:
+            return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
+        self._studio.ask([piece.phrase for piece in found], self._settings.patience if self._is_real else LONGEST)
+        try:
+            parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
+        except SynthesisFailed as error:
+            return unspeakable(behavior, error.fault)
+        return speech_estimate(behavior, joined(parts, len(behavior.text)), pose or BodyPose())
+
+    def _part(self, piece: Piece) -> Part | None:
+        """The part of a phrase, if it is synthesized. Raises SynthesisFailed."""
+        clause = self._studio.known(piece.phrase)
+        if clause is None:
+            return None
+        model = utter(piece.phrase.text).seconds
+        if model > 0.5:
+            self._pace += 0.1 * (clause.seconds / model - self._pace)
+        return sounding(piece, clause)
+
+    # -- speaking -----------------------------------------------------------------------------------------------
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        if not isinstance(behavior, Speech):
+            raise BehaviorRefused(_fault(behavior, f"this voice has no {type_name(behavior)}"))
+        await self._voice.wait_for_silence(authority)
+        if authority.revoked is not None:
+            return
+        if self._player is not None and self._player.fault is not None:
+            await self._player.revive()
+            if (fault := self._player.fault) is not None:
+                raise BehaviorRefused(replace(fault, where=behavior.id))
+        parts = _Phrases(behavior, self)
+        if (refused := parts.refused()) is not None:
+            raise BehaviorRefused(replace(refused, where=behavior.id))
+        words = utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
+        async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
+            async for progress in utterance:
+                if self._player is not None:
+                    self._player.check()
+                yield progress
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        if not parts or "voice" in parts:
+            self._voice.hush()
+
+    def state(self) -> BodyState:
+        return BodyState(pose=BodyPose(), moving=self._voice.is_busy, speaking=self._voice.saying)
+
+    def see(self, world: World) -> None:
+        """Look at nothing: it only speaks."""
+
+    def parts_of(self, behavior: Speech) -> Sequence[Piece]:
+        """Cut a speech into phrases, and have them synthesized."""
+        found = pieces(behavior, self._settings.language)
+        self._studio.ask([piece.phrase for piece in found], 0.0 if self._is_real else LONGEST)
+        return found
+
+
+class _Phrases(Parts):
+    """The parts of a speech, as its phrases are synthesized."""
+
+    def __init__(self, behavior: Speech, voice: SoundingVoice) -> None:
+        self._behavior, self._voice = behavior, voice
+        self._pieces = voice.parts_of(behavior)
+
+    def refused(self) -> Fault | None:
+        """The reason why the first phrase cannot be said; None: it can, or it is not known yet."""
+        try:
+            self.part(0)
+        except BodyFailed as error:
+            return error.fault
+        return None
+
+    def part(self, number: int) -> Part | None:
+        if not self._pieces:
+            return silent(self._behavior.text)
+        voice, piece = self._voice, self._pieces[number]
+        try:
+            if (part := voice._part(piece)) is None:
+                voice._studio.ask([piece.phrase], 0.0 if voice._is_real else LONGEST)
+                part = voice._part(piece)
+            return part
+        except SynthesisFailed as error:
+            raise BodyFailed(replace(error.fault, where=self._behavior.id)) from error
+
+    def watch(self, bell: Bell) -> Callable[[], None]:
+        self._voice._studio.watch(bell)
+        return lambda: self._voice._studio.unwatch(bell)
+
+
+class EspeakVoice(SoundingVoice):
+    """The voice `espeak`: eSpeak NG, with sound on a device, in a file, or nowhere."""
+
+    name, synthesizer, Settings = "espeak", EspeakSynthesizer, EspeakSettings
+
+
+def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
+    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")

@@ -1,0 +1,83 @@
+"""A WAV file of all that is said, each sound at its loop time: a whole scenario can be heard and aligned.
+
+The file is valid after each sound, whatever ends the process then: the sizes in its header are brought up to date
+with
+the samples. Its second 0 is the loop time `origin`: 0 in virtual time, else when the voice was connected. A comment
+in the file (LIST INFO ICMT) says that.
+"""
+
+import struct
+from collections.abc import Callable
+from typing import BinaryIO
+
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Seconds
+
+COMMENT_SIZE = 80
+_HEADER = 12 + 24 + 8 + 4 + 8 + COMMENT_SIZE + 8
+LARGEST = 2**32 - 2**16
+"""Bytes of sound in one file: its header has no room for more."""
+
+
+class WavFile:
+    """An outlet into a file. It takes what it is given at once, so it needs no lead."""
+
+    lead: Seconds = 0.0
+
+    def __init__(self, file: BinaryIO, name: str, rate: int, origin: Seconds, now: Callable[[], Seconds]) -> None:
+        """Begin an empty file. file: unbuffered. rate: samples per second. origin: the loop time of its second 0."""
+        self.fault: Fault | None = None
+        self._file, self._name, self._rate, self._origin, self._now = file, name, rate, origin, now
+        self._size = 0
+        self._on_fault: list[Callable[[], None]] = []
+        self._write(0, _header(0, rate, origin))
+
+    def __enter__(self) -> "WavFile":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
+    def earliest(self) -> Seconds:
+        return self._now()
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        if self.fault is not None:
+            return
+        place = max(0, round((at - self._origin) * self._rate)) * 2
+        if place + len(samples) > LARGEST:
+            self._fail("the file is full", "a WAV file holds 4 GiB; name another one")
+            return
+        self._write(_HEADER + place, samples)
+        self._size = max(self._size, place + len(samples))
+        self._write(0, _header(self._size, self._rate, self._origin))
+
+    def rest(self) -> None:
+        """Need nothing: what is not written is silence."""
+
+    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
+        self._on_fault.append(on_fault)
+        return lambda: self._on_fault.remove(on_fault)
+
+    def _write(self, place: int, content: bytes) -> None:
+        try:
+            self._file.seek(place)
+            self._file.write(content)
+        except OSError as error:
+            self._fail(error.strerror or str(error), "is the disk full?")
+
+    def _fail(self, reason: str, advice: str) -> None:
+        self.fault = Fault(reason=f"the sound file: {reason}", where=self._name, advice=advice, service="control")
+        for each in list(self._on_fault):
+            each()
+
+
+def _header(size: int, rate: int, origin: Seconds) -> bytes:
+    comment = f"Engage; second 0 is loop time {origin:.6f} s".encode().ljust(COMMENT_SIZE, b"\0")[:COMMENT_SIZE]
+    info = b"INFO" + b"ICMT" + struct.pack("<I", COMMENT_SIZE) + comment
+    return (
+        b"RIFF" + struct.pack("<I", _HEADER - 8 + size) + b"WAVE"
+        + b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, rate, 2 * rate, 2, 16)
+        + b"LIST" + struct.pack("<I", len(info)) + info
+        + b"data" + struct.pack("<I", size)
+    )  # fmt: skip

@@ -1,0 +1,55 @@
+"""A synthesizer of one's own joins by the file on the page; words are aligned with sound alone."""
+
+import asyncio
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.services.control.body import MovementAuthority, Reached, Spoke
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.drivers import made
+from engage_hri.services.control.voice.clauses import laid_out
+from engage_hri.services.control.voice.phrases import pieces
+from engage_hri.services.control.voice.synthesis import Said
+
+PAGE = (Path(__file__).parents[2] / "docs" / "control.md").read_text(encoding="utf-8")
+SENTENCES = (
+    ("en-us", "Could you hand me the blue square, please, so that it touches the top of the rectangle?"),
+    ("en-us", "Now move the yellow triangle. It belongs on the left side, next to the house."),
+    ("de", "Bitte legen Sie das gelbe Dreieck auf die linke Seite, neben das Haus."),
+    ("fr", "Bonjour, est-ce que vous pouvez me donner le petit carré bleu?"),
+    ("ru", "Пожалуйста, передвиньте синий квадрат налево."),
+    ("zh", "你好，请把蓝色的方块放在桌子的左边。"),
+)
+
+
+async def test_the_synthesizer_of_the_page_speaks_by_its_file_name(tmp_path: Path):
+    code = next(block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "class MyVoice" in block)
+    (tmp_path / "my_voice.py").write_text(code, encoding="utf-8")
+    body = made(ControlConfig(body="simulated", voice=f"{tmp_path}/my_voice.py:MyVoice"))
+    speech = Speech(id="s", text="One two three four")
+    async with body.connected():
+        progress = [each async for each in body.perform(speech, MovementAuthority(speech, "end"))]
+
+    assert [each.word for each in progress if isinstance(each, Spoke)] == ["One", "two", "three", "four"]
+    assert isinstance(progress[-1], Reached)
+    assert asyncio.get_running_loop().time() == pytest.approx(18 * 0.07, abs=0.02)
+
+
+def test_words_are_aligned_with_sound_alone_within_the_stated_error():
+    pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+    from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
+
+    engine, errors = EspeakSynthesizer(EspeakSettings()), []
+    for language, text in SENTENCES:
+        phrase = pieces(Speech(id="s", text=text, language=language))[0].phrase
+        said = engine.say(phrase)
+        known = laid_out(phrase.text, said, engine.rate).words
+        guessed = laid_out(phrase.text, Said(said.samples), engine.rate).words
+        errors += [abs(one.start - other.start) for one, other in zip(known, guessed, strict=True)]
+
+    assert np.median(errors) < 0.07
+    assert np.quantile(errors, 0.9) < 0.22
