@@ -84,7 +84,7 @@ def simulated_body(config: ControlConfig) -> Body:
     from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 
     repertoire = extended(BUILT_IN, [(file, _read(file)) for file in config.repertoire_files])
-    return SimulatedBody(config.no_point_zones, config.variability, repertoire)
+    return SimulatedBody(config.no_point_zones, config.variability, repertoire, alive=config.alive)
 
 
 def _read(file: str) -> str:

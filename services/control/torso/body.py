@@ -23,23 +23,28 @@ from engage_hri.services.control.body import (
     Body,
     BodyFailed,
     BodyState,
+    MouthShape,
     MovementAuthority,
     Progress,
     Reached,
 )
 from engage_hri.services.control.config import Variability
-from engage_hri.services.control.extras import Seen
+from engage_hri.services.control.extras import Idle, Seen
 from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks
+from engage_hri.services.control.torso.alive import Alive
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, speech_estimate, wait_estimate
+from engage_hri.services.control.torso.idling import idling
+from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.rehearsal import rehearsed
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.voice import speaking
+from engage_hri.services.control.voice.lipsync import LipSync
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.waiting import Bell
@@ -58,7 +63,10 @@ class SimulatedBody(Body):
         zones: tuple[NoPointZone, ...] = (),
         deviations: Variability | None = None,
         repertoire: Repertoire = BUILT_IN,
+        *,
+        alive: bool = False,
     ) -> None:
+        """Make a torso at rest, in a running event loop. alive: it blinks and breathes. Raises InputRefused."""
         self.capabilities = Capabilities(
             body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
@@ -71,6 +79,9 @@ class SimulatedBody(Body):
         self._torso = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
+        self._alive = Alive(self._deviations.seed, self._loop.time()) if alive else None
+        self._mouth = Mouth()
+        self.on_lips = self.move_lips
         self._offsets: dict[str, float] = {}
         """Radians by which the true angle of a joint is more than what it measures, as its calibration says."""
         self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
@@ -182,6 +193,14 @@ class SimulatedBody(Body):
                 if kinematics.LIMIT[joint].part != "face":
                     beside[joint] = beside.get(joint, 0.0) + radians(amount)
         return {joint: angle for joint, angle in beside.items() if angle}
+
+    # -- what belongs to no behavior ----------------------------------------------------------------------------
+
+    def idle(self) -> Idle:
+        return idling(self._torso, self._mouth, self._alive, self._loop.time())
+
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
+        self._mouth.move(shapes, self._loop.time())
 
     # -- faults -------------------------------------------------------------------------------------------------
 
@@ -314,11 +333,18 @@ class SimulatedBody(Body):
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
-            async for progress in utterance:
-                yield progress
-                if isinstance(progress, Reached) and progress.sync == "end":
-                    return
+        lips = LipSync(utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
+        unwatch = authority.watch(lips.authority_changed)
+        try:
+            async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
+                async for progress in utterance:
+                    lips.hear(progress)
+                    yield progress
+                    if isinstance(progress, Reached) and progress.sync == "end":
+                        return
+        finally:
+            unwatch()
+            lips.end()
         if self._deviations.of("voiceless"):
             raise BodyFailed(_fault(behavior, "the voice is mute"))
 
