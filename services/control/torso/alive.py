@@ -1,4 +1,4 @@
-"""What the torso does by itself while it does nothing: it blinks, breathes, and its face is never quite still. Pure.
+"""Idle motion of the torso: it blinks, breathes, and its face is never quite still. Pure.
 
 All of it is added to the posture that behaviors give it, and enters no estimate, no pose after a behavior, and
 nothing that a behavior does or waits in: breath gives way to any motion and any hold of the body, the face to any
@@ -46,7 +46,7 @@ class Blinks:
         self._next = self._pause(0)
 
     def around(self, t: Seconds) -> tuple[Seconds, Seconds]:
-        """When the last blink until t began (-inf: none), and when the first after it does."""
+        """Tell when the last blink until t began (-inf: none), and when the first after it does."""
         if t < self._last:
             self._number, self._last, self._next = 0, -inf, self._pause(0)
         while self._next <= t:
@@ -90,7 +90,7 @@ class Alive:
         }
 
     def added(self, t: Seconds, face: Mapping[str, float], *, face_rests: bool, body_rests: bool) -> dict[str, float]:
-        """What is added to each joint at t. face: its joints as they are without that."""
+        """Tell what is added to each joint at t. face: its joints as they are without that."""
         since, by = t - self._born, dict[str, float]()
         of_face, of_body = self._face.share(t, is_open=face_rests), self._body.share(t, is_open=body_rests)
         if of_face:
@@ -109,7 +109,7 @@ class Alive:
         return {joint: angle for joint, angle in by.items() if angle}
 
     def quick_at(self, t: Seconds) -> Seconds:
-        """When it next moves quickly, as in a blink; t: it does."""
+        """Tell when it next moves quickly, as in a blink; t: it does."""
         last, following = self._blinks.around(t - self._born)
         return t if t - self._born < last + CLOSING + CLOSED + OPENING else self._born + following
 

@@ -333,7 +333,7 @@ class SimulatedBody(Body):
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        lips = LipSync(utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
+        lips = LipSync(behavior, utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
         unwatch = authority.watch(lips.authority_changed)
         try:
             async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:

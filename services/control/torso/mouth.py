@@ -53,7 +53,7 @@ class Mouth:
         return t < self._since + CHANGE or bool(self._times and t < self._times[-1] + CHANGE / 2)
 
     def added(self, t: Seconds, face: Mapping[str, float]) -> dict[str, float]:
-        """What is added to the joints of the mouth. face: its joints as an expression has them: its rest."""
+        """Tell what is added to the joints of the mouth. face: its joints as an expression has them: its rest."""
         opening, width = self.at(t)
         if not (opening or width):
             return {}

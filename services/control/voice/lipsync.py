@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
+from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Arrived, MouthShape, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.voice.timeline import Utterance, Word
@@ -56,12 +57,14 @@ class LipSync:
 
     def __init__(
         self,
+        behavior: Speech,
         utterance: Utterance,
         authority: MovementAuthority,
         now: Callable[[], Seconds],
         move: Callable[[Sequence[MouthShape]], None],
     ) -> None:
         self._utterance = utterance
+        self._times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
         self._authority = authority
         self._now = now
         self._move = move
@@ -72,14 +75,12 @@ class LipSync:
     def hear(self, progress: Progress) -> None:
         """Follow what the voice reports."""
         match progress:
-            case Reached(sync="start", at=at):
-                self._begin = at
-                self._go_on()
             case Arrived():
                 self._move(())
-            case Reached(at=at, arrived=arrived) if at > arrived and self._begin is not None:
-                self._begin += at - arrived
-                self._go_on()
+            case Reached(sync=sync, at=at, arrived=arrived) if sync in self._times:
+                if self._begin is None or at > arrived:
+                    self._begin = at - self._times[sync]
+                    self._go_on()
             case Spoke() | Reached():
                 pass
 
