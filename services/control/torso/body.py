@@ -30,7 +30,7 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.extras import Idle, Seen
-from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks
+from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks, truth
 from engage_hri.services.control.torso.alive import Alive
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
@@ -161,38 +161,17 @@ class SimulatedBody(Body):
     # -- what it does not measure -------------------------------------------------------------------------------
 
     def seen(self) -> Seen | None:
-        if not (beside := self._beside()):
-            return None
         told = tracks.pose_at(self._torso.tracks, self._loop.time())
-        angles = {joint: angle + beside.get(joint, 0.0) for joint, angle in told.items()}
-        arms = kinematics.arm(angles, "left"), kinematics.arm(angles, "right")
-        return Seen(gaze=kinematics.gaze(angles), left_arm=arms[0], right_arm=arms[1])
+        return truth.seen(told, truth.beside(self._deviations, self._offsets))
 
     def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
-        angles = tracks.updated(kinematics.HOME, pose)
-        match part:
-            case "head":
-                return kinematics.gaze(angles)
-            case "left_arm":
-                return kinematics.arm(angles, "left")
-            case "right_arm":
-                return kinematics.arm(angles, "right")
-        return None
+        return truth.ray_at(part, pose)
 
     def calibrate(self, offsets: Mapping[str, Radians]) -> None:
         if unknown := [joint for joint in offsets if kinematics.LIMIT.get(joint) is None]:
             reason, advice = f"no joint {', '.join(unknown)}", f"its joints are {', '.join(kinematics.LIMIT)}"
             raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
         self._offsets = dict(offsets)
-
-    def _beside(self) -> dict[str, float]:
-        """Radians by which joints are beside the angles that it tells: each that is miscalibrated, or corrected."""
-        beside = {joint: -offset for joint, offset in self._offsets.items()}
-        for fault, amount in self._deviations.of("miscalibrated"):
-            for joint in [limit.joint for limit in kinematics.JOINTS if fault.part in ("", limit.part, limit.joint)]:
-                if kinematics.LIMIT[joint].part != "face":
-                    beside[joint] = beside.get(joint, 0.0) + radians(amount)
-        return {joint: angle for joint, angle in beside.items() if angle}
 
     # -- what belongs to no behavior ----------------------------------------------------------------------------
 
@@ -334,17 +313,13 @@ class SimulatedBody(Body):
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
         lips = LipSync(behavior, utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
-        unwatch = authority.watch(lips.authority_changed)
-        try:
+        with lips.following():
             async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
                 async for progress in utterance:
                     lips.hear(progress)
                     yield progress
                     if isinstance(progress, Reached) and progress.sync == "end":
                         return
-        finally:
-            unwatch()
-            lips.end()
         if self._deviations.of("voiceless"):
             raise BodyFailed(_fault(behavior, "the voice is mute"))
 

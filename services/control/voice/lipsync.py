@@ -1,6 +1,7 @@
 """Shapes of the mouth for a voice that knows its words alone, in step with it as it waits and goes on. Pure."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
@@ -72,6 +73,16 @@ class LipSync:
         self._silent_from: Seconds | None = None
         """Seconds from the start at which it falls silent, since it is held."""
 
+    @contextmanager
+    def following(self) -> Iterator[None]:
+        """Follow the authority during the body of `with`. The mouth is closed after it, however it ends."""
+        unwatch = self._authority.watch(self.authority_changed)
+        try:
+            yield
+        finally:
+            unwatch()
+            self._move(())
+
     def hear(self, progress: Progress) -> None:
         """Follow what the voice reports."""
         match progress:
@@ -100,10 +111,6 @@ class LipSync:
                 self._begin = now - coming[0]
             self._silent_from = None
             self._go_on()
-
-    def end(self) -> None:
-        """Close the mouth, however the speech has ended."""
-        self._move(())
 
     def _go_on(self) -> None:
         if self._silent_from is None:
