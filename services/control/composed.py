@@ -7,6 +7,7 @@ knows only its own joints; what one says of poses is completed with where the ot
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from math import inf
 from typing import NamedTuple
 
 from msgspec.structs import replace
@@ -26,7 +27,7 @@ from engage_hri.services.control.body import (
     MovementAuthority,
     Progress,
 )
-from engage_hri.services.control.extras import Seen
+from engage_hri.services.control.extras import Idle, Seen
 from engage_hri.services.control.refusals import unsupported
 from engage_hri.services.runtime.steps import Steps, finished
 
@@ -223,6 +224,15 @@ class ComposedBody(Body):
                 if member.body.capabilities.faults:
                     member.body.switch_faults(played)
             raise
+
+    def idle(self) -> Idle:
+        added: dict[str, Radians] = {}
+        quick_at = inf
+        for member in self._members:
+            idle, own = member.body.idle(), _own_joints(member)
+            added |= {joint: angle for joint, angle in idle.added.items() if own is None or joint in own}
+            quick_at = min(quick_at, idle.quick_at)
+        return Idle(added=added, quick_at=quick_at)
 
     # -- where it really points -----------------------------------------------------------------------------------
 

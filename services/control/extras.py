@@ -1,13 +1,14 @@
 """Parts of a body besides its contract: faults that it plays, where it really points, and a correction of that."""
 
 from collections.abc import Mapping, Sequence
+from math import inf
 
 from msgspec import Struct
 
 from engage_hri.schemas.body import BodyPose, Capabilities, Ray
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.units import Radians
+from engage_hri.schemas.units import Radians, Seconds
 
 
 class Seen(Struct, frozen=True, kw_only=True):
@@ -16,6 +17,17 @@ class Seen(Struct, frozen=True, kw_only=True):
     gaze: Ray | None = None
     left_arm: Ray | None = None
     right_arm: Ray | None = None
+
+
+class Idle(Struct, frozen=True, kw_only=True):
+    """Motion that belongs to no behavior: breath, blinks, lips with the voice.
+
+    added: what it adds to the angles of joints that `Body.state` tells. quick_at: loop time from which on it changes
+    quickly; earlier than now: it does; inf: not in sight.
+    """
+
+    added: Mapping[str, Radians] = {}
+    quick_at: Seconds = inf
 
 
 class Extras:
@@ -46,6 +58,10 @@ class Extras:
         None: it is as it measures; and a real body, which everybody sees.
         """
         return None
+
+    def idle(self) -> Idle:
+        """Tell what it adds by itself to the posture of `state` now. None of it is in `state`, or in an estimate."""
+        return Idle()
 
     def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
         """Tell where the gaze (`head`) or a forearm is with the joints so; None: it does not know.

@@ -2,15 +2,17 @@
 
 from math import inf
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import OngoingActions
-from engage_hri.schemas.body import RobotSeen, RobotState
+from engage_hri.schemas.body import BodyPose, JointAngle, RobotSeen, RobotState
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.calibration import Calibration
-from engage_hri.services.control.extras import Seen
+from engage_hri.services.control.extras import Idle, Seen
 from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
 
@@ -64,10 +66,27 @@ class Shown:
         if news != before or now >= at + (MOVING if state.moving else IDLE) - EPSILON:
             self._told = now, news
             self._bus.publish(keys.ROBOT_STATE, message)
-        if self._bus.is_heard(keys.ROBOT_MOTION):
-            self._bus.publish(keys.ROBOT_MOTION, message)
         self._tell_seen(now)
-        self._next.set(now + (self._interval if state.moving else IDLE))
+        wait = self._interval if state.moving else IDLE
+        if self._bus.is_heard(keys.ROBOT_MOTION):
+            idle = self._body.idle()
+            self._bus.publish(keys.ROBOT_MOTION, self._with_idle(message, idle))
+            if idle.added and not state.moving:
+                wait = max(self._interval, min(MOVING, idle.quick_at - now))
+        self._next.set(now + wait)
+
+    def _with_idle(self, state: RobotState, idle: Idle) -> RobotState:
+        """The state with what the body adds to it by itself."""
+        if not idle.added:
+            return state
+        pose = BodyPose(
+            joints=tuple([JointAngle(it.joint, it.angle + idle.added.get(it.joint, 0.0)) for it in state.pose.joints])
+        )
+        rays = {
+            field: self._calibration.widened(self._body.ray_at(part, pose), part) or getattr(state, field)
+            for field, part in (("gaze", "head"), ("left_arm", "left_arm"), ("right_arm", "right_arm"))
+        }
+        return replace(state, pose=pose, **rays)
 
     def _tell_seen(self, now: Seconds) -> None:
         """Publish where a simulated body really is, as long as that is not where it measures."""

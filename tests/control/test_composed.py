@@ -254,3 +254,23 @@ async def test_a_fault_that_nobody_can_play_changes_nothing() -> None:
         body.switch_faults((BodyFault(kind="slow", part="left_arm", amount=2.0),))
 
     assert body.faults == before
+
+
+# -- alive ----------------------------------------------------------------------------------------------------------
+
+
+async def test_each_driver_moves_by_itself_what_it_has_here_and_no_more() -> None:
+    """Two whole torsos, of which one is to have the face and the other the rest: each blinks, and one is seen."""
+    face = Member("face", SimulatedBody(alive=True), ("face",))
+    rest = Member("rest", SimulatedBody(alive=True), ("head", "torso", "left_arm", "right_arm", "voice"))
+    body = ComposedBody([face, rest])
+    body.move_lips([MouthShape(0.0, 0.8), MouthShape(60.0, 0.0)])
+    await asyncio.sleep(1.0)
+    own = {limit.joint for limit in rest.body.capabilities.joints if limit.part != "face"}
+    idle = body.idle()
+    expected = {joint: angle for joint, angle in face.body.idle().added.items() if joint not in own}
+    expected |= {joint: angle for joint, angle in rest.body.idle().added.items() if joint in own}
+
+    assert idle.added == expected
+    assert idle.added["jaw"] > 0.0
+    assert idle.quick_at == min(face.body.idle().quick_at, rest.body.idle().quick_at)

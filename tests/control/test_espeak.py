@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.control.contract import BodyContract
 
 from engage_hri.schemas.behaviors import Mark, Speech
 from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
@@ -16,6 +15,7 @@ from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.composed import Member, composed
+from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.clauses import clause
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer, ssml

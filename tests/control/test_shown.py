@@ -17,7 +17,7 @@ POINT = Pointing(id="point-1", target="near-right")
 
 
 async def test_states_come_at_a_steady_rate_while_it_moves_and_once_a_second_else(hub: MemoryHub):
-    async with robot(hub, state_rate=20.0) as client:
+    async with robot(hub, state_rate=20.0, alive=False) as client:
         await asyncio.sleep(3.5)
         resting = [item.at.seconds for item in client.of(RobotState)]
         client.heard.clear()

@@ -24,18 +24,22 @@ from engage_hri.services.control.body import (
     Body,
     BodyFailed,
     BodyState,
+    MouthShape,
     MovementAuthority,
     Progress,
     Reached,
 )
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.extras import Seen
-from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks
+from engage_hri.services.control.extras import Idle, Seen
+from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks, truth
+from engage_hri.services.control.torso.alive import Alive
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, wait_estimate
 from engage_hri.services.control.torso.files import repertoire_of
+from engage_hri.services.control.torso.idling import idling
+from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
@@ -44,6 +48,7 @@ from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.estimate import speech_estimate
+from engage_hri.services.control.voice.lipsync import LipSync
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.waiting import Bell
@@ -65,7 +70,10 @@ class SimulatedBody(Body):
         zones: tuple[NoPointZone, ...] = (),
         deviations: Variability | None = None,
         repertoire: Repertoire = BUILT_IN,
+        *,
+        alive: bool = False,
     ) -> None:
+        """Make a torso at rest, in a running event loop. alive: it blinks and breathes. Raises InputRefused."""
         self.capabilities = Capabilities(
             body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
@@ -78,6 +86,9 @@ class SimulatedBody(Body):
         self._torso = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
+        self._alive = Alive(self._deviations.seed, self._loop.time()) if alive else None
+        self._mouth = Mouth()
+        self.on_lips = self.move_lips
         self._offsets: dict[str, float] = {}
         """Radians by which the true angle of a joint is more than what it measures, as its calibration says."""
         self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
@@ -86,7 +97,7 @@ class SimulatedBody(Body):
     @classmethod
     def configured(cls, config: ControlConfig, settings: None) -> Self:
         """Make a torso with the zones, deviations and repertoire of the section `control`. Raises InputRefused."""
-        return cls(config.no_point_zones, config.variability, repertoire_of(config))
+        return cls(config.no_point_zones, config.variability, repertoire_of(config), alive=config.alive)
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -186,23 +197,11 @@ class SimulatedBody(Body):
     # -- what it does not measure -------------------------------------------------------------------------------
 
     def seen(self) -> Seen | None:
-        if not (beside := self._beside()):
-            return None
         told = tracks.pose_at(self._torso.tracks, self._loop.time())
-        angles = {joint: angle + beside.get(joint, 0.0) for joint, angle in told.items()}
-        arms = kinematics.arm(angles, "left"), kinematics.arm(angles, "right")
-        return Seen(gaze=kinematics.gaze(angles), left_arm=arms[0], right_arm=arms[1])
+        return truth.seen(told, truth.beside(self._deviations, self._offsets))
 
     def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
-        angles = tracks.updated(kinematics.HOME, pose)
-        match part:
-            case "head":
-                return kinematics.gaze(angles)
-            case "left_arm":
-                return kinematics.arm(angles, "left")
-            case "right_arm":
-                return kinematics.arm(angles, "right")
-        return None
+        return truth.ray_at(part, pose)
 
     def calibrate(self, offsets: Mapping[str, Radians]) -> None:
         if unknown := [joint for joint in offsets if kinematics.LIMIT.get(joint) is None]:
@@ -210,14 +209,13 @@ class SimulatedBody(Body):
             raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
         self._offsets = dict(offsets)
 
-    def _beside(self) -> dict[str, float]:
-        """Radians by which joints are beside the angles that it tells: each that is miscalibrated, or corrected."""
-        beside = {joint: -offset for joint, offset in self._offsets.items()}
-        for fault, amount in self._deviations.of("miscalibrated"):
-            for joint in [limit.joint for limit in kinematics.JOINTS if fault.part in ("", limit.part, limit.joint)]:
-                if kinematics.LIMIT[joint].part != "face":
-                    beside[joint] = beside.get(joint, 0.0) + radians(amount)
-        return {joint: angle for joint, angle in beside.items() if angle}
+    # -- what belongs to no behavior ----------------------------------------------------------------------------
+
+    def idle(self) -> Idle:
+        return idling(self._torso, self._mouth, self._alive, self._loop.time())
+
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
+        self._mouth.move(shapes, self._loop.time())
 
     # -- faults -------------------------------------------------------------------------------------------------
 
@@ -372,11 +370,14 @@ class SimulatedBody(Body):
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
-            async for progress in utterance:
-                yield progress
-                if isinstance(progress, Reached) and progress.sync == "end":
-                    return
+        lips = LipSync(behavior, utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
+        with lips.following():
+            async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
+                async for progress in utterance:
+                    lips.hear(progress)
+                    yield progress
+                    if isinstance(progress, Reached) and progress.sync == "end":
+                        return
         if self._deviations.of("voiceless"):
             raise BodyFailed(_fault(behavior, "the voice is mute"))
 
