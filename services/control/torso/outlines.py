@@ -25,7 +25,7 @@ from engage_hri.services.control.torso.path import (
     Array,
     Leg,
 )
-from engage_hri.services.control.torso.tracks import limits_of
+from engage_hri.services.control.torso.tracks import ALONG, limits_of
 
 Flags = NDArray[np.bool_]
 
@@ -35,8 +35,6 @@ JOINTS = 3
 """Joints of an arm. A head has fewer; the others do not move."""
 TRIES = 8
 """Times that are tried for a leg. One that needs still more time has to be laid."""
-ALONG = np.linspace(0.0, 1.0, 17)
-"""Shares of a path's length at which it is held against the table, as `tracks.meets_table` does."""
 _POWERS = np.arange(6.0)
 _VALUES = SAMPLES[:, None] ** _POWERS
 _SPEEDS = _POWERS[1:] * SAMPLES[:, None] ** _POWERS[:5]
@@ -176,5 +174,6 @@ def _is_clear(terms: Array, seconds: Array) -> Flags:
     leg = np.minimum((at[..., None] >= ends[:, None]).sum(axis=2), seconds.shape[1] - 1)
     path = np.arange(len(seconds))[:, None]
     share = np.clip((at - (ends - seconds)[path, leg]) / seconds[path, leg], 0.0, 1.0)
+    # To which side the arm is makes no difference, the torso upright.
     angles = np.einsum("psk,kpsj->jps", share[..., None] ** _POWERS, terms[:, path, leg])
-    return np.asarray((kinematics.above_table(*angles) > DOUBT).all(axis=1))
+    return np.asarray((kinematics.above_table("left", angles) > DOUBT).all(axis=1))
