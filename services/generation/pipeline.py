@@ -62,7 +62,7 @@ def planning(
     chosen = Choices()
     order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
     apart = references_apart(order, fragment.constraints, config.words_between)
-    made = proposed(references(fragment), world, config, discourse)
+    made = proposed([each for each in order if isinstance(each, Reference)], world, config, discourse)
     if made.references:
         motions = replace(motions, looks_last=config.profile == "figure-3.3")
         scene = _scene(world, body, permits, config)
