@@ -29,7 +29,7 @@ import random
 import subprocess
 import sys
 from collections import defaultdict
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
 from itertools import count
@@ -189,19 +189,28 @@ class Trips:
 
 
 @asynccontextmanager
-async def served(endpoint: str, *names: str) -> AsyncIterator[list[dict[str, Any]]]:
-    """Services in processes of their own. At the end the list holds what each says of its steps."""
+async def served(endpoint: str, *names: str) -> AsyncIterator[tuple[list[dict[str, Any]], Callable[[], None]]]:
+    """Services in processes of their own. At the end the list holds what each says of its steps.
+
+    The function has them forget the steps so far.
+    """
     said: list[dict[str, Any]] = []
     command = (sys.executable, __file__, "--serve")
     others = [
         await asyncio.create_subprocess_exec(*command, name, endpoint, stdout=subprocess.PIPE, stdin=subprocess.PIPE)
         for name in names
     ]
+
+    def forget() -> None:
+        for other in others:
+            assert other.stdin is not None
+            other.stdin.write(b"forget\n")
+
     try:
         for other in others:
             assert other.stdout is not None
             await other.stdout.readline()
-        yield said
+        yield said, forget
     finally:
         for name, other in zip(names, others, strict=True):
             out, _ = await other.communicate(b"enough\n")
@@ -209,12 +218,12 @@ async def served(endpoint: str, *names: str) -> AsyncIterator[list[dict[str, Any
 
 
 async def serve_one(name: str, endpoint: str) -> None:
-    """Serve in this process until a line comes in; then say what the loop has seen."""
+    """Serve in this process until a line says that it is enough; then say what the loop has seen."""
     loop = asyncio.get_running_loop()
     assert isinstance(loop, SteppedLoop)
     told = asyncio.Event()
     async with await open_hub(ROBOT, connect=[endpoint]) as hub, running(hub, {name: SERVICES[name]}):
-        loop.add_reader(sys.stdin, told.set)
+        loop.add_reader(sys.stdin, lambda: loop.forget() if sys.stdin.readline() == "forget\n" else told.set())
         stands()
         await told.wait()
         print(json.dumps({"longest": loop.longest, "long": loop.long, "what": loop.what}), flush=True)
@@ -240,11 +249,12 @@ async def measured(how: str, which: str, number: int, trips: int, watch: Stopwat
     loop = asyncio.get_running_loop()
     assert isinstance(loop, SteppedLoop)
     async with AsyncExitStack() as stack:
-        said: list[dict[str, Any]] = []
+        said, forget = list[dict[str, Any]](), loop.forget
         if how == "bus":
             endpoint = free_endpoint()
             hub: Hub = await stack.enter_async_context(await open_hub(ROBOT, listen=[endpoint]))
-            said = await stack.enter_async_context(served(endpoint, "generation", "control"))
+            others = served(endpoint, "generation", "control")
+            said, forget = await stack.enter_async_context(others)
         else:
             hub = await stack.enter_async_context(MemoryHub())
         client = hub.join("client", "manager")
@@ -269,7 +279,7 @@ async def measured(how: str, which: str, number: int, trips: int, watch: Stopwat
             await fragments.trip()
         taken, cpu = list[Seconds](), list[Seconds]()
         parts: dict[str, list[Seconds]] = defaultdict(list)
-        loop.forget()
+        forget()
         for _ in range(trips):
             if how != "load":
                 await fragments.set_up()

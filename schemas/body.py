@@ -247,9 +247,10 @@ class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
     reached: int = 0
     """Number of its sync points that it has reached: the first of its times are theirs, and have passed. It is under
     way then. Phases that are over count for nothing in its estimate; it has none if it moves nothing."""
-    only: Literal["", "posture"] = ""
+    only: Literal["", "posture", "degrees"] = ""
     """`posture`: asked is only what it comes to: whether it can be done, with which parts, degrees, ray and poses.
-    The body may leave out the phases then, which are most of the work. Empty: all."""
+    `degrees`: of these neither ray nor poses. The body may leave out the rest; phases are most of the work, poses
+    most of the answer. Empty: all."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):
