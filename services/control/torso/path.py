@@ -56,7 +56,7 @@ def resting(q: Sequence[float] | Array) -> JointMotion:
     return JointMotion(position, np.zeros_like(position), np.zeros_like(position))
 
 
-class Leg(Struct, frozen=True, kw_only=True):
+class Leg(Struct, frozen=True, kw_only=True, gc=False):
     """A stretch of a path. Its end is passed with `velocity` (empty: rest) and without acceleration.
 
     seconds: natural duration; longer if the limits ask for it.
