@@ -150,20 +150,20 @@ class BehaviorOutcome(Outcome, frozen=True, kw_only=True, tag="behavior_outcome"
     fault: Fault | None = None
 
 
-class JointAngle(Struct, frozen=True, omit_defaults=True):
+class JointAngle(Struct, frozen=True, omit_defaults=True, gc=False):
     """Angle of one joint."""
 
     joint: str
     angle: Radians
 
 
-class BodyPose(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class BodyPose(Struct, frozen=True, kw_only=True, omit_defaults=True, gc=False):
     """Joint angles of a body, at some instant or at the end of a behavior."""
 
     joints: tuple[JointAngle, ...] = ()
 
 
-class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True, gc=False):
     """Time that the body needs from one sync point of a behavior to the next.
 
     An estimate in which a duration is no number, negative, or longer than a day is refused.
@@ -181,7 +181,7 @@ class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True):
     hold: bool = False
 
 
-class Ray(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Ray(Struct, frozen=True, kw_only=True, omit_defaults=True, gc=False):
     """A gaze axis or a forearm.
 
     origin: the eyes, or the elbow. axis: the direction, a unit vector. tip: of a forearm, the hand.
@@ -249,9 +249,10 @@ class EstimateItem(Struct, frozen=True, kw_only=True, omit_defaults=True):
     reached: int = 0
     """Number of its sync points that it has reached: the first of its times are theirs, and have passed. It is under
     way then. Phases that are over count for nothing in its estimate; it has none if it moves nothing."""
-    only: Literal["", "posture"] = ""
+    only: Literal["", "posture", "degrees"] = ""
     """`posture`: asked is only what it comes to: whether it can be done, with which parts, degrees, ray and poses.
-    The body may leave out the phases then, which are most of the work. Empty: all."""
+    `degrees`: of these neither ray nor poses. The body may leave out the rest; phases are most of the work, poses
+    most of the answer. Empty: all."""
 
 
 class EstimateBehaviors(Struct, frozen=True, kw_only=True, tag="estimate_behaviors", omit_defaults=True):

@@ -60,16 +60,18 @@ class BodyLink:
     async def planned(self, planning: Planning) -> FragmentPlan:
         """The plan that is being made, a slice at a time; its questions go to the body. Raises as they do."""
         told: Sequence[Estimate] | None = None
-        done = 0
+        done = SLICE  # to take in an answer was a slice of its own
         try:
             while True:
-                asked = planning.send(told)
-                told = None
-                if not isinstance(asked, int):
-                    told, done = await self._estimates(asked), 0
-                elif (done := done + asked) >= SLICE:
+                if done >= SLICE:
                     done = 0
                     await asyncio.sleep(0)
+                asked = planning.send(told)
+                told = None
+                if isinstance(asked, int):
+                    done += asked
+                else:
+                    told, done = await self._estimates(asked), SLICE
         except StopIteration as end:
             plan: FragmentPlan = end.value
             return plan

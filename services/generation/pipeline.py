@@ -23,6 +23,8 @@ from engage_hri.services.generation.references.sequence import unasked
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
 
+ELEMENTS = 512
+"""Elements that the making of phrases counts for, and that of a block (see `runtime.steps`)."""
 Planning = Generator[int | tuple[EstimateItem, ...], Sequence[Estimate] | None, FragmentPlan]
 """The making of a plan, in steps (see `runtime.steps`) and questions to the body, which are sent the answers."""
 
@@ -62,8 +64,9 @@ def planning(
     chosen = Choices()
     order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
     apart = references_apart(order, fragment.constraints, config.words_between)
-    made = proposed(references(fragment), world, config, discourse)
+    made = proposed([each for each in order if isinstance(each, Reference)], world, config, discourse)
     if made.references:
+        yield ELEMENTS
         motions = replace(motions, looks_last=config.profile == "figure-3.3")
         scene = _scene(world, body, permits, config)
         tables = yield from weigh(made.references, scene, motions, config)
@@ -76,6 +79,7 @@ def planning(
                 break
         else:
             chosen = yield from choice(tables, scene, motions, config, apart)
+        yield ELEMENTS
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
     return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 

@@ -155,6 +155,19 @@ async def test_of_other_behaviors_all_is_told() -> None:
     assert list(body.rehearse(items, seen)) == in_full(body, items, seen)
 
 
+async def test_where_only_degrees_are_asked_neither_poses_nor_rays_are_told() -> None:
+    chance = random.Random(9)
+    seen, body = world(chance), SimulatedBody()
+    items = questions(chance, [None])
+    bare = {"ray": None, "pose_after": None, "pose_end": None}
+
+    told = body.rehearse([replace(item, only="degrees") for item in items], seen)
+
+    for one, other in zip(told, body.rehearse(items, seen), strict=True):
+        assert one == (replace(other, **bare) if not other.phases else other)
+    assert sum(each.ray is None for each in told) > 6
+
+
 # -- outlines against paths that are laid -------------------------------------------------------------------------
 
 

@@ -53,9 +53,12 @@ def motion_estimate(
 
 
 def posture_estimate(
-    behavior: BlockBehavior, course: Course, degrees: Degrees, poses: tuple[BodyPose, BodyPose]
+    behavior: BlockBehavior, course: Course, degrees: Degrees, poses: tuple[BodyPose, BodyPose] | None
 ) -> Estimate:
-    """Estimate a behavior without phases. degrees: of head or arm, to the target. poses: on target, at the end."""
+    """Estimate a behavior without phases. degrees: of head or arm, to the target.
+
+    poses: on target, at the end; None: not asked for, and neither is the ray.
+    """
     return Estimate(
         behavior=behavior.id,
         feasible=True,
@@ -63,9 +66,9 @@ def posture_estimate(
         parts=("head",) if course.parts == ("nod",) else course.parts,
         head_degrees=degrees if is_gaze(course) else 0.0,
         arm_degrees=degrees if is_arm(course) else 0.0,
-        ray=course.ray,
-        pose_after=poses[0],
-        pose_end=poses[1],
+        ray=course.ray if poses else None,
+        pose_after=poses[0] if poses else None,
+        pose_end=poses[1] if poses else None,
     )
 
 

@@ -203,20 +203,35 @@ def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool
     return any(_is_in_table(arm(pose, side)) for side in sides)
 
 
-def above_table(yaw: Array, pitch: Array, elbow: Array) -> Array:
-    """Distances in metres by which arms stay out of the table, the torso upright; where one is in it, below 0.
+def above_table(side: Side, arm_angles: Array, trunk: Array | None = None) -> Array:
+    """Distances in metres by which an arm stays out of the table, for many poses; where it is in it, below 0.
 
-    yaw, pitch, elbow: angles of the joints of an arm, of any one shape. The same points count as in `touches_table`.
+    arm_angles, trunk: of the joints of the arm, and of the torso (None: upright), joints x poses. The same points
+    count as in `touches_table`.
     """
-    forward, out = np.cos(yaw), pitch + elbow
-    elbow_x, elbow_z = UPPER_ARM * np.sin(pitch) * forward, SHOULDER["left"][2] - UPPER_ARM * np.cos(pitch)
-    hand_x, hand_z = elbow_x + FOREARM * np.sin(out) * forward, elbow_z - FOREARM * np.cos(out)
+    yaw, pitch, elbow = arm_angles
+    forward, sideward, out = np.cos(yaw), np.sin(yaw), pitch + elbow
+    ahead, above = UPPER_ARM * np.sin(pitch), -UPPER_ARM * np.cos(pitch)
+    further, lower = ahead + FOREARM * np.sin(out), above - FOREARM * np.cos(out)
+    (x, y, z), places = SHOULDER[side], []
+    for reach, height in ((ahead, above), (further, lower)):
+        place = x + reach * forward, z + height
+        places.append(place if trunk is None else _carried(place[0], y + reach * sideward, place[1], trunk))
+    (elbow_x, elbow_z), (hand_x, hand_z) = places
     is_across = (elbow_x < TABLE_EDGE) & (hand_x > TABLE_EDGE)
     part = (TABLE_EDGE - elbow_x) / np.where(is_across, hand_x - elbow_x, 1.0)
     edge, top = TABLE_EDGE - CLEARANCE, TABLE_TOP + CLEARANCE
     at_edge = np.where(is_across, elbow_z + part * (hand_z - elbow_z) - top, np.inf)
     at_elbow, at_hand = np.maximum(edge - elbow_x, elbow_z - top), np.maximum(edge - hand_x, hand_z - top)
     return np.asarray(np.minimum(np.minimum(at_elbow, at_hand), at_edge))
+
+
+def _carried(x: Array, y: Array, z: Array, trunk: Array) -> tuple[Array, Array]:
+    """Places of points of the torso's frame in the world, as `_to_world` has them: how far ahead, and how high."""
+    turn, lean = trunk
+    height = z - HIP[2]
+    ahead = x * np.cos(lean) + height * np.sin(lean)
+    return ahead * np.cos(turn) - y * np.sin(turn), HIP[2] + height * np.cos(lean) - x * np.sin(lean)
 
 
 def degrees_between(one: Iterable[float], other: Iterable[float]) -> float:

@@ -7,8 +7,7 @@ in the way, there is no outline: that path has to be laid.
 
 from collections.abc import Sequence
 from functools import cache
-from itertools import groupby
-from operator import itemgetter
+from itertools import accumulate
 
 import numpy as np
 from msgspec import Struct
@@ -26,16 +25,16 @@ from engage_hri.services.control.torso.path import (
     Array,
     Leg,
 )
-from engage_hri.services.control.torso.tracks import limits_of
+from engage_hri.services.control.torso.tracks import ALONG, limits_of
 
 Flags = NDArray[np.bool_]
 
 DOUBT = 1e-10
 """Share of a limit, or metres above the table, within which rounding might decide."""
+JOINTS = 3
+"""Joints of an arm. A head has fewer; the others do not move."""
 TRIES = 8
 """Times that are tried for a leg. One that needs still more time has to be laid."""
-ALONG = np.linspace(0.0, 1.0, 17)
-"""Shares of a path's length at which it is held against the table, as `tracks.meets_table` does."""
 _POWERS = np.arange(6.0)
 _VALUES = SAMPLES[:, None] ** _POWERS
 _SPEEDS = _POWERS[1:] * SAMPLES[:, None] ** _POWERS[:5]
@@ -59,11 +58,23 @@ class Asked(Struct, frozen=True):
 def outlines(asked: Sequence[Asked]) -> list[Degrees | None]:
     """Degrees that the joints turn to the target; None: the path has to be laid, to know them or to be refused."""
     found: list[Degrees | None] = [None] * len(asked)
-    shapes = sorted((_shape(each), number) for number, each in enumerate(asked) if _is_plain(each))
-    for _, group in groupby(shapes, itemgetter(0)):
-        numbers = [number for _, number in group]
-        for number, degrees in zip(numbers, _alike([asked[number] for number in numbers]), strict=True):
-            found[number] = degrees
+    if not (plain := [number for number, each in enumerate(asked) if _is_plain(each)]):
+        return found
+    # A leg between two angles and speeds, without acceleration at both, is a polynomial of degree five in the share
+    # of its time: arrays of its terms are 6 x legs x joints.
+    paths = [asked[number] for number in plain]
+    ends = [leg for path in paths for leg in _ends(path)]
+    first = [0, *accumulate(len(path.legs) for path in paths)]
+    natural = np.maximum([leg.seconds for path in paths for leg in path.legs], LEAST)
+    bounds = np.repeat(
+        np.stack([_bounds(path.parts) for path in paths], axis=1), [len(path.legs) for path in paths], axis=1
+    )
+    terms, seconds, turned, is_sure = _laid(np.array(ends).swapaxes(0, 1), natural, bounds)
+    is_clear = _are_clear(paths, first, terms, seconds)
+    ways, sure = np.degrees(turned).tolist(), is_sure.tolist()
+    for number, since, until, clear in zip(plain, first, first[1:], is_clear, strict=False):
+        if clear and all(sure[since:until]):
+            found[number] = sum(ways[since : since + asked[number].to_target])
     return found
 
 
@@ -76,39 +87,41 @@ def _stays(asked: Asked) -> bool:
     return not any(asked.speeds) and all(leg.goal == asked.start and not any(leg.velocity) for leg in asked.legs)
 
 
-def _shape(asked: Asked) -> tuple[int, int, int, bool]:
-    return len(asked.start), len(asked.legs), asked.to_target, asked.is_arm
+def _ends(asked: Asked) -> list[tuple[tuple[float, ...], ...]]:
+    """Angles and speeds at the start and at the end of each leg, of as many joints as an arm has."""
+    rest = (0.0,) * (JOINTS - len(asked.start))
+    still = (0.0,) * JOINTS
+    here, speeds = (*asked.start, *rest), (*asked.speeds, *rest)
+    ends: list[tuple[tuple[float, ...], ...]] = []
+    for leg in asked.legs:
+        goal, out = (*leg.goal, *rest), (*leg.velocity, *rest) if leg.velocity else still
+        ends.append((here, speeds, goal, out))
+        here, speeds = goal, out
+    return ends
 
 
-def _alike(asked: Sequence[Asked]) -> list[Degrees | None]:
-    """Outlines of paths with as many joints and legs.
+def _are_clear(asked: Sequence[Asked], first: Sequence[int], terms: Array, seconds: Array) -> list[bool]:
+    """True for each path that stays clear of the table, beyond doubt: all but those of arms do.
 
-    A leg between two angles and speeds, without acceleration at both, is a polynomial of degree five in the share of
-    its time: arrays of its terms are 6 x legs x joints.
+    first: the first of the legs of each path. terms, seconds: of all legs.
     """
-    joints, count, to_target, is_arm = _shape(asked[0])
-    legs = [leg for each in asked for leg in each.legs]
-    still = (0.0,) * joints
-    goal = np.array([leg.goal for leg in legs]).reshape(-1, count, joints)
-    out = np.array([leg.velocity or still for leg in legs]).reshape(-1, count, joints)
-    begin = np.concatenate((np.array([[each.start] for each in asked]), goal[:, :-1]), axis=1)
-    into = np.concatenate((np.array([[each.speeds] for each in asked]), out[:, :-1]), axis=1)
-    bounds = np.stack([_bounds(each.parts) for each in asked for _ in each.legs], axis=1)
-    ends = np.stack((begin, into, goal, out)).reshape(4, -1, joints)
-    natural = np.maximum(np.array([leg.seconds for leg in legs]), LEAST)
-    terms, seconds, turned, is_laid = _laid(ends, natural, bounds)
-    is_sure: Flags = np.all(is_laid.reshape(-1, count), axis=1)
-    if is_arm:
-        is_sure &= _is_clear(terms.reshape(6, -1, count, joints), seconds.reshape(-1, count))
-    degrees = np.degrees(turned.reshape(-1, count)[:, :to_target].sum(axis=1)).tolist()
-    return [each if sure else None for each, sure in zip(degrees, is_sure.tolist(), strict=True)]
+    clear = [True] * len(asked)
+    arms: dict[int, list[int]] = {}
+    for number, each in enumerate(asked):
+        if each.is_arm:
+            arms.setdefault(len(each.legs), []).append(number)
+    for count, numbers in arms.items():
+        legs = np.array([first[number] for number in numbers])[:, None] + np.arange(count)
+        for number, is_clear in zip(numbers, _is_clear(terms[:, legs], seconds[legs]).tolist(), strict=True):
+            clear[number] = is_clear
+    return clear
 
 
 @cache
 def _bounds(parts: tuple[str, ...]) -> Array:
     """Lowest and highest angles, speeds and accelerations of some parts' joints: 4 x joints."""
     each = [(limit.low, limit.high, limit.speed, limit.acceleration) for limit in limits_of(parts)]
-    return np.array(each).T
+    return np.array([*each, *[(-1.0, 1.0, 1.0, 1.0)] * (JOINTS - len(each))]).T
 
 
 def _laid(ends: Array, natural: Array, bounds: Array) -> tuple[Array, Array, Array, Flags]:
@@ -161,5 +174,6 @@ def _is_clear(terms: Array, seconds: Array) -> Flags:
     leg = np.minimum((at[..., None] >= ends[:, None]).sum(axis=2), seconds.shape[1] - 1)
     path = np.arange(len(seconds))[:, None]
     share = np.clip((at - (ends - seconds)[path, leg]) / seconds[path, leg], 0.0, 1.0)
+    # To which side the arm is makes no difference, the torso upright.
     angles = np.einsum("psk,kpsj->jps", share[..., None] ** _POWERS, terms[:, path, leg])
-    return np.asarray((kinematics.above_table(*angles) > DOUBT).all(axis=1))
+    return np.asarray((kinematics.above_table("left", angles) > DOUBT).all(axis=1))

@@ -8,6 +8,7 @@ the rate: |q''| rate^2 + |q'| |rate'| <= limit.
 
 from collections.abc import Collection, Sequence
 from copy import copy
+from itertools import chain
 from math import sqrt
 from typing import Any
 
@@ -56,7 +57,7 @@ def resting(q: Sequence[float] | Array) -> JointMotion:
     return JointMotion(position, np.zeros_like(position), np.zeros_like(position))
 
 
-class Leg(Struct, frozen=True, kw_only=True):
+class Leg(Struct, frozen=True, kw_only=True, gc=False):
     """A stretch of a path. Its end is passed with `velocity` (empty: rest) and without acceleration.
 
     seconds: natural duration; longer if the limits ask for it.
@@ -125,6 +126,19 @@ class Path:
             return resting(self.legs[-1].goal if self.legs else self.start.q)
         segment = self._segment(s)
         return JointMotion(*_evaluated(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds)))
+
+    def positions(self, shares: Array) -> Array:
+        """Positions q at these shares of the length, in order: an array of shares x joints."""
+        if not self._segments:
+            return np.tile(self.at(0.0).q, (len(shares), 1))
+        s, found, since = shares * self.length, [], 0
+        for number, segment in enumerate(self._segments):
+            is_last = number == len(self._segments) - 1
+            until = len(s) if is_last else int(np.searchsorted(s, segment.start + segment.seconds))
+            passed = np.clip(s[since:until] - segment.start, 0.0, segment.seconds)
+            found.append(np.power(passed[:, None], _POWERS) @ segment.coefficients)
+            since = max(since, until)
+        return np.concatenate(found)
 
     def after(self, s: Seconds, unreported: Collection[str] = ()) -> tuple[Leg, ...]:
         """Legs that are left at s, with the sync points beyond s. Those in `unreported` that are not come at once."""
@@ -213,7 +227,8 @@ class _Limits:
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
         best: _Connection | None = None
         least = _NOTHINGS if seconds <= 0.0 else ()
-        for each in (*least, *(max(seconds, LEAST) * stretch for stretch in STRETCHES)):
+        natural = max(seconds, LEAST)
+        for each in chain(least, (natural * stretch for stretch in STRETCHES)):
             connection = self._with_peaks(_quintic(start, end, each), each)
             if connection.excess <= 0.0:
                 return connection

@@ -16,6 +16,8 @@ from engage_hri.services.runtime.steps import Steps, portions
 
 AT_ONCE = 64
 """Motions whose outlines are drawn in one go: about a millisecond."""
+FEW = 3
+"""Motions from which on outlines are worth drawing: fewer paths are laid as soon."""
 ELEMENTS, OF_AN_OUTLINE, OF_A_PATH = 40, 12, 256
 """Elements that the planning of a motion counts for (see `runtime.steps`), its outline, and its path."""
 
@@ -33,8 +35,8 @@ class _Open(Struct, frozen=True):
 
 
 def is_brief(item: EstimateItem) -> bool:
-    """True if only the posture is asked, of a motion that can be known without its path."""
-    return item.only == "posture" and isinstance(item.behavior, Gaze | Pointing)
+    """True if no phases are asked, of a motion that can be known without its path."""
+    return bool(item.only) and isinstance(item.behavior, Gaze | Pointing)
 
 
 def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps[list[Estimate]]:
@@ -45,7 +47,7 @@ def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps
     questions = _Questions(torso, world)
     told: dict[int, Estimate] = {}
     opened: list[_Open] = []
-    for number, item in enumerate(items):
+    for number, item in enumerate(items if len(items) >= FEW else ()):
         try:
             made = questions.opened(number, item)
         except Impossible as impossible:
@@ -56,8 +58,9 @@ def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps
     for portion in portions(opened, AT_ONCE):
         for each, degrees in zip(portion, outlines([each.asked for each in portion]), strict=True):
             if degrees is not None:
-                both = poses(each.course, each.situation.pose)
-                told[each.number] = posture_estimate(items[each.number].behavior, each.course, degrees, both)
+                item = items[each.number]
+                both = None if item.only == "degrees" else poses(each.course, each.situation.pose)
+                told[each.number] = posture_estimate(item.behavior, each.course, degrees, both)
         yield OF_AN_OUTLINE * len(portion)
     for number, item in enumerate(items):
         if number not in told:

@@ -13,11 +13,13 @@ import numpy as np
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.aiming import NECK, Aim
+from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import return_time, turning_time
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
+ALONG = np.linspace(0.0, 1.0, 17)
+"""Shares of a path's length at which it is held against the table."""
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
@@ -172,9 +174,11 @@ def meets_table(path: Path, joints: Sequence[str]) -> bool:
     sides = [side for side in kinematics.SHOULDER if f"{side}_elbow" in joints]
     if not path.length or not sides:
         return False
-    for step in range(17):
-        angles = dict(zip(joints, path.at(path.length * step / 16).q.tolist(), strict=True))
-        if kinematics.touches_table({**kinematics.HOME, **angles}, sides):
+    angles = dict(zip(joints, path.positions(ALONG).T, strict=True))
+    trunk = np.array([angles[joint] for joint in TRUNK]) if TRUNK[0] in angles else None
+    for side in sides:
+        arm = np.array([angles[joint] for joint in kinematics.joints_of(f"{side}_arm")])
+        if (kinematics.above_table(side, arm, trunk) < 0.0).any():
             return True
     return False
 

@@ -1,8 +1,8 @@
 """Motions that references may need: the questions to the body, and its estimates by pose.
 
 First it is asked for a gaze and a point at each target from where it is: that says what can be meant, and which
-pairs of gesture and phrase may win. Then only for motions from postures that these leave. All that is asked is what
-a motion comes to, never its phases.
+pairs of gesture and phrase may win. Then only for motions from postures that these leave, and how far they turn. All
+that is asked is what a motion comes to, never its phases.
 """
 
 from collections.abc import Iterable, Sequence
@@ -140,10 +140,10 @@ def onward(ways: Sequence[Way], motions: Motions, hand: Hand | None = None) -> t
     items = []
     for way in ways:
         if way.part == "head":
-            items.append(_question(_gaze(way.target), _left(way, motions.gazes)))
+            items.append(_question(_gaze(way.target), _left(way, motions.gazes), "degrees"))
         else:
             named = hand_of(motions.point(CURRENT_POSE, way.target)) or hand
-            items.append(_question(_point(way.target, named), _left(way, motions.points)))
+            items.append(_question(_point(way.target, named), _left(way, motions.points), "degrees"))
     return tuple(items)
 
 
@@ -174,5 +174,7 @@ def _point(target: str, hand: Hand | None) -> Pointing:
     return Pointing(id=f"point at {target}", target=target, mode=hand)
 
 
-def _question(behavior: BlockBehavior, pose: BodyPose | None) -> EstimateItem:
-    return EstimateItem(behavior=behavior, pose=pose, only="posture")
+def _question(
+    behavior: BlockBehavior, pose: BodyPose | None, only: Literal["posture", "degrees"] = "posture"
+) -> EstimateItem:
+    return EstimateItem(behavior=behavior, pose=pose, only=only)

@@ -70,11 +70,11 @@ def weigh(
     """The tables of all pairs of each reference. motions: from where the body is."""
     tables = []
     seems = shown(distinct([reference.target for reference in references]), scene, motions)
-    yield (len(scene.layout.owner) + 64) * len(seems) // 64
+    yield (len(scene.layout.owner) + 64) * len(seems) // 16
     for reference in references:
         pairs = considered(reference, seems[reference.target], scene, motions, config)
         tables.append(Table(reference, pairs, config))
-        yield 3 * len(pairs) + len(scene.universe) // 4
+        yield 6 * len(pairs) + len(scene.universe) // 2
     return tables
 
 
@@ -90,7 +90,7 @@ def choice(
     explained: list[ReferenceChoice] = []
     for table, pair, posture in zip(tables, best.pairs, best.postures, strict=False):
         explained.append(_explain(table, pair, posture, Movements(table.reference.target, motions, config)))
-        yield 4 * len(table.pairs)
+        yield 8 * len(table.pairs)
     choices = tuple(explained)
     warnings = deictic_warnings([table.reference for table in tables], scene)
     hands: dict[str, Hand] = {}

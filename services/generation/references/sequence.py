@@ -140,7 +140,7 @@ def cheapest(
         while not onward and (possible := table.candidates(level)):
             onward = _continued(ways, list(possible.values()), movements, table.reference.target, motions, config)
             level += 1
-        yield 4 * len(ways) * max(1, level)
+        yield 16 * len(ways) * max(1, level)
         ways = onward or [
             replace(way, pairs=(*way.pairs, None), postures=(*way.postures, way.posture)) for way in ways
         ]
