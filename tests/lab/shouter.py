@@ -1,4 +1,4 @@
-"""Somebody who says much, for links that fill up: `python -m tests.lab.shouter ENDPOINT`. 20 messages of 40 kB a second."""
+"""Somebody who says much, so that links fill up: `python -m tests.lab.shouter ENDPOINT`. 20 times 40 kB a second."""
 
 import asyncio
 import sys
