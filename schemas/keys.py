@@ -215,6 +215,11 @@ def alive(participant: str) -> str:
     return f"{PREFIX}/alive/{participant}"
 
 
+def is_presence(key: str) -> bool:
+    """Tell whether the key is that of a participant who comes or goes."""
+    return key.startswith(f"{PREFIX}/alive/")
+
+
 # Keys of the bus itself. No wildcard includes a chunk that begins with `@`, so no subscriber gets these by accident.
 ANY_TOKEN = f"{PREFIX}/@bus/*/**"
 ANY_PROTOCOL = "engage/*/@bus/*/**"
@@ -255,6 +260,11 @@ def server_of(key: str) -> str:
 def matches(pattern: str, key: str) -> bool:
     """Tell whether the key expression `pattern` (`*`: one chunk, `**`: any number) includes the concrete `key`."""
     return _matches(pattern.split("/"), key.split("/"))
+
+
+def first(patterns: Iterable[str], key: str) -> str | None:
+    """Find the first of the key expressions that includes `key`; None: none does."""
+    return next((pattern for pattern in patterns if matches(pattern, key)), None)
 
 
 def _matches(pattern: list[str], key: list[str]) -> bool:

@@ -82,8 +82,8 @@ class Reading(ABC, Generic[T]):
         self.close()
 
 
-KEYS_KEPT = 4096
-"""Number of keys for which a subscription remembers the pattern: clients come and go, each with its own keys."""
+KEYS_KEPT = 1024
+"""Number of keys of which a subscription knows the pattern: clients come and go, each with its own."""
 
 
 class Subscription(Reading[Received]):
@@ -113,10 +113,12 @@ class Subscription(Reading[Received]):
 
     def carrier(self, key: str) -> str | None:
         """The first pattern that includes the key: each message comes once, however many patterns include it."""
+        if keys.is_presence(key):  # Each who comes and goes has a key, which is hardly ever asked for again.
+            return keys.first(self.patterns, key)
         if key not in self._carriers:
             if len(self._carriers) >= KEYS_KEPT:
                 self._carriers.clear()
-            self._carriers[key] = next((pattern for pattern in self.patterns if keys.matches(pattern, key)), None)
+            self._carriers[key] = keys.first(self.patterns, key)
         return self._carriers[key]
 
     def offer(self, received: Received) -> None:
@@ -386,9 +388,7 @@ class Hub(ABC):
     def facts(self) -> ProcessFacts:
         """Tell what this process runs on."""
         loop = type(asyncio.get_running_loop()).__module__.partition(".")[0]
-        return ProcessFacts(
-            host=platform.node(), python=platform.python_version(), loop=loop, wall=time.time()
-        )  # fmt: skip
+        return ProcessFacts(host=platform.node(), python=platform.python_version(), loop=loop, wall=time.time())
 
     @abstractmethod
     async def close(self) -> None: ...

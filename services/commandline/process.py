@@ -67,14 +67,19 @@ def _leave(number: int, frame: FrameType | None) -> None:
     os._exit(interrupted())
 
 
-def run_until_signal(main: Coroutine[Any, Any, None]) -> None:
-    """Run until Ctrl-C, SIGTERM, or the loss of the output's reader, all of which are good ends."""
+def run_until_signal(main: Coroutine[Any, Any, int | None]) -> int:
+    """Run until Ctrl-C, SIGTERM, or the loss of the output's reader, all of which are good ends.
+
+    Returns the exit code: that of `main` if it ends with one by itself.
+    """
+    code: int | None = DONE
     try:
-        run(main)
+        code = run(main)
     except* KeyboardInterrupt:
         pass
     except* BrokenPipeError:
         silence()
+    return DONE if code is None else code
 
 
 def unique_name(name: str) -> str:
@@ -85,6 +90,19 @@ def unique_name(name: str) -> str:
 async def forever() -> None:
     """Wait until cancelled."""
     await asyncio.get_running_loop().create_future()
+
+
+async def until_closed() -> None:
+    """Wait until the other end of standard input is closed."""
+    reader = asyncio.StreamReader()
+    transport, _ = await asyncio.get_running_loop().connect_read_pipe(
+        lambda: asyncio.StreamReaderProtocol(reader), sys.stdin
+    )
+    try:
+        while await reader.read(1024):
+            pass
+    finally:
+        transport.close()
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -1,7 +1,9 @@
 """Command `engage router`: passes on what the processes of several machines send one another."""
 
+import asyncio
 import os
 import sys
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from select import PIPE_BUF, select
@@ -10,9 +12,12 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.access import ROUTER
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.config import is_encrypted
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.commandline.patient import LOG, Patient, beneath, complain
-from engage_hri.services.commandline.process import DONE, forever, run_until_signal
+from engage_hri.services.commandline.process import FAILED, run_until_signal, until_closed
+from engage_hri.services.commandline.watched import EVERY, SIGN, watched
 from engage_hri.services.runtime.configuration import bus_config
 
 ZENOH_THREADS = "(rx: (worker_threads: 32))"
@@ -38,14 +43,49 @@ class Options:
             show_default="open to all",
         ),
     ] = None  # fmt: skip
+    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
 
 def main(options: Options) -> int:
-    """Route until a signal."""
-    os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)  # read when the first session opens
+    """Route until a signal, in a process of its own that is watched over."""
+    keys = _keys(options)
+    if options.attended:
+        os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)  # read when the first session opens
+        return run_until_signal(_route(options, keys))
+    return run_until_signal(watched(_command(options), "the router", _teller(), LOG.warning))
+
+
+def _keys(options: Options) -> Keys | None:
+    """Read the keys. Raises InputRefused if they are not a router's, or an endpoint does not go with them."""
     folder = bus_config(keys=str(options.keys or "")).keys
-    run_until_signal(_route(options, read_keys(folder, ROUTER) if folder else None))
-    return DONE
+    if not folder:
+        return None
+    own = read_keys(folder, ROUTER)
+    if own.holder.role != ROUTER:
+        reason = f"these are the keys of {own.holder.common_name}, not of a router"
+        raise InputRefused(Fault(reason=reason, where=str(own.folder)))
+    if plain := [each for each in (*options.listen, *(options.connect or ())) if not is_encrypted(each)]:
+        raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=str(own.folder), advice="tls/HOST:PORT"))
+    return own
+
+
+def _command(options: Options) -> list[str]:
+    """Make the command line of the router's process."""
+    return [
+        *(sys.executable, "-P", "-m", "engage_hri", "router", "--attended"),
+        *(part for endpoint in options.listen for part in ("--listen", endpoint)),
+        *(part for endpoint in options.connect or () for part in ("--connect", endpoint)),
+        *(("--keys", str(options.keys)) if options.keys else ()),
+    ]
+
+
+def _teller() -> Callable[[str], None]:
+    out = Patient("standard output", _without_waiting, LOG.warning)
+
+    def tell(line: str) -> None:
+        out.write(f"{line}\n")
+
+    return tell
 
 
 def _without_waiting(data: bytes) -> int | None:
@@ -58,11 +98,19 @@ def _without_waiting(data: bytes) -> int | None:
 async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
 
-    told = Patient("standard output", _without_waiting, LOG.warning)
-
-    def tell(line: str) -> None:
-        told.write(f"{line}\n")
-
-    async with routing(options.listen, options.connect or (), tell, keys):
+    tell = _teller()
+    async with (
+        routing(options.listen, options.connect or (), tell, keys) as router,
+        asyncio.TaskGroup() as group,
+    ):
         complain(f"router is ready at {', '.join(options.listen)}")
-        await forever()
+        group.create_task(_show(router.works, lambda: tell(SIGN)), name="signs of life")
+        await until_closed()
+        os._exit(FAILED)  # Who watched over it was killed, and may be started again at the same endpoints.
+
+
+async def _show(works: Callable[[], Awaitable[None]], sign: Callable[[], None]) -> None:
+    while True:
+        await works()
+        sign()
+        await asyncio.sleep(EVERY)

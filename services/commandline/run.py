@@ -1,7 +1,6 @@
 """Command `engage run SERVICE`: one service as one process on the real bus."""
 
 import asyncio
-import sys
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import Annotated
@@ -12,7 +11,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.options import Embodied, Listening
 from engage_hri.services.commandline.patient import complain
-from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
+from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name, until_closed
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.runtime.service import serve
@@ -59,7 +58,7 @@ async def _serve(options: Options, config: RobotConfig) -> None:
         serving = asyncio.create_task(serve(hub, name, service, announce), name=f"service {name}")
         waiting = {serving}
         if options.attended:
-            waiting.add(asyncio.create_task(_until_closed(), name="parent"))
+            waiting.add(asyncio.create_task(until_closed(), name="parent"))
         try:
             await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -68,16 +67,3 @@ async def _serve(options: Options, config: RobotConfig) -> None:
             await asyncio.wait(waiting)
     if not serving.cancelled():
         serving.result()
-
-
-async def _until_closed() -> None:
-    """Wait until the other end of standard input is closed."""
-    reader = asyncio.StreamReader()
-    transport, _ = await asyncio.get_running_loop().connect_read_pipe(
-        lambda: asyncio.StreamReaderProtocol(reader), sys.stdin
-    )
-    try:
-        while await reader.read(1024):
-            pass
-    finally:
-        transport.close()

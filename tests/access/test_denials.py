@@ -91,6 +91,17 @@ def test_a_flood_of_one_does_not_hide_another() -> None:
     )
 
 
+def test_who_sends_a_key_that_takes_for_ever_to_match_is_named_be_it_allowed_or_not() -> None:
+    key = f"robot/engage/v1/@bus/*/alive/{'$*0' * 12}"
+    caching = trace(f"ACL (ingress): caching permissions for `{key}` ...")
+    costly = "costly: robot/manager/bob has sent a key with 12 `$*`; while it is matched the router stands still"
+
+    assert told(checked("Liveliness Query", key, un="")) == [costly]
+    assert told(caching, checked("Query", key)) == [costly]
+    assert told(checked("Query", "robot/engage/v1/@bus/a$*/alive/bob-$*", un="")) == []
+    assert told(checked("Query", key, un="", flow="egress")) == []
+
+
 def test_other_errors_of_zenoh_are_passed_on() -> None:
     assert told("2026-11-22T22:21:19Z ERROR acc-0 ThreadId(05) zenoh::x: no memory")[0].startswith("zenoh: 2026")
     assert not told("2026-11-22T22:21:19Z DEBUG acc-0 ThreadId(05) zenoh_link_tls::utils: Loading certificates", "")

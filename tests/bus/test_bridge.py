@@ -79,6 +79,7 @@ async def test_a_flood_of_one_process_costs_the_others_nothing(monkeypatch: pyte
             if received.source == "quiet":
                 found.add("quiet")
     assert await trip is not None
+    assert await hubs[0].peers.round_trip(here.run, PATIENCE) is not None  # behind all that it has sent
     assert here.bridge._came == here.bridge._left == {}
     await loud.leave()
     for hub in (*hubs, here):

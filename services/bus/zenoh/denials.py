@@ -22,6 +22,9 @@ LEVELS = (
 """Parts of Zenoh's log that tell of refusals, and all errors but those about the end of what was denied."""
 MOST = 200
 """Number of different refusals of one holder that are told; a flood of them fills neither log nor memory."""
+WILD = 4
+"""Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
+Keys of ours have one."""
 PIPE = 2**20
 """Bytes of the log that may wait for the loop; beyond, the router waits."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
@@ -83,6 +86,9 @@ class Denials:
     def _check(self, thread: str, checked: re.Match[str]) -> None:
         if checked["name"]:
             self._know(checked["zid"], checked["name"])
+        who = self._names.get(checked["zid"], f"process {checked['zid']}")
+        if (wild := checked["key"].count("$*")) > WILD and checked["flow"] == "ingress":
+            self._say(f"costly: {who} has sent a key with {wild} `$*`; while it is matched the router stands still")
         if (caching := self._caching.get(thread)) is not None:
             is_cached = not checked["cached"] and caching == (checked["flow"], checked["key"])
             if not is_cached or checked["what"] == _LAST_CACHED:
@@ -91,7 +97,6 @@ class Denials:
                 return
         # What is kept from somebody is nothing that they did; and the end of what never began is no news.
         if checked["verdict"] and checked["flow"] == "ingress" and not checked["what"].startswith("Undeclare"):
-            who = self._names.get(checked["zid"], f"process {checked['zid']}")
             self._say(f"denied: {who} may not {checked['what'].lower()} {checked['key']}", f"of what {who} does")
 
     def _know(self, zid: str, name: str) -> None:

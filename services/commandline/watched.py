@@ -1,0 +1,85 @@
+"""Watch over one child process: it shows signs of life, and is started anew when it shows none, or ends."""
+
+import asyncio
+import signal
+from asyncio.subprocess import Process
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.supervisor import PATIENCE, ending, killed, spawned, without_threads
+
+SIGN = "\x06"
+"""Line that is a sign of life, and not passed on."""
+EVERY: Seconds = 1.0
+"""Time between two signs."""
+SILENCE: Seconds = 5.0
+"""Time without any line after which a child is taken to hang."""
+BEGINNING: Seconds = 30.0
+"""The same for the first sign, on a machine that is busy or slow."""
+BRIEF: Seconds = 2.0
+"""Life of a child after which the next one does not come at once, but after `PAUSE`."""
+PAUSE: Seconds = 0.5
+
+
+async def watched(command: Sequence[str], name: str, tell: Callable[[str], None], warn: Callable[[str], None]) -> int:
+    """Run a process until cancelled, and again whenever it hangs or ends. Returns the exit code of one that refuses.
+
+    One that ends by itself before its first sign refuses to run: it has said why. name: of the process, for people.
+    tell: gets the lines of its standard output. warn: gets what became of it.
+    """
+    loop = asyncio.get_running_loop()
+    with without_threads():
+        while True:
+            began = loop.time()
+            async with spawned(_end, *command) as process:
+                has_shown, is_silent = await _listen(process, tell)
+                if is_silent:
+                    await killed(process)
+                code = await process.wait()
+            if is_silent:
+                after = f"for {SILENCE:g} s" if has_shown else f"within {BEGINNING:g} s"
+                warn(f"{name} showed no sign of life {after}; it was killed, and is started anew")
+            elif not has_shown and code >= 0:
+                return code
+            else:
+                warn(f"{name} ended with {ending(code)}; it is started anew")
+            if loop.time() - began < BRIEF:
+                await asyncio.sleep(PAUSE)
+
+
+async def _listen(process: Process, tell: Callable[[str], None]) -> tuple[bool, bool]:
+    """Pass on the lines until they end. Returns whether there was a sign of life, and whether it fell silent."""
+    assert process.stdout is not None
+    has_shown = False
+    while True:
+        try:
+            async with asyncio.timeout(SILENCE if has_shown else BEGINNING):
+                raw = await process.stdout.readline()
+        except TimeoutError:
+            return has_shown, True
+        except ValueError:
+            raw = b"(a line too long to show)\n"
+        if not raw:
+            return has_shown, False
+        line = raw.decode(errors="replace").rstrip("\n")
+        if line == SIGN:
+            has_shown = True
+        else:
+            tell(line)
+
+
+async def _end(process: Process) -> None:
+    """End a process that runs: in order, if it does so in time."""
+    if process.returncode is not None:
+        return
+    with suppress(ProcessLookupError):
+        process.send_signal(signal.SIGTERM)
+    try:
+        async with asyncio.timeout(PATIENCE):
+            assert process.stdout is not None
+            while await process.stdout.read(2**16):
+                pass
+            await process.wait()
+    except TimeoutError:
+        await killed(process)

@@ -1,0 +1,164 @@
+"""A process that is watched over: started anew when it hangs or ends, and left alone if it refuses."""
+
+import asyncio
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from engage_hri.schemas import keys
+from engage_hri.services.commandline import watched as module
+from engage_hri.services.commandline.watched import SIGN, watched
+from tests.bus.places import free_endpoint
+from tests.cli.command import start
+from tests.cli.test_processes import PATIENCE, children, gone, line, stopped
+
+pytestmark = pytest.mark.real_time
+
+BEATS = f"""
+import itertools, os, signal, sys, time
+life = len(open(sys.argv[1]).read()) if os.path.exists(sys.argv[1]) else 0
+open(sys.argv[1], "a").write("x")
+for beat in itertools.count():
+    print({SIGN!r}, flush=True)
+    if beat == 0:
+        print("life", life, flush=True)
+    if life == 0 and beat == 3:
+        {{fault}}
+    time.sleep(0.05)
+"""
+
+
+SILENT = "it showed no sign of life for 0.5 s; it was killed, and is started anew"
+
+
+class Watch:
+    """A child that has this fault in its first life."""
+
+    def __init__(self, folder: Path, fault: str) -> None:
+        self.lines: list[str] = []
+        self.warnings: list[str] = []
+        self.second = asyncio.Event()
+        command = [sys.executable, "-c", BEATS.replace("{fault}", fault), str(folder / "lives")]
+        self.task = asyncio.create_task(watched(command, "it", self._tell, self.warnings.append))
+
+    def _tell(self, line: str) -> None:
+        self.lines.append(line)
+        if line == "life 1":
+            self.second.set()
+
+    async def end(self) -> None:
+        self.task.cancel()
+        await asyncio.wait([self.task])
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (
+            "os.kill(os.getpid(), signal.SIGSTOP)",
+            "it showed no sign of life for 0.5 s; it was killed, and is started anew",
+        ),
+        ("time.sleep(1000)", "it showed no sign of life for 0.5 s; it was killed, and is started anew"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", "it ended with signal 9; it is started anew"),
+        ("sys.exit(3)", "it ended with exit code 3; it is started anew"),
+    ],
+)
+async def test_one_that_hangs_or_ends_is_started_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, told: str
+) -> None:
+    monkeypatch.setattr(module, "SILENCE", 0.5)
+    watch = Watch(tmp_path, fault)
+    async with asyncio.timeout(PATIENCE):
+        await watch.second.wait()
+    await watch.end()
+
+    assert watch.lines == ["life 0", "life 1"]
+    assert watch.warnings == [told]
+
+
+async def test_one_that_refuses_before_it_has_begun_is_not_tried_again(tmp_path: Path) -> None:
+    lines: list[str] = []
+    command = [sys.executable, "-c", "print('why'); raise SystemExit(2)"]
+    async with asyncio.timeout(PATIENCE):
+        code = await watched(command, "it", lines.append, lines.append)
+
+    assert (code, lines) == (2, ["why"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")
+async def test_a_router_that_is_frozen_is_started_anew_and_all_are_back() -> None:
+    endpoint = free_endpoint()
+    router = await start("router", "--listen", endpoint)
+    try:
+        await line(router, "router is ready")
+        service = await start("run", "recognition", "--mode", "client", "--connect", endpoint)
+        await line(service, "recognition is ready")
+        await line(router, "robot: recognition is here", log=False)
+        (child,) = children(router.pid)
+        os.kill(child, signal.SIGSTOP)
+
+        await line(router, "the router showed no sign of life for 5 s; it was killed, and is started anew")
+        await line(router, "router is ready")
+        await line(router, "robot: recognition is here", log=False)
+        await line(service, "a router is there again")
+    finally:
+        codes = [await stopped(process) for process in (service, router)]
+
+    assert codes == [0, 0]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")
+async def test_a_question_that_never_ends_costs_the_others_some_seconds() -> None:
+    """Each `$*` multiplies the time that Zenoh takes to match a token; a dozen of them were ten seconds and more."""
+    endpoint = free_endpoint()
+    router = await start("router", "--listen", endpoint)
+
+    def visitor() -> zenoh.Session:
+        settings = {"mode": "client", "connect/endpoints": [endpoint], "scouting/multicast/enabled": False}
+        config = zenoh.Config()
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
+        return zenoh.open(config)
+
+    try:
+        await line(router, "router is ready")
+        service = await start("run", "recognition", "--mode", "client", "--connect", endpoint)
+        await line(service, "recognition is ready")
+        holder, asker = visitor(), visitor()
+        tokens = [holder.liveliness().declare_token(keys.own(f"{number:032x}", "log")) for number in range(20)]
+        await line(router, "robot: recognition is here", log=False)
+        asker.liveliness().get(keys.own(f"{'$*0' * 12}x", "log"), timeout=1.0)
+
+        await line(router, "the router showed no sign of life for 5 s; it was killed, and is started anew")
+        await line(router, "robot: recognition is here", log=False)
+        assert len(tokens) == 20
+        for session in (holder, asker):
+            session.close()  # type: ignore[no-untyped-call]
+    finally:
+        codes = [await stopped(process) for process in (service, router)]
+
+    assert codes == [0, 0]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")
+async def test_a_router_goes_with_who_watches_over_it_and_its_place_is_free() -> None:
+    endpoint = free_endpoint()
+    first = await start("router", "--listen", endpoint)
+    await line(first, "router is ready")
+    (child,) = children(first.pid)
+    first.kill()
+    await gone(child)
+    second = await start("router", "--listen", endpoint)
+    await line(second, "router is ready")
+
+    third = await start("router", "--listen", endpoint)
+    async with asyncio.timeout(PATIENCE):
+        out, err = await third.communicate()
+    assert (third.returncode, out, err.count(b"\n")) == (3, b"", 1)
+    assert await stopped(second, signal.SIGTERM) == 0
+    await first.communicate()
