@@ -76,6 +76,8 @@ class OrdinaryBody(Body):
         self._home: Angles = {limit.joint: self.rest.get(limit.joint, 0.0) for limit in self.joints}
         self._base: Angles = self._home
         self._base_target = ""
+        self._shifts = 0
+        """Number of times that the base was set: a driver may give the same angles twice."""
         self._owner: MovementAuthority | None = None
         """The authority of the behavior that has the part."""
         self._looking_at = ""
@@ -211,6 +213,8 @@ class OrdinaryBody(Body):
         is_beneath = row.turns_base and self._owner is not None and self._owner.points != row.points
         if row.turns_base:
             self._base, self._base_target = goals["end"], getattr(behavior, "target", "")
+            self._shifts += 1
+        shifts = self._shifts
         if is_beneath:  # beneath a look nothing moves
             for sync in authority.points:
                 yield Reached(sync, at, at)
@@ -234,7 +238,7 @@ class OrdinaryBody(Body):
                 if hold == sync:  # the next point is another instant
                     came = at
         except Revoked:
-            if row.turns_base and authority.revoked == "taken_over" and self._base is goals["end"]:
+            if row.turns_base and authority.revoked == "taken_over" and self._shifts == shifts:
                 yield Reached("end", _now(), _now())  # a look lies over it, and goes home to there
         finally:
             if self._owner is authority:
@@ -250,6 +254,7 @@ class OrdinaryBody(Body):
             self._owner.revoke()
             self._owner = None
         self._base, self._base_target = self._home, ""
+        self._shifts += 1
         with suppress(BodyFailed):
             await self._move(self._home, None, "home")
 
@@ -303,11 +308,11 @@ class OrdinaryBody(Body):
             arrived = await self._move(goal, authority, sync)
             self._looking_at = getattr(behavior, "target", "") if TYPES[type_name(behavior)].family == "gaze" else ""
             return arrived
-        if not TYPES[type_name(behavior)].turns_base:
-            goal = self._base
-        arrived = await self._move(goal, authority, sync)
-        while self._off(self._base) is not None:  # a shift has set another base meanwhile
-            arrived = await self._move(self._base, authority, sync)
+        arrived, shifts = None, -1
+        while shifts != self._shifts:  # again, if a shift has set another base meanwhile
+            shifts, goal = self._shifts, self._base
+            came = await self._move(goal, authority, sync)
+            arrived = arrived if came is None else came
         self._looking_at = self._base_target
         return arrived
 

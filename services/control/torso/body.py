@@ -251,6 +251,8 @@ class SimulatedBody(Body):
                 async for progress in points:
                     yield progress
             if run.is_beneath and run.pending:
+                if run.awaits("start"):  # joints that lag have not let it set out
+                    yield Reached("start", now := self._loop.time(), now)
                 run.pending.clear()
                 async with aclosing(pass_end(authority)) as points:
                     async for progress in points:

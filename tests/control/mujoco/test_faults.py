@@ -10,7 +10,7 @@ from msgspec.structs import replace
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Pointing
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Pointing
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.body import BehaviorRefused, BodyFailed
@@ -247,3 +247,23 @@ async def test_what_cannot_be_played_is_refused_and_changes_nothing(fault: BodyF
     assert body.faults == (BodyFault(kind="slow"),)
     body.switch_faults([])
     assert body.faults == ()
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", ["slow", "weak", "blocked"])
+async def test_looks_and_shifts_over_one_another_tell_their_points_from_the_first_on(kind: str, seed: int):
+    """A shift over which a look comes before the joints have let it set out told its end alone."""
+    body, chance = MujocoBody(), Random(seed)
+    body.see(WORLD)
+    stages = []
+    async with body.connected():
+        body.switch_faults([BodyFault(kind=kind)])
+        for number in range(10):
+            make, target = chance.choice((Gaze, GazeShift)), chance.choice([each.id for each in WORLD.entities])
+            stages.append(Stage(body, make(id=f"{number}", target=target), "end"))
+            await asyncio.sleep(chance.choice((0.0, 0.0, 0.05, 0.5, 1.5)))
+        await asyncio.gather(*(stage.task for stage in stages), return_exceptions=True)
+
+    assert sum(len(stage.passed) for stage in stages) > 10
+    for stage in stages:
+        assert stage.passed == list(stage.authority.points[: len(stage.passed)])
