@@ -332,7 +332,8 @@ def _score(behavior: Speech, part: Part, number: int, start: int, base: Seconds)
             item = _Item(base + at, Reached(mark.id, at, at), utterance.is_gap(mark.position))
             score.append((at, mark.position, item))
     said = [word for word in utterance.words if word.end > word.start]
-    for word, until in zip(said, [*(word.start for word in said[1:]), utterance.seconds], strict=True):
+    following = [word.start for word in said[1:]] + [utterance.seconds] * bool(said)
+    for word, until in zip(said, following, strict=True):
         gap = _Gap(number, word.start if word is not said[0] else 0.0, until, told[word.position])
         score.append((word.start, word.position - len(word.text), _Item(base + word.start, gap)))
     if is_last:
