@@ -7,13 +7,14 @@ knows only its own joints; what one says of poses is completed with where the ot
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from dataclasses import dataclass
+from functools import cached_property
 from math import inf
-from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, Ray
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, JointLimit, Ray
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
@@ -28,7 +29,7 @@ from engage_hri.services.control.body import (
     Progress,
 )
 from engage_hri.services.control.extras import Idle, Seen
-from engage_hri.services.control.refusals import unsupported
+from engage_hri.services.control.refusals import infeasible, unsupported
 from engage_hri.services.runtime.steps import Steps, finished
 
 GAZE_PART, LIPS_PART, VOICE_PART = "head", "face", "voice"
@@ -44,21 +45,37 @@ PARTS_OF_TYPES = {
 """Parts of which a type of behavior needs one, where a driver has such parts."""
 
 
-class Member(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Member:
     """A driver in a composed body. name: as it was asked for. parts: those of its parts that it has here."""
 
     name: str
     body: Body
     parts: tuple[str, ...]
 
-    @property
+    @cached_property  # these are asked for each behavior, and many times a second
     def is_whole(self) -> bool:
         return set(self.parts) == set(self.body.capabilities.parts)
 
-    @property
+    @cached_property
     def types(self) -> tuple[str, ...]:
         """Types of behaviors that it can perform with the parts that it has here."""
         return tuple(name for name in self.body.capabilities.types if self._can(name))
+
+    @cached_property
+    def limits(self) -> tuple[JointLimit, ...]:
+        """Limits of the joints that it has here."""
+        every = self.body.capabilities.joints
+        return every if self.is_whole else tuple(limit for limit in every if limit.part in self.parts)
+
+    @cached_property
+    def joints(self) -> frozenset[str]:
+        """Names of the joints in `limits`."""
+        return frozenset(limit.joint for limit in self.limits)
+
+    def tells_of(self, joint: str) -> bool:
+        """True if what it says of this joint counts; of a driver with all its parts that is everything."""
+        return self.is_whole or joint in self.joints
 
     def _can(self, name: str) -> bool:
         needed = [part for part in PARTS_OF_TYPES.get(name, ()) if part in self.body.capabilities.parts]
@@ -66,8 +83,7 @@ class Member(NamedTuple):
 
     def plays(self, fault: BodyFault) -> bool:
         """True if it can play this fault, at a part or a joint that it has here."""
-        own = {limit.joint for limit in self.body.capabilities.joints if limit.part in self.parts}
-        is_here = not fault.part or fault.part in self.parts or fault.part in own
+        is_here = not fault.part or fault.part in self.parts or fault.part in self.joints
         return is_here and fault.kind in self.body.capabilities.faults
 
     def has(self, part: str) -> bool:
@@ -172,22 +188,27 @@ class ComposedBody(Body):
     # -- motion -------------------------------------------------------------------------------------------------
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        member, estimate = self._best(behavior, None, self._world)
-        if member is None or not estimate.feasible:
-            raise BehaviorRefused(estimate.fault or Fault(reason="it cannot be done", where=behavior.id))
+        member = self._performer(behavior)
         async with aclosing(member.body.perform(behavior, authority)) as stream:
             async for progress in stream:
                 yield progress
 
+    def _performer(self, behavior: BlockBehavior) -> Member:
+        """The driver that is to perform a behavior now. Raises BehaviorRefused."""
+        able = self._able(behavior)
+        if len(able) == 1 and able[0].is_whole:
+            return able[0]  # it refuses by itself what it cannot do
+        member, estimate = self._best(behavior, None, self._world)
+        if member is None or not estimate.feasible:
+            raise BehaviorRefused(estimate.fault or Fault(reason="it cannot be done", where=behavior.id))
+        return member
+
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         async with asyncio.TaskGroup() as tasks:
             for member in self._members:
-                # A whole driver is asked as the caller asks, so that it takes also what is in no list home.
-                mine = (
-                    ()
-                    if not parts and member.is_whole
-                    else tuple(p for p in parts or member.parts if p in member.parts)
-                )
+                mine = tuple(part for part in parts or member.parts if part in member.parts)
+                if not parts and member.is_whole:
+                    mine = ()  # all: so it takes home also what is in no list of parts
                 if mine or not parts:
                     tasks.create_task(member.body.home(mine), name=f"home of {member.name}")
 
@@ -229,8 +250,8 @@ class ComposedBody(Body):
         added: dict[str, Radians] = {}
         quick_at = inf
         for member in self._members:
-            idle, own = member.body.idle(), _own_joints(member)
-            added |= {joint: angle for joint, angle in idle.added.items() if own is None or joint in own}
+            idle = member.body.idle()
+            added |= {joint: angle for joint, angle in idle.added.items() if member.tells_of(joint)}
             quick_at = min(quick_at, idle.quick_at)
         return Idle(added=added, quick_at=quick_at)
 
@@ -254,8 +275,7 @@ class ComposedBody(Body):
 
     def calibrate(self, offsets: Mapping[str, Radians]) -> None:
         for member in self._members:
-            own = {limit.joint for limit in member.body.capabilities.joints if limit.part in member.parts}
-            member.body.calibrate({joint: angle for joint, angle in offsets.items() if joint in own})
+            member.body.calibrate({joint: angle for joint, angle in offsets.items() if joint in member.joints})
         known = {limit.joint for limit in self.capabilities.joints}
         if unknown := [joint for joint in offsets if joint not in known]:
             reason, advice = f"no joint {', '.join(unknown)}", f"it has {', '.join(sorted(known))}"
@@ -295,18 +315,10 @@ def _joints(pose: BodyPose) -> dict[str, JointAngle]:
     return {angle.joint: angle for angle in pose.joints}
 
 
-def _own_joints(member: Member) -> frozenset[str] | None:
-    """Joints of the parts that it has here; None: all that it tells of."""
-    if member.is_whole:
-        return None
-    return frozenset(limit.joint for limit in member.body.capabilities.joints if limit.part in member.parts)
-
-
 def _pose(states: Iterable[tuple[Member, BodyState]]) -> BodyPose:
     angles = []
     for member, state in states:
-        own = _own_joints(member)
-        angles += [angle for angle in state.pose.joints if own is None or angle.joint in own]
+        angles += [angle for angle in state.pose.joints if member.tells_of(angle.joint)]
     return BodyPose(joints=tuple(angles))
 
 
@@ -316,26 +328,18 @@ def _within(member: Member, estimate: Estimate) -> Estimate:
     if not estimate.feasible or member.is_whole or not beyond:
         return estimate
     reason = f"{member.name} is to have only {', '.join(member.parts)} here, and this takes {', '.join(beyond)}"
-    return _infeasible(estimate.behavior, reason)
-
-
-def _infeasible(behavior: str, reason: str) -> Estimate:
-    fault = Fault(reason=reason, where=behavior, service="control")
-    return Estimate(behavior=behavior, feasible=False, fault=fault, warning="BEHAVIOR_TYPE_NOT_SUPPORTED")
+    fault = Fault(reason=reason, where=estimate.behavior, service="control")
+    return infeasible(estimate.behavior, "BEHAVIOR_TYPE_NOT_SUPPORTED", fault)
 
 
 def _joined(members: Sequence[Member]) -> Capabilities:
     each = [member.body.capabilities for member in members]
-    limits = []
-    for member in members:
-        own = _own_joints(member)
-        limits += [limit for limit in member.body.capabilities.joints if own is None or limit.joint in own]
     none = Capabilities(body="", types=(), parts=())
     return Capabilities(
         body="+".join(one.body for one in each),
         types=tuple(dict.fromkeys(name for member in members for name in member.types)),
         parts=tuple(part for member in members for part in member.parts),
-        joints=tuple(limits),
+        joints=tuple(limit for member in members for limit in member.limits),
         reach=max((one.reach for one in each), default=0.0),
         no_point_zones=tuple(dict.fromkeys(zone for one in each for zone in one.no_point_zones)),
         gaze_half_angle=max((one.gaze_half_angle for one in each), default=none.gaze_half_angle),
@@ -347,9 +351,7 @@ def _joined(members: Sequence[Member]) -> Capabilities:
 def _refuse_conflicts(members: Sequence[Member]) -> None:
     owner: dict[tuple[str, str], Member] = {}
     for member in members:
-        own = _own_joints(member)
-        joints = {limit.joint for limit in member.body.capabilities.joints if own is None or limit.joint in own}
-        for kind, names in (("part", member.parts), ("joint", sorted(joints))):
+        for kind, names in (("part", member.parts), ("joint", sorted(member.joints))):
             for name in names:
                 other = owner.setdefault((kind, name), member)
                 if other is not member:

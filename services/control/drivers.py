@@ -65,22 +65,23 @@ def named(text: str) -> Named:
 
 def made(config: ControlConfig) -> Body:
     """Make the body that the configuration asks for, of one driver or of several. Raises InputRefused."""
-    asked = [named(text) for text in config.bodies]
-    if config.voice:
-        asked.append(Named(config.voice, ("voice",)))
-    own_voice = not config.voice
     members = []
-    for each in asked:
+    for each in _asked(config):
         body = make(each, config)
-        members.append(Member(each.spec, body, _parts(each, body, own_voice=own_voice)))
+        members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
     return composed(members)
 
 
 def check(config: ControlConfig) -> None:
     """Refuse drivers that cannot be had, without making a body. Raises InputRefused."""
-    for each in (*map(named, config.bodies), *((Named(config.voice),) if config.voice else ())):
+    for each in _asked(config):
         if each.spec != "simulated":
             _settings(each, load(each.spec), config)
+
+
+def _asked(config: ControlConfig) -> list[Named]:
+    voice = [Named(config.voice, ("voice",))] if config.voice else []
+    return [*map(named, config.bodies), *voice]
 
 
 def make(asked: Named, config: ControlConfig) -> Body:

@@ -36,6 +36,7 @@ from engage_hri.services.control.body import (
     Reached,
     Revoked,
 )
+from engage_hri.services.control.refusals import infeasible
 
 Angles = Mapping[str, Radians]
 Way = Sequence[tuple[str, Angles]]
@@ -186,7 +187,7 @@ class OrdinaryBody(Body):
             warning = "NO_SUCH_TARGET" if target and world.entity(target) is None else "CANNOT_CREATE_BEHAVIOR"
             if type_name(behavior) not in self.types:
                 warning = "BEHAVIOR_TYPE_NOT_SUPPORTED"
-            return Estimate(behavior=behavior.id, feasible=False, fault=refused.fault, warning=warning)
+            return infeasible(behavior.id, warning, refused.fault)
         here = dict(self._measured())
         here |= {angle.joint: angle.angle for angle in pose.joints if angle.joint in here} if pose else {}
         row, phases, since = TYPES[type_name(behavior)], [], "start"

@@ -23,14 +23,13 @@ def refusal(
     try:
         check_behavior(behavior)
     except InputRefused as error:
-        return _infeasible(behavior, "CANNOT_CREATE_BEHAVIOR", error.fault)
+        return infeasible(behavior.id, "CANNOT_CREATE_BEHAVIOR", error.fault)
     if type_name(behavior) not in able.types:
         return unsupported(behavior)
     target = world.entity(behavior.target) if isinstance(behavior, Pointing) else None
     if target is not None and any(math.dist(zone.center, target.position) <= zone.radius for zone in zones):
-        return _infeasible(
-            behavior, "CANNOT_CREATE_BEHAVIOR", _fault(behavior, f"{target.id!r} is in a no-point zone")
-        )
+        fault = _fault(behavior, f"{target.id!r} is in a no-point zone")
+        return infeasible(behavior.id, "CANNOT_CREATE_BEHAVIOR", fault)
     return None
 
 
@@ -38,12 +37,15 @@ def unsupported(behavior: BlockBehavior) -> Estimate:
     """The estimate of a behavior of a type that a body does not perform."""
     name = type_name(behavior)
     advice = f"; give it a voice: {VOICE_ADVICE}" if name == "speech" else ""
-    return _infeasible(behavior, "BEHAVIOR_TYPE_NOT_SUPPORTED", _fault(behavior, f"this body has no {name}{advice}"))
+    return infeasible(
+        behavior.id, "BEHAVIOR_TYPE_NOT_SUPPORTED", _fault(behavior, f"this body has no {name}{advice}")
+    )
 
 
 def _fault(behavior: BlockBehavior, reason: str) -> Fault:
     return Fault(reason=reason, where=behavior.id, service="control")
 
 
-def _infeasible(behavior: BlockBehavior, warning: str, fault: Fault) -> Estimate:
-    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=warning)
+def infeasible(behavior: str, warning: str, fault: Fault) -> Estimate:
+    """The estimate of a behavior, by its id, that cannot be done."""
+    return Estimate(behavior=behavior, feasible=False, fault=fault, warning=warning)
