@@ -13,6 +13,7 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.refusals import infeasible
 from engage_hri.services.control.voice.clauses import Clause
 from engage_hri.services.control.voice.phrases import Piece
 from engage_hri.services.control.voice.timeline import Utterance, Word, utter
@@ -83,5 +84,4 @@ def joined(parts: Sequence[Part], length: int) -> Utterance:
 
 def unspeakable(behavior: Speech, fault: Fault) -> Estimate:
     """The estimate of a speech that cannot be said."""
-    fault = replace(fault, where=behavior.id)
-    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning="CANNOT_CREATE_BEHAVIOR")
+    return infeasible(behavior.id, "CANNOT_CREATE_BEHAVIOR", replace(fault, where=behavior.id))

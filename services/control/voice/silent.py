@@ -7,45 +7,41 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     BehaviorRefused,
-    Body,
     BodyFailed,
-    BodyState,
     MovementAuthority,
     Progress,
     Reached,
 )
 from engage_hri.services.control.refusals import unsupported
 from engage_hri.services.control.voice.estimate import speech_estimate
+from engage_hri.services.control.voice.parts import unspeakable
+from engage_hri.services.control.voice.speaker import Speaker, speech
 from engage_hri.services.control.voice.timeline import utter
-from engage_hri.services.control.voice.voice import Voice
 
 FAULTS = ("mute", "voiceless")
 """Kinds of faults that it can play."""
 
 
-class SilentVoice(Body):
+class SilentVoice(Speaker):
     """A voice without sound, as a body with one part."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.capabilities = Capabilities(body="silent", types=("speech",), parts=("voice",), faults=FAULTS)
-        self._voice = Voice()
         self._faults: tuple[BodyFault, ...] = ()
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if not isinstance(behavior, Speech):
             return unsupported(behavior)
         if self._is_voiceless:
-            fault = _fault(behavior, "the voice is mute")
-            return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning="CANNOT_CREATE_BEHAVIOR")
+            return unspeakable(behavior, _fault(behavior, "the voice is mute"))
         return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        if not isinstance(behavior, Speech):
-            raise BehaviorRefused(_fault(behavior, f"this voice has no {type_name(behavior)}"))
+        behavior = speech(behavior)
         if self._is_voiceless:
             raise BehaviorRefused(_fault(behavior, "the voice is mute"))
         await self._voice.wait_for_silence(authority)
@@ -58,16 +54,6 @@ class SilentVoice(Body):
                     return
         if self._is_voiceless:
             raise BodyFailed(_fault(behavior, "the voice is mute"))
-
-    async def home(self, parts: tuple[str, ...] = ()) -> None:
-        if not parts or "voice" in parts:
-            self._voice.hush()
-
-    def state(self) -> BodyState:
-        return BodyState(pose=BodyPose(), moving=self._voice.is_busy, speaking=self._voice.saying)
-
-    def see(self, world: World) -> None:
-        """Look at nothing: it only speaks."""
 
     @property
     def faults(self) -> tuple[BodyFault, ...]:

@@ -15,13 +15,10 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     BehaviorRefused,
-    Body,
     BodyFailed,
-    BodyState,
     MovementAuthority,
     Progress,
 )
@@ -33,16 +30,16 @@ from engage_hri.services.control.voice.outlets import Nowhere, Outlet, Several
 from engage_hri.services.control.voice.parts import Part, expected, joined, silent, sounding, unspeakable
 from engage_hri.services.control.voice.phrases import Piece, pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.speaker import Speaker, speech
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
 from engage_hri.services.control.voice.studio import LONGEST, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
 from engage_hri.services.control.voice.timeline import utter
-from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.control.voice.wav import WavFile
 from engage_hri.services.control.waiting import Bell
 
 
-class SoundingVoice(Body):
+class SoundingVoice(Speaker):
     """A voice with a synthesizer, as a body with one part. Subclass it, and say which.
 
     name: of the body. synthesizer: its class, with the type of its settings, which are those of the body, too.
@@ -54,12 +51,12 @@ class SoundingVoice(Body):
 
     def __init__(self, settings: Any = None) -> None:
         """Make the voice. settings: None: as they are by default."""
+        super().__init__()
         self._settings: VoiceSettings = self.Settings() if settings is None else settings
         self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",))
         self._loop = asyncio.get_running_loop()
         takes = self.synthesizer.Settings is not None
         self._studio = Studio(self.synthesizer, self._settings if takes else None)
-        self._voice = Voice()
         self._outlet: Outlet = Nowhere(self._loop.time)
         self._player: player.Player | None = None
         self._pace = 1.0
@@ -135,8 +132,7 @@ class SoundingVoice(Body):
     # -- speaking -----------------------------------------------------------------------------------------------
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        if not isinstance(behavior, Speech):
-            raise BehaviorRefused(_fault(behavior, f"this voice has no {type_name(behavior)}"))
+        behavior = speech(behavior)
         await self._voice.wait_for_silence(authority)
         if authority.revoked is not None:
             return
@@ -153,16 +149,6 @@ class SoundingVoice(Body):
                 if self._player is not None:
                     self._player.check()
                 yield progress
-
-    async def home(self, parts: tuple[str, ...] = ()) -> None:
-        if not parts or "voice" in parts:
-            self._voice.hush()
-
-    def state(self) -> BodyState:
-        return BodyState(pose=BodyPose(), moving=self._voice.is_busy, speaking=self._voice.saying)
-
-    def see(self, world: World) -> None:
-        """Look at nothing: it only speaks."""
 
     def parts_of(self, behavior: Speech) -> Sequence[Piece]:
         """Cut a speech into phrases, and have them synthesized."""
