@@ -102,6 +102,25 @@ async def killed(process: Process) -> None:
     await process.wait()
 
 
+async def ended_in_order(process: Process, read: Callable[[Process], Awaitable[None]]) -> bool:
+    """End a process, if it still runs: by SIGTERM, and by SIGKILL after `PATIENCE`. Returns False if it was killed.
+
+    read: reads its output to the end, so that it is not kept from ending by a full pipe.
+    """
+    if process.returncode is not None:
+        return True
+    with suppress(ProcessLookupError):
+        process.terminate()
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await read(process)
+            await process.wait()
+    except TimeoutError:
+        await killed(process)
+        return False
+    return True
+
+
 class Child:
     """A supervised process. once: it may end by itself, with exit code 0, and is then not started again."""
 
@@ -148,17 +167,8 @@ class Child:
             self._tell(self.name, line.decode(errors="replace").rstrip())
 
     async def _end(self, process: Process) -> None:
-        if process.returncode is not None:
-            return
-        with suppress(ProcessLookupError):
-            process.terminate()
-        try:
-            async with asyncio.timeout(PATIENCE):
-                await self._pass_on(process)
-                await process.wait()
-        except TimeoutError:
+        if not await ended_in_order(process, self._pass_on):
             self._tell(self.name, f"did not end within {PATIENCE:g} s; killed")
-            await killed(process)
 
 
 class ChildRefused(RunFailed):

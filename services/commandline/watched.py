@@ -1,13 +1,11 @@
 """Watch over one child process: it shows signs of life, and is started anew when it shows none, or ends."""
 
 import asyncio
-import signal
 from asyncio.subprocess import Process
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.supervisor import PATIENCE, ending, killed, spawned, without_threads
+from engage_hri.services.commandline.supervisor import ended_in_order, ending, killed, spawned, without_threads
 
 SIGN = "\x06"
 """Line that is a sign of life, and not passed on."""
@@ -70,16 +68,10 @@ async def _listen(process: Process, tell: Callable[[str], None]) -> tuple[bool, 
 
 
 async def _end(process: Process) -> None:
-    """End a process that runs: in order, if it does so in time."""
-    if process.returncode is not None:
-        return
-    with suppress(ProcessLookupError):
-        process.send_signal(signal.SIGTERM)
-    try:
-        async with asyncio.timeout(PATIENCE):
-            assert process.stdout is not None
-            while await process.stdout.read(2**16):
-                pass
-            await process.wait()
-    except TimeoutError:
-        await killed(process)
+    await ended_in_order(process, _drained)
+
+
+async def _drained(process: Process) -> None:
+    assert process.stdout is not None
+    while await process.stdout.read(2**16):
+        pass
