@@ -1,4 +1,4 @@
-"""What all voices are that are bodies of one part: with sound or without."""
+"""Base of the voices that are bodies of one part, with sound or without."""
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose
