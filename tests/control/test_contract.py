@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from msgspec.structs import replace
 
 from engage_hri.services.control.body import Body, BodyState
 from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
-from engage_hri.services.control.testing import BodyContract
+from engage_hri.services.control.testing import BodyContract, played
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.liars_by_deed import Noisy
 
@@ -33,7 +34,8 @@ class TestSimulatedBody(BodyContract):
         return SimulatedBody()
 
     def faults(self) -> Mapping[str, Callable[[], Body]]:
-        return {name: lambda each=each: SimulatedBody(deviations=each) for name, each in FAULTS.items()}  # type: ignore[misc]
+        configured = {name: partial(SimulatedBody, deviations=each) for name, each in FAULTS.items()}
+        return {**configured, **played(self.make)}
 
 
 class TestNoisyEncoders(BodyContract):

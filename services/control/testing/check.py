@@ -19,6 +19,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.services.control.body import Body
@@ -26,6 +27,7 @@ from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD, behavior
 from engage_hri.services.control.testing.cases import Connection, findings_of
 from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.laws import Finding, named
+from engage_hri.services.control.testing.played import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
 from engage_hri.services.control.testing.suite import PLUGIN, Suite, unchecked
@@ -51,7 +53,7 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     since = time.monotonic()
     report = _described(make, stated, driver)
     collected = _Collected(law.lower().replace("`", ""), progress)
-    with _judging(_suite(make, stated)) as arguments:
+    with _judging(_suite(make, stated, report.capabilities)) as arguments:
         code = pytest.main(arguments, plugins=[collected])
     if code == pytest.ExitCode.INTERRUPTED:
         raise KeyboardInterrupt
@@ -67,9 +69,10 @@ def judged() -> type[BodyContract]:
     return _judged[-1]
 
 
-def _suite(make: Make, stated: Stated) -> type[BodyContract]:
+def _suite(make: Make, stated: Stated, able: Capabilities) -> type[BodyContract]:
     settings = {
         "make": lambda self: make(),
+        "faults": lambda self: played(make, playable(able)),
         "tolerance": stated.tolerance,
         "noise": stated.noise,
         "accuracy": stated.accuracy,

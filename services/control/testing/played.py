@@ -1,0 +1,57 @@
+"""Faults that a simulated body can play, as makers of bodies that have each: for `faults` of a suite."""
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.body_faults import KINDS, BodyFault, parts_of, words
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.testing.plugin import virtual_loop
+
+Make = Callable[[], Body]
+BY_ENCODERS = ("noisy",)
+"""Kinds that make measurements worse and nothing else: for these a suite states `noise`."""
+AMOUNT = 10.0
+"""Of a kind that needs an amount: degrees."""
+
+
+def playable(able: Capabilities) -> tuple[BodyFault, ...]:
+    """List a fault of each kind that a body can play, in every part that can have it, or in its first joint."""
+    found = []
+    for kind in able.faults:
+        row = KINDS.get(kind)
+        if kind in BY_ENCODERS or (row is not None and row.on == "joint" and not parts_of(row, able)):
+            continue
+        is_exact = row is not None and row.needs_amount
+        part = parts_of(row, able)[0] if row is not None and row.on == "joint" else ""
+        found.append(BodyFault(kind=kind, part=part, amount=AMOUNT if is_exact else None))
+    return tuple(found)
+
+
+def played(make: Make, faults: Iterable[BodyFault] | None = None) -> Mapping[str, Make]:
+    """Name faults in words, and say how to make the body that has each from its start.
+
+    make: makes the body without faults. faults: None: one of each kind that it says it can play; to know these, a
+    body is made, in a loop of its own.
+    """
+    return {words(fault): partial(_with, make, fault) for fault in (faults if faults is not None else _all(make))}
+
+
+def _all(make: Make) -> tuple[BodyFault, ...]:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:  # pytest asks for the names before it runs a test
+        with asyncio.Runner(loop_factory=virtual_loop) as runner:
+            return playable(runner.run(_able(make)))
+    return playable(make().capabilities)
+
+
+async def _able(make: Make) -> Capabilities:
+    return make().capabilities
+
+
+def _with(make: Make, fault: BodyFault) -> Body:
+    body = make()
+    body.switch_faults((fault,))
+    return body
