@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import AsyncGenerator, Mapping, Sequence
-from contextlib import aclosing
+from contextlib import aclosing, suppress
 
 from msgspec.structs import replace
 
@@ -29,6 +29,8 @@ NODS: Mapping[str, tuple[Radians, Radians]] = {
     "NOD": (0.0, -math.radians(10.0)), "SHAKE": (math.radians(10.0), 0.0), "TILT": (0.0, math.radians(5.0)),
 }  # fmt: skip
 """Yaw and pitch of the first stroke of a movement of the head."""
+SHARES = (1.0, -1.0, 0.5, -0.5)
+"""Of these, in this order: near the end of its range a neck nods the other way, or less."""
 OVER_THE_TABLE: Meters = 0.05
 """Height over the table that elbow and hand keep: a forearm is that thick."""
 ABOVE: Meters = 0.15
@@ -117,9 +119,15 @@ class HeadLimb(Limb):
         turn = NODS.get(behavior.lexeme.upper())
         if turn is None:
             raise self.refused(behavior, f"this head has no {behavior.lexeme!r}: it has {', '.join(NODS)}")
+        for share in SHARES[:-1]:
+            with suppress(BehaviorRefused):
+                return self._nod(behavior, turn, share)
+        return self._nod(behavior, turn, SHARES[-1])
+
+    def _nod(self, behavior: BlockBehavior, turn: tuple[Radians, Radians], share: float) -> Way:
         return [
-            ("stroke", self._beside(behavior, *turn)),
-            ("stroke_end", self._beside(behavior, *(-0.4 * each for each in turn))),
+            ("stroke", self._beside(behavior, *(share * each for each in turn))),
+            ("stroke_end", self._beside(behavior, *(-0.4 * share * each for each in turn))),
         ]
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:

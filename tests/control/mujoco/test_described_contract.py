@@ -7,17 +7,15 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 pytest.importorskip("icub_models", reason="needs the package icub-models, which has the model")
 
-from engage_hri.schemas.behaviors import Head
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.mujoco.described import DescribedBody
-from engage_hri.services.control.testing import BEHAVIORS, BodyContract
+from engage_hri.services.control.testing import BodyContract
 
 ICUB = Path(__file__).parent / "robots" / "icub.toml"
 
 
 class TestDescribedBody(BodyContract):
     tolerance = 0.1
-    behaviors = tuple(each for each in BEHAVIORS if not isinstance(each, Head))  # its nod is not held to it yet
 
     def make(self) -> Body:
         return DescribedBody(ICUB)
