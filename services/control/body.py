@@ -6,7 +6,7 @@ and `services/control/testing` is the suite that it has to pass.
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
@@ -292,6 +292,13 @@ class Body(Extras, ABC):
 
         shapes: in time order; the last one closes the mouth. Empty: the voice has fallen silent.
         """
+
+    def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
+        """Begin what estimates of these behaviors need and nobody can know at once, as the sound of new words.
+
+        Returns what is to be awaited before they are asked for, a moment at most; None, as by default: nothing.
+        """
+        return None
 
     @abstractmethod
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:

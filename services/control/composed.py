@@ -5,7 +5,7 @@ knows only its own joints; what one says of poses is completed with where the ot
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -124,6 +124,14 @@ class ComposedBody(Body):
             yield
 
     # -- planning -----------------------------------------------------------------------------------------------
+
+    def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
+        begun = [
+            member.body.prepare([each for each in behaviors if type_name(each) in member.types])
+            for member in self._members
+        ]
+        waited = [each for each in begun if each is not None]
+        return _all(waited) if waited else None
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         _, estimate = self._best(behavior, pose, world)
@@ -320,6 +328,10 @@ def _pose(states: Iterable[tuple[Member, BodyState]]) -> BodyPose:
     for member, state in states:
         angles += [angle for angle in state.pose.joints if member.tells_of(angle.joint)]
     return BodyPose(joints=tuple(angles))
+
+
+async def _all(awaited: Sequence[Awaitable[None]]) -> None:
+    await asyncio.gather(*awaited)
 
 
 def _within(member: Member, estimate: Estimate) -> Estimate:

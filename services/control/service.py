@@ -1,7 +1,7 @@
 """The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Coroutine
 from contextlib import aclosing, nullcontext
 from typing import Any
 
@@ -130,7 +130,15 @@ class _Control:
     def estimate(self, question: Message) -> Message | Coroutine[Any, Any, Message]:
         if not isinstance(question, EstimateBehaviors):
             raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
+        preparing = self._body.prepare([item.behavior for item in question.items])
+        if preparing is not None:
+            return self._prepared(preparing, question)
         return self._rehearsals.answer(self._estimated(question, self._world))
+
+    async def _prepared(self, preparing: Awaitable[None], question: EstimateBehaviors) -> Message:
+        await preparing
+        answer = self._rehearsals.answer(self._estimated(question, self._world))
+        return await answer if isinstance(answer, Coroutine) else answer
 
     def _estimated(self, question: EstimateBehaviors, world: World) -> Steps[Message]:
         refused = [self._refused(item.behavior) for item in question.items]

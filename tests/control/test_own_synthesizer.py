@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
@@ -53,3 +54,42 @@ def test_words_are_aligned_with_sound_alone_within_the_stated_error():
 
     assert np.median(errors) < 0.07
     assert np.quantile(errors, 0.9) < 0.22
+
+
+WAITING = """
+import os, time
+from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.sounding import SoundingVoice
+from engage_hri.services.control.voice.synthesis import Said, Synthesizer
+
+class Waiting(Synthesizer):
+    rate = 16000
+
+    def say(self, phrase):
+        while not os.path.exists({file!r}):
+            time.sleep(0.01)
+        return Said(bytes(2 * 3 * 16000))
+
+class Voice(SoundingVoice):
+    name, synthesizer, Settings = "waiting", Waiting, VoiceSettings
+"""
+
+
+@pytest.mark.real_time
+async def test_other_work_goes_on_while_an_estimate_waits_for_a_new_text(tmp_path: Path):
+    """The synthesizer is done after that other work: if the loop stood still, how long the sound is were unknown."""
+    file = tmp_path / "go_on"
+    (tmp_path / "waiting.py").write_text(WAITING.format(file=str(file)), encoding="utf-8")
+    drivers = {"Voice": {"device": "none", "patience": 5.0}}
+    body = made(ControlConfig(body="simulated", voice=f"{tmp_path}/waiting.py:Voice", drivers=drivers))
+    speech = Speech(id="s", text="One two three four")
+    async with body.connected():
+        preparing = body.prepare([speech])
+        assert preparing is not None
+        asyncio.get_running_loop().call_later(0.1, file.touch)
+        await preparing
+        estimate = body.estimate(speech, None, World(entities=()))
+
+    assert body.prepare([Wait(id="w", duration=1.0)]) is None
+    assert estimate.phases[-1].to == "end"
+    assert sum(phase.natural for phase in estimate.phases) == pytest.approx(3.0, abs=0.01)

@@ -1,7 +1,7 @@
 """The synthesizer eSpeak NG, by ctypes: over a hundred languages, with the time of each word and speech sound.
 
 eSpeak NG is free software under the GNU GPL, version 3 or later. It is not part of Engage, and it is loaded only in
-the process of `studio.py`. The library comes from the extra `voice` (the package `espeakng-loader`) or from the system.
+the process of `studio.py`. The library comes from the extra `voice` (package `espeakng-loader`) or from the system.
 The events of its interface are those of espeak-ng/speak_lib.h, revision 12.
 """
 

@@ -15,7 +15,7 @@ class VoiceSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     latency: seconds from the moment at which the player gets a sample until it sounds; None: what is usual for it.
     file: a WAV file for all that is said, each at its loop time; empty: none.
     language: a tag such as `de`, where the text does not name its language (`xml:lang`); empty: the voice's own.
-    patience: seconds that an estimate may wait for a phrase that was never said before. What is not there by then is
+    patience: seconds that a plan may wait for a phrase that was never said before. What is not there by then is
         estimated from its length.
     """
 

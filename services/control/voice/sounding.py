@@ -6,7 +6,7 @@ class MyVoice(SoundingVoice):
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from typing import Any, ClassVar
 
@@ -106,13 +106,20 @@ class SoundingVoice(Speaker):
 
     # -- planning -----------------------------------------------------------------------------------------------
 
+    def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
+        speeches = [each for each in behaviors if isinstance(each, Speech)]
+        phrases = [piece.phrase for each in speeches for piece in pieces(each, self._settings.language)]
+        if not self._is_real or self._studio.ask(phrases, 0.0):
+            return None
+        return self._studio.asked(phrases, self._settings.patience)
+
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if not isinstance(behavior, Speech):
             return unsupported(behavior)
         found = pieces(behavior, self._settings.language)
         if not found:
             return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
-        self._studio.ask([piece.phrase for piece in found], self._settings.patience if self._is_real else LONGEST)
+        self._studio.ask([piece.phrase for piece in found], 0.0 if self._is_real else LONGEST)
         try:
             parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
         except SynthesisFailed as error:

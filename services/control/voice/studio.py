@@ -1,7 +1,7 @@
 """The synthesizer in its own process, as the body sees it: phrases are asked for, and kept when they are there.
 
-Asking waits for as long as it is told to, and no longer: an estimate of a new text waits a tenth of a second at the
-most. What is not there by then comes later, while the loop goes on; whoever needs it waits for it.
+Where time is real the loop does not stand still for them: before a new text is estimated, a tenth of a second may go
+by, in which other work goes on. What is not there by then comes later; whoever needs it waits for it.
 """
 
 import asyncio
@@ -77,20 +77,33 @@ class Studio:
             self._known.move_to_end(phrase)
         return found
 
-    def ask(self, phrases: Sequence[Phrase], wait: Seconds) -> None:
+    async def asked(self, phrases: Sequence[Phrase], patience: Seconds) -> None:
+        """Wait until phrases are there, or for as long as `patience`. What the process says is heard (`listen`)."""
+        bell = Bell()
+        self._bells.append(bell)
+        deadline = bell.now() + patience
+        try:
+            while not self.ask(phrases, 0.0) and bell.now() < deadline:
+                await bell.wait(deadline)
+        finally:
+            self._bells.remove(bell)
+
+    def ask(self, phrases: Sequence[Phrase], wait: Seconds) -> bool:
         """Ask for phrases to be synthesized, in this order, and wait until they are there or the time is over.
 
-        phrases: those that are known cost nothing. wait: seconds by the clock.
+        phrases: those that are known cost nothing. wait: seconds by the clock, in which the loop stands still.
+
+        Returns whether all are there.
         """
         self._line.update(dict.fromkeys(phrase for phrase in phrases if phrase not in self._known))
         deadline = time.monotonic() + wait
         while True:
             self._go_on()
             if all(phrase in self._known for phrase in phrases):
-                return
+                return True
             left = deadline - time.monotonic()
             if left <= 0.0 or self._process is None or self._process.stdout is None:
-                return
+                return False
             select.select([self._process.stdout], [], [], min(left, 1.0))
 
     def make(self, wait: Seconds) -> bool:
