@@ -86,7 +86,7 @@ def maker(name: str, config: "ControlConfig") -> "Callable[[], Body]":
 
     asked = replace(config, body=name)
     drivers.check(asked)
-    return partial(drivers.made, asked)
+    return partial(drivers.made, asked, is_guarded=False)
 
 
 @contextmanager

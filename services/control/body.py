@@ -75,6 +75,10 @@ class BodyFailed(EngageError):
     """The behavior could not be finished. What had moved is on its way to the safe pose."""
 
 
+class DriverBroken(BodyFailed):
+    """The driver has broken off, and nobody knows where its parts are."""
+
+
 class Revoked(Exception):
     """The authority of the behavior is gone: it was aborted or taken over."""
 
@@ -295,6 +299,8 @@ class Body(Extras, ABC):
 
     def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
         """Begin what estimates of these behaviors need and nobody can know at once, as the sound of new words.
+
+        behaviors: those that are to be estimated.
 
         Returns what is to be awaited before they are asked for, a moment at most; None, as by default: nothing.
         """

@@ -212,13 +212,17 @@ class ComposedBody(Body):
         return member
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        async with asyncio.TaskGroup() as tasks:
-            for member in self._members:
-                mine = tuple(part for part in parts or member.parts if part in member.parts)
-                if not parts and member.is_whole:
-                    mine = ()  # all: so it takes home also what is in no list of parts
-                if mine or not parts:
-                    tasks.create_task(member.body.home(mine), name=f"home of {member.name}")
+        ways = []
+        for member in self._members:
+            mine = tuple(part for part in parts or member.parts if part in member.parts)
+            if not parts and member.is_whole:
+                mine = ()  # all: so it takes home also what is in no list of parts
+            if mine or not parts:
+                ways.append(member.body.home(mine))
+        # Who fails keeps nobody else from going home.
+        failed = [each for each in await asyncio.gather(*ways, return_exceptions=True) if each is not None]
+        if failed:
+            raise failed[0]
 
     def move_lips(self, shapes: Sequence[MouthShape]) -> None:
         for member in self._members:

@@ -25,6 +25,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.composed import Member, composed
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
 
 GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
@@ -63,11 +64,16 @@ def named(text: str) -> Named:
     return Named(spec.strip(), parts)
 
 
-def made(config: ControlConfig) -> Body:
-    """Make the body that the configuration asks for, of one driver or of several. Raises InputRefused."""
+def made(config: ControlConfig, *, is_guarded: bool = True) -> Body:
+    """Make the body that the configuration asks for, of one driver or of several. Raises InputRefused.
+
+    is_guarded: what others' drivers raise becomes faults that name them (`GuardedBody`).
+    """
     members = []
     for each in _asked(config):
         body = make(each, config)
+        if is_guarded and each.spec not in BUILT_IN:
+            body = GuardedBody(each.spec, body)
         members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
     return composed(members)
 
@@ -95,7 +101,7 @@ def make(asked: Named, config: ControlConfig) -> Body:
     except EngageError:
         raise
     except Exception as error:
-        raise _refusal(f"its driver breaks as it is made: {_words(error)}", asked.spec, _place(error)) from error
+        raise _refusal(f"its driver breaks as it is made: {words_of(error)}", asked.spec, place_of(error)) from error
     if not isinstance(body, Body):
         advice = "it is to be a class that inherits from `engage_hri.Body`, or a function that returns one"
         raise _refusal(f"it makes a {type(body).__name__}, and no body", asked.spec, advice)
@@ -128,7 +134,7 @@ def load(spec: str) -> Driver:
         try:
             return offered[spec].load()  # type: ignore[no-any-return]
         except Exception as error:
-            raise _refusal(f"it cannot be imported: {_words(error)}", spec, _place(error)) from error
+            raise _refusal(f"it cannot be imported: {words_of(error)}", spec, place_of(error)) from error
     known = sorted({*BUILT_IN, *offered})
     close = get_close_matches(spec, known, n=1)
     advice = f"do you mean {close[0]}? " if close else ""
@@ -167,14 +173,14 @@ def _imported(module: str, spec: str, extra: str = "") -> ModuleType:
     try:
         return import_module(module)
     except Exception as error:
-        advice = _place(error)
+        advice = place_of(error)
         if isinstance(error, ModuleNotFoundError):
             missing = error.name or ""
             if extra:
                 advice = f"install it: pip install 'engage-hri[{extra}]'"
             elif missing and f"{module}.".startswith(f"{missing}."):
                 advice = f"is the package installed here? Of a file: {FORMS.partition(', ')[2]}"
-        raise _refusal(f"it cannot be imported: {_words(error)}", spec, advice) from error
+        raise _refusal(f"it cannot be imported: {words_of(error)}", spec, advice) from error
 
 
 def _file(path: Path, spec: str) -> ModuleType:
@@ -199,7 +205,7 @@ def _file(path: Path, spec: str) -> ModuleType:
         del sys.modules[name]
         if not isinstance(error, Exception | SystemExit):
             raise
-        raise _refusal(f"it cannot be imported: {_words(error)}", spec, _place(error)) from error
+        raise _refusal(f"it cannot be imported: {words_of(error)}", spec, place_of(error)) from error
     return module
 
 
@@ -242,21 +248,3 @@ def _bodies(module: ModuleType) -> Sequence[str]:
 def _refusal(reason: str, spec: str, advice: str) -> InputRefused:
     where = spec if spec.startswith("control.") else f"body {spec}"
     return InputRefused(Fault(reason=reason, where=where, advice=advice, service="control"))
-
-
-def _words(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def _place(error: BaseException) -> str:
-    """Say at which line of which file of the driver an error was raised; empty: it is not known."""
-    if isinstance(error, SyntaxError):
-        return f"see {error.filename}, line {error.lineno}"
-    trace = error.__traceback__
-    last = None
-    while trace is not None:
-        name = trace.tb_frame.f_code.co_filename
-        if "importlib" not in name and name != __file__:
-            last = (name, trace.tb_lineno)
-        trace = trace.tb_next
-    return f"see {last[0]}, line {last[1]}" if last else ""

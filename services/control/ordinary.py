@@ -357,9 +357,9 @@ class OrdinaryBody(Body):
     def _off(self, goal: Angles) -> tuple[str, Radians] | None:
         """The joint that is farthest from the goal, and by how much; None: all are near."""
         here = self._measured()
-        joint = max(goal, key=lambda name: abs(here[name] - goal[name]))
-        off = goal[joint] - here[joint]
-        return (joint, off) if abs(off) > self.near else None
+        off = {joint: goal[joint] - here[joint] for joint in goal}
+        joint = max(off, key=lambda name: abs(off[name]), default="")
+        return (joint, off[joint]) if off and abs(off[joint]) > self.near else None
 
     def _seconds(self, here: Angles, goal: Angles) -> Seconds:
         """Time of a motion: that of the joint that takes longest, speeding up, cruising and braking."""

@@ -1,22 +1,14 @@
 """The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
-from collections.abc import Awaitable, Coroutine
 from contextlib import aclosing, nullcontext
-from typing import Any
-
-from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
+from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
     BehaviorOutcome,
-    DescribeBody,
-    Estimate,
-    EstimateBehaviors,
-    Estimates,
     GoHome,
     HomeReached,
     PerformBehavior,
@@ -26,9 +18,8 @@ from engage_hri.schemas.body import (
 )
 from engage_hri.schemas.body_faults import SwitchFaults
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.holds import BodyHeld
-from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -40,6 +31,7 @@ from engage_hri.services.control.body import (
     BehaviorRefused,
     Body,
     BodyFailed,
+    DriverBroken,
     MovementAuthority,
     Progress,
     Reached,
@@ -48,17 +40,15 @@ from engage_hri.services.control.body import (
 from engage_hri.services.control.calibration import calibrated
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
-from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.live import LiveBehavior
-from engage_hri.services.control.refusals import VOICE_ADVICE, refusal
+from engage_hri.services.control.questions import Questions
+from engage_hri.services.control.refusals import VOICE_ADVICE
 from engage_hri.services.control.shown import Shown
 from engage_hri.services.control.switching import FaultSwitch
 from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.control.variability import Deviations, is_lost
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.steps import Steps
-from engage_hri.services.runtime.unhurried import InTurns
 
 
 async def embody(
@@ -83,8 +73,8 @@ async def embody(
     async with body.connected() if connects else nullcontext(), asyncio.TaskGroup() as tasks:
         control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
-            bus.answer(keys.ESTIMATE, control.estimate)
-            bus.answer(keys.DESCRIBE, control.describe)
+            bus.answer(keys.ESTIMATE, control.questions.estimate)
+            bus.answer(keys.DESCRIBE, control.questions.describe)
             ready()
             try:
                 control.tell_held()
@@ -111,8 +101,6 @@ class _Control:
         self._bus = bus
         self._config = config
         self._body = body
-        self._estimates = IncomingEstimates(bus)
-        self._rehearsals = InTurns()
         self._tasks = tasks
         self._actions = ActionReporter(bus.robot, bus.clock)
         self._world = World(entities=())
@@ -121,42 +109,10 @@ class _Control:
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
         body.on_fault = self._tell_fault
-        self._calibration = calibrated(body, config.calibration)
-        self.shown = Shown(bus, body, self._actions, config.state_rate, self._calibration)
+        calibration = calibrated(body, config.calibration)
+        self.questions = Questions(bus, config, body, calibration, lambda: self._world)
+        self.shown = Shown(bus, body, self._actions, config.state_rate, calibration)
         self.switch = FaultSwitch(bus, body, self.desk)
-
-    # -- reads --------------------------------------------------------------------------------------------------
-
-    def estimate(self, question: Message) -> Message | Coroutine[Any, Any, Message]:
-        if not isinstance(question, EstimateBehaviors):
-            raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
-        preparing = self._body.prepare([item.behavior for item in question.items])
-        if preparing is not None:
-            return self._prepared(preparing, question)
-        return self._rehearsals.answer(self._estimated(question, self._world))
-
-    async def _prepared(self, preparing: Awaitable[None], question: EstimateBehaviors) -> Message:
-        await preparing
-        answer = self._rehearsals.answer(self._estimated(question, self._world))
-        return await answer if isinstance(answer, Coroutine) else answer
-
-    def _estimated(self, question: EstimateBehaviors, world: World) -> Steps[Message]:
-        refused = [self._refused(item.behavior) for item in question.items]
-        known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
-        others = [item for item in question.others if self._refused(item.behavior) is None]
-        told = yield from self._body.rehearse_in_steps(known, world, others)
-        estimates = map(self._calibration.stated, self._estimates.take(known, told))
-        return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
-
-    def _refused(self, behavior: BlockBehavior) -> Estimate | None:
-        return refusal(behavior, self._body.capabilities, self._config.no_point_zones, self._world)
-
-    def describe(self, question: Message) -> Message:
-        if not isinstance(question, DescribeBody):
-            raise InputRefused(Fault(reason="expected DescribeBody", where=keys.DESCRIBE, service="control"))
-        able = self._body.capabilities
-        zones = dict.fromkeys((*able.no_point_zones, *self._config.no_point_zones))
-        return replace(able, no_point_zones=tuple(zones))
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -199,7 +155,7 @@ class _Control:
                 self.desk.refuse(id, Fault(reason="given up on the way home", where=id, service="control"))
 
     def _begin(self, request: PerformBehavior) -> None:
-        refused = self._refused(request.behavior)  # before a motor sees it
+        refused = self.questions.refused(request.behavior)  # before a motor sees it
         if refused is not None and refused.fault is not None:
             self.desk.refuse(request.id, refused.fault)
             return
@@ -260,14 +216,14 @@ class _Control:
             self.desk.refuse(request.id, error.fault)
             self._end_aborts(live)
             return
-        except BodyFailed as error:
-            live.status, live.fault = "failed", error.fault
         except (Exception, asyncio.CancelledError) as error:
             if is_asked_to_stop():
                 raise
-            # An error of the driver ends this behavior. Nothing is known of where its parts are, so all go home.
-            live.status, live.fault = "failed", self._bus.failed(error, f"behavior {live.label}")
-            self._take_home(f"after {live.label} broke")
+            what = f"behavior {live.label}"
+            live.status = "failed"
+            live.fault = error.fault if isinstance(error, BodyFailed) else self._bus.failed(error, what)
+            if isinstance(error, DriverBroken) or not isinstance(error, BodyFailed):
+                self._take_home(f"after {live.label} broke")  # nobody knows where its parts are
         if live.status == "aborted":
             live.status = "taken_over" if live.authority.revoked == "taken_over" else live.aborted
         self._forget(live)
@@ -300,16 +256,27 @@ class _Control:
 
     async def _go_home(self, request: GoHome) -> None:
         with self.desk.serving(request):
-            await self._body.home(request.parts)
+            if (fault := await self._homed(request.parts)) is not None:
+                self.desk.refuse(request.id, fault)
+                return
             self.note_look()
             self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
+
+    async def _homed(self, parts: tuple[str, ...] = ()) -> Fault | None:
+        """Take parts home. Returns what has gone wrong, which has been told."""
+        try:
+            await self._body.home(parts)
+        except BodyFailed as error:
+            self._tell_fault(error.fault)
+            return error.fault
+        return None
 
     def _take_home(self, name: str) -> None:
         """Move the whole body home without a request."""
 
         async def go() -> None:
             with self._bus.containing(f"way home {name}"):
-                await self._body.home()
+                await self._homed()
 
         self._tasks.create_task(go(), name=f"home {name}")
         self.shown.look_soon()

@@ -37,6 +37,30 @@ class Motors:
         share = share * share * (3 - 2 * share)
         return {joint: angle + share * (self.goal[joint] - angle) for joint, angle in self.start.items()}
 '''
+BREAKING = """
+from pan_tilt import PanTilt
+
+class Open(PanTilt):
+    async def open(self):
+        raise OSError("open broke")
+
+class Go(PanTilt):
+    def go(self, goal, seconds):
+        raise OSError("go broke")
+
+class Aim(PanTilt):
+    def aim(self, behavior, world):
+        raise ValueError("aim broke")
+
+class Angles(PanTilt):
+    count = 0
+
+    def angles(self):
+        self.count += 1
+        if self.count > 40:
+            raise OSError("angles broke")
+        return super().angles()
+"""
 ASK = """<ebml:ebml xmlns:ebml="edu.wpi.ebml" xmlns="org.mindmakers.bml" id="ask" turnIndex="1" turnStatus="full">
   <speech id="please"><text>Please move</text></speech>
   <ebml:reference id="piece" target="blue-square" minReliability="0.95">
@@ -126,3 +150,20 @@ async def test_it_is_put_on_by_up(tmp_path: Path, robot: str, in_one: bool) -> N
 
     assert outcome.status == "done", err.decode()
     assert "Traceback" not in (out + err).decode()
+
+
+def test_a_driver_that_breaks_costs_what_it_did_and_is_named(engage: Engage, tmp_path: Path, robot: str) -> None:
+    """In each call of the base class. A traceback would be a bug of ours."""
+    (tmp_path / "breaking.py").write_text(BREAKING)
+    found = {}
+    for name in ("Open", "Go", "Aim", "Angles"):
+        body = f"{tmp_path / 'breaking.py'}:{name}"
+        result = engage(
+            "play", tmp_path / "ask.xml", "--embedded", "--virtual-time", "--body", body, "--voice", "silent"
+        )
+        text = result.out + result.err
+        assert "Traceback" not in text
+        assert f"{name.lower()} broke (see {tmp_path / 'breaking.py'}, line " in text
+        found[name] = result.code, "the blue piece" in text
+
+    assert found == {"Open": (3, False), "Go": (0, True), "Aim": (0, True), "Angles": (0, True)}

@@ -85,20 +85,25 @@ def _write(file: Path, text: str) -> None:
     file.write_text(text)
 
 
+def _made(config: ControlConfig) -> Body:
+    """The body as its driver makes it."""
+    return drivers.made(config, is_guarded=False)
+
+
 async def test_the_simulated_torso_is_the_default():
-    assert type(drivers.made(ControlConfig())) is SimulatedBody
+    assert type(_made(ControlConfig())) is SimulatedBody
 
 
 async def test_a_class_of_a_file_may_import_what_lies_beside_it(file: Path):
-    body = drivers.made(ControlConfig(body=f"{file}:Mine"))
+    body = _made(ControlConfig(body=f"{file}:Mine"))
 
     assert (type(body).__name__, body.capabilities.body) == ("Mine", "bare")
-    assert type(drivers.made(ControlConfig(body=f"{file}:Mine"))) is type(body)
+    assert type(_made(ControlConfig(body=f"{file}:Mine"))) is type(body)
 
 
 async def test_a_driver_is_made_with_its_settings():
     name = f"{__name__}:Serial"
-    body = drivers.made(ControlConfig(body=name, drivers={"Serial": {"baud": 4800}}))
+    body = _made(ControlConfig(body=name, drivers={"Serial": {"baud": 4800}}))
 
     assert isinstance(body, Serial)
     assert body.settings == Port(baud=4800)
@@ -107,7 +112,7 @@ async def test_a_driver_is_made_with_its_settings():
 async def test_an_installed_package_offers_bodies(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(drivers, "entry_points", lambda group: [Offering()] if group == drivers.GROUP else [])
 
-    assert type(drivers.made(ControlConfig(body="offered"))) is Bare
+    assert type(_made(ControlConfig(body="offered"))) is Bare
     with pytest.raises(InputRefused, match="do you mean offered"):
         drivers.made(ControlConfig(body="offred"))
 
@@ -115,7 +120,7 @@ async def test_an_installed_package_offers_bodies(monkeypatch: pytest.MonkeyPatc
 def test_a_function_may_make_the_body(file: Path):
     file.write_text(PLAIN + "\ndef make():\n    return Mine()\n")
 
-    assert type(drivers.made(ControlConfig(body=f"{file}:make"))).__name__ == "Mine"
+    assert type(_made(ControlConfig(body=f"{file}:make"))).__name__ == "Mine"
 
 
 async def test_a_subclass_of_a_configured_body_with_a_constructor_of_its_own_is_made_by_that(file: Path):
@@ -125,7 +130,7 @@ async def test_a_subclass_of_a_configured_body_with_a_constructor_of_its_own_is_
         "class Twin(SimulatedBody):\n    def __init__(self):\n        super().__init__()\n",
     )
 
-    assert isinstance(drivers.made(ControlConfig(body=str(file))), SimulatedBody)
+    assert isinstance(_made(ControlConfig(body=str(file))), SimulatedBody)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,224 @@
+"""A body whose driver may break: what it raises becomes a fault that names it and the place, and nothing else ends.
+
+A driver is somebody's program, and its robot may be unplugged in any call. Each call has its own honest answer then:
+an estimate says that it cannot be done, a behavior fails, a measurement tells the last joint angles and no look.
+"""
+
+import traceback
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Ray
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Radians
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import (
+    Body,
+    BodyFailed,
+    BodyState,
+    DriverBroken,
+    MouthShape,
+    MovementAuthority,
+    Progress,
+    Revoked,
+)
+from engage_hri.services.control.extras import Idle, Seen
+from engage_hri.services.control.refusals import infeasible
+from engage_hri.services.runtime.steps import Steps
+
+T = TypeVar("T")
+_PACKAGE = str(Path(__file__).parents[2])
+
+
+class GuardedBody(Body):
+    """A body as its driver makes it, until that breaks."""
+
+    def __init__(self, name: str, body: Body) -> None:
+        """name: of the driver, as it was asked for. body: as the driver has made it."""
+        self.name = name
+        self.body = body
+        self.capabilities = body.capabilities
+        self._last = BodyState(pose=BodyPose(), moving=False)
+        self._broken: set[str] = set()
+        """Calls that broke when they were made last: each is told once until it works again."""
+        body.on_fault = lambda fault: self.on_fault(fault)
+        body.on_lips = lambda shapes: self.on_lips(shapes)
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        async with AsyncExitStack() as stack:
+            try:
+                await stack.enter_async_context(self.body.connected())
+            except EngageError as error:
+                raise self._placed(error) from error
+            except Exception as error:
+                raise RunFailed(self._fault(error, "as it connects")) from error
+            is_left = False
+            try:
+                yield
+                is_left = True
+            finally:
+                try:
+                    await stack.aclose()
+                except Exception as error:
+                    fault = self._fault(error, "as it leaves" if is_left else "while it is connected")
+                    if not is_left:  # a task of its own has ended us
+                        raise RunFailed(fault) from error
+                    self.on_fault(fault)
+
+    # -- planning -----------------------------------------------------------------------------------------------
+
+    def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
+        awaited = self._asked(lambda: self.body.prepare(behaviors), None, "in `prepare`")
+        return None if awaited is None else self._awaited(awaited)
+
+    async def _awaited(self, awaited: Awaitable[None]) -> None:
+        try:
+            await awaited
+        except Exception as error:
+            self._tell(error, "in `prepare`")
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        try:
+            return self.body.estimate(behavior, pose, world)
+        except Exception as error:
+            return self._refusal(behavior, error)
+
+    def rehearse(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Sequence[Estimate]:
+        try:
+            return self.body.rehearse(items, world, others)
+        except Exception as error:
+            return [self._refusal(item.behavior, error) for item in items]
+
+    def rehearse_in_steps(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Steps[Sequence[Estimate]]:
+        try:
+            return (yield from self.body.rehearse_in_steps(items, world, others))
+        except Exception as error:
+            if len(items) == 1:
+                return [self._refusal(items[0].behavior, error)]
+        return [self.estimate(item.behavior, item.pose, world) for item in items]  # not all need to break
+
+    def _refusal(self, behavior: BlockBehavior, error: Exception) -> Estimate:
+        fault = self._fault(error, "in an estimate")
+        return infeasible(behavior.id, "CANNOT_CREATE_BEHAVIOR", replace(fault, where=behavior.id))
+
+    # -- motion -------------------------------------------------------------------------------------------------
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        try:
+            async with aclosing(self.body.perform(behavior, authority)) as stream:
+                async for progress in stream:
+                    yield progress
+        except (EngageError, Revoked):
+            raise
+        except Exception as error:
+            raise DriverBroken(self._fault(error, "as it moves")) from error
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        try:
+            await self.body.home(parts)
+        except EngageError:
+            raise
+        except Exception as error:
+            raise BodyFailed(self._fault(error, "on the way home")) from error
+
+    def see(self, world: World) -> None:
+        self._asked(lambda: self.body.see(world), None, "in `see`")
+
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
+        self._asked(lambda: self.body.move_lips(shapes), None, "in `move_lips`")
+
+    # -- measurements -------------------------------------------------------------------------------------------
+
+    def state(self) -> BodyState:
+        unknown = BodyState(pose=self._last.pose, moving=False)
+        self._last = self._asked(self.body.state, unknown, "in `state`")
+        return self._last
+
+    def idle(self) -> Idle:
+        return self._asked(self.body.idle, Idle(), "in `idle`")
+
+    def seen(self) -> Seen | None:
+        return self._asked(self.body.seen, None, "in `seen`")
+
+    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
+        return self._asked(lambda: self.body.ray_at(part, pose), None, "in `ray_at`")
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        return self._asked(lambda: self.body.faults, (), "in `faults`")
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        self._refusing(lambda: self.body.switch_faults(faults), "in `switch_faults`")
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        self._refusing(lambda: self.body.calibrate(offsets), "in `calibrate`")
+
+    # -- faults -------------------------------------------------------------------------------------------------
+
+    def _asked(self, call: Callable[[], T], otherwise: Any, when: str) -> T:
+        try:
+            told = call()
+        except Exception as error:
+            self._tell(error, when)
+            return otherwise  # type: ignore[no-any-return]
+        self._broken.discard(when)
+        return told
+
+    def _refusing(self, call: Callable[[], None], when: str) -> None:
+        try:
+            call()
+        except EngageError:
+            raise
+        except Exception as error:
+            raise InputRefused(self._fault(error, when)) from error
+
+    def _tell(self, error: Exception, when: str) -> None:
+        if when not in self._broken:
+            self._broken.add(when)
+            self.on_fault(self._fault(error, when))
+
+    def _fault(self, error: Exception, when: str) -> Fault:
+        if isinstance(error, EngageError):
+            return self._placed(error).fault
+        while isinstance(error, ExceptionGroup):  # of a task group: all that have failed are there
+            error = error.exceptions[0]
+        return Fault(
+            reason=f"its driver breaks {when}: {words_of(error)}", where=f"body {self.name}",
+            advice=place_of(error), service="control",
+        )  # fmt: skip
+
+    def _placed(self, error: EngageError) -> EngageError:
+        """The same, saying whose it is where the driver has not said."""
+        if not error.fault.where:
+            error.fault = replace(error.fault, where=f"body {self.name}", service="control")
+            error.args = (str(error.fault),)
+        return error
+
+
+def words_of(error: BaseException) -> str:
+    """Say what was raised, on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def place_of(error: BaseException) -> str:
+    """Say at which line of which file an error was raised; empty: it is not known.
+
+    That is the last one outside of this package and of what imports modules, so of the driver.
+    """
+    if isinstance(error, SyntaxError):
+        return f"see {error.filename}, line {error.lineno}"
+    frames = [each for each in traceback.extract_tb(error.__traceback__) if "importlib" not in each.filename]
+    own = [each for each in frames if not each.filename.startswith(_PACKAGE)]
+    last = (own or frames)[-1:]
+    return f"see {last[0].filename}, line {last[0].lineno}" if last else ""
