@@ -5,6 +5,7 @@ SHELLS = {
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/shown.py",  # publishes what the body shows
+    "services/control/performing.py",  # breaks off what a body does not end
     "services/control/questions.py",  # answers what behaviors would take
     "services/control/estimates.py",  # publishes mistakes of the body
     "services/control/switching.py",  # publishes the faults that are on

@@ -6,7 +6,7 @@ and `services/control/testing` is the suite that it has to pass.
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
@@ -77,6 +77,15 @@ class BodyFailed(EngageError):
 
 class DriverBroken(BodyFailed):
     """The driver has broken off, and nobody knows where its parts are."""
+
+
+class TakenOver(BodyFailed):
+    """Another behavior has taken parts that were on their way home."""
+
+    def __init__(self, parts: Iterable[str]) -> None:
+        """Name the parts."""
+        reason = f"another behavior has taken {', '.join(parts)} on the way home"
+        super().__init__(Fault(reason=reason, service="control"))
 
 
 class Revoked(Exception):
@@ -365,6 +374,10 @@ class Body(Extras, ABC):
         """Move to the safe pose, and return when the body is there. Behaviors that move these parts end as aborted.
 
         parts: names of parts, as in `capabilities`; empty: all.
+
+        Raises:
+            TakenOver: a behavior that came later has a part now.
+            BodyFailed: the body does not come there.
         """
 
     @abstractmethod

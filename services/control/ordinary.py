@@ -35,6 +35,7 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
     Revoked,
+    TakenOver,
 )
 from engage_hri.services.control.refusals import infeasible
 
@@ -256,8 +257,7 @@ class OrdinaryBody(Body):
             self._owner = None
         self._base, self._base_target = self._home, ""
         self._shifts += 1
-        with suppress(BodyFailed):
-            await self._move(self._home, None, "home")
+        await self._move(self._home, None, "home")
 
     def state(self) -> BodyState:
         angles = self._measured()
@@ -329,6 +329,8 @@ class OrdinaryBody(Body):
         while (off := self._off(goal)) is not None:
             if authority is not None and authority.revoked:
                 raise Revoked
+            if authority is None and self._owner is not None:
+                raise TakenOver((self.part,))
             if _now() > deadline:
                 joint, angle = off
                 where = f"{math.degrees(abs(angle)):.1f} degrees short of its goal"

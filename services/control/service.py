@@ -36,11 +36,13 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
     Spoke,
+    TakenOver,
 )
 from engage_hri.services.control.calibration import calibrated
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
 from engage_hri.services.control.live import LiveBehavior
+from engage_hri.services.control.performing import Performing
 from engage_hri.services.control.questions import Questions
 from engage_hri.services.control.refusals import VOICE_ADVICE
 from engage_hri.services.control.shown import Shown
@@ -202,10 +204,10 @@ class _Control:
 
     async def _perform(self, live: LiveBehavior) -> None:
         """Perform a behavior, from its request to the one terminal answer."""
-        request = live.request
-        accepted = False
+        request, accepted = live.request, False
+        performing = Performing(live, self._body, self._give_up)
         try:
-            async with aclosing(self._body.perform(request.behavior, live.authority)) as stream:
+            async with performing, aclosing(performing.progress()) as stream:
                 async for progress in stream:
                     if not accepted:
                         self.desk.accept(request.id)
@@ -217,19 +219,31 @@ class _Control:
             self._end_aborts(live)
             return
         except (Exception, asyncio.CancelledError) as error:
-            if is_asked_to_stop():
+            if is_asked_to_stop() and not performing.is_broken_off:
                 raise
-            what = f"behavior {live.label}"
             live.status = "failed"
-            live.fault = error.fault if isinstance(error, BodyFailed) else self._bus.failed(error, what)
+            if isinstance(error, BodyFailed):
+                live.fault = error.fault
+            elif live.fault is None:
+                live.fault = self._bus.failed(error, f"behavior {live.label}")
             if isinstance(error, DriverBroken) or not isinstance(error, BodyFailed):
                 self._take_home(f"after {live.label} broke")  # nobody knows where its parts are
         if live.status == "aborted":
             live.status = "taken_over" if live.authority.revoked == "taken_over" else live.aborted
-        self._forget(live)
-        with self.desk.serving(request):
-            self._end(live)
-        self._end_aborts(live)
+        self._finish(live)
+
+    def _give_up(self, live: LiveBehavior) -> None:
+        """End a behavior without its driver, which does not end it."""
+        live.status = "failed"
+        self._finish(live)
+        self._take_home(f"after {live.label} was given up")
+
+    def _finish(self, live: LiveBehavior) -> None:
+        if live.request.id in self._live:
+            self._forget(live)
+            with self.desk.serving(live.request):
+                self._end(live)
+            self._end_aborts(live)
 
     def _forget(self, live: LiveBehavior) -> None:
         del self._live[live.request.id]
@@ -267,7 +281,8 @@ class _Control:
         try:
             await self._body.home(parts)
         except BodyFailed as error:
-            self._tell_fault(error.fault)
+            if not isinstance(error, TakenOver):
+                self._tell_fault(error.fault)
             return error.fault
         return None
 

@@ -32,7 +32,7 @@ from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.pulse import TICK, Pulse
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.workbench import Workbench
-from engage_hri.services.control.torso import kinematics, tracks
+from engage_hri.services.control.torso import homing, kinematics, tracks
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.course import CoursePoint
 from engage_hri.services.control.torso.files import repertoire_of
@@ -126,7 +126,7 @@ class MujocoBody(SimulatedBody):
             self.pulse.wake()
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        """Move to the safe pose, and return when the joints are there. Raises BodyFailed: they do not come."""
+        """Move to the safe pose, and return when the joints are there. Raises BodyFailed, TakenOver."""
         self.pulse.step()
         self.pulse.wake()
         await super().home(parts)
@@ -140,6 +140,7 @@ class MujocoBody(SimulatedBody):
                 raise BodyFailed(self._stuck("home", off, waited))
             self.pulse.wake()
             await bell.wait(now + TICK)
+            homing.check(self._torso, going)
 
     def state(self) -> BodyState:
         self.pulse.step()

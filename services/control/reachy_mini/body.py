@@ -29,6 +29,7 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
     Revoked,
+    TakenOver,
 )
 from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
 from engage_hri.services.control.reachy_mini.courses import Instant
@@ -179,7 +180,9 @@ class ReachyMini(Body):
         self._moves.relax(names, self._loop.time())
         watches = {name: Watch(self._settings.patience) for name in names}
         with self._bell() as bell:
-            while going := [name for name in names if name not in self._moves.runs and not self._is_home(name)]:
+            while going := [name for name in names if not self._is_home(name)]:
+                if taken := sorted({joints.PARTS[name] for name in going if name in self._moves.runs}):
+                    raise TakenOver(taken)
                 await bell.wait(inf if self._link is not None else self._loop.time())
                 if self._link is None:
                     return

@@ -31,7 +31,7 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.extras import Idle, Seen
-from engage_hri.services.control.torso import choreography, displacing, head, kinematics, tracks, truth
+from engage_hri.services.control.torso import choreography, displacing, head, homing, kinematics, tracks, truth
 from engage_hri.services.control.torso.alive import Alive
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copied import Clock, beside
@@ -51,7 +51,6 @@ from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.voice import Voice
-from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.steps import Steps, finished
 
 FAULTS = tuple(KINDS)
@@ -173,9 +172,7 @@ class SimulatedBody(Body):
             if self._torso.base is not None:
                 self._torso.base.revoke()
         self._torso.relax(tuple(sorted(going)))
-        bell = Bell()
-        while not bell.is_past(until := max((self._torso.tracks[part].motion.end for part in going), default=0.0)):
-            await bell.wait(until)
+        await homing.wait(self._torso, going)
 
     def state(self) -> BodyState:
         now = self._loop.time()

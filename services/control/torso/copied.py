@@ -40,6 +40,7 @@ def beside(torso: Torso, clock: Clock, world: World) -> Torso:
 
     other = copy(torso)
     other.clock, other.world, other.attention = clock, world, copy(torso.attention)
+    other.homeward = []
     other.misbelieved = dict(torso.misbelieved)
     other.tracks = {part: copy(track) for part, track in torso.tracks.items()}
     for track in other.tracks.values():

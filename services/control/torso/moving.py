@@ -27,6 +27,7 @@ from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.variability import Deviations
+from engage_hri.services.control.waiting import Bell
 
 STEP: Seconds = 0.02
 """Seconds between two looks at where the trunk will be."""
@@ -55,6 +56,8 @@ class Torso:
         for track in self.tracks.values():
             track.trunk = self.tracks["torso"]
         self.runs: dict[str, Run] = {}
+        self.homeward: list[Bell] = []
+        """Bells of those who wait for parts to come home: each behavior that takes parts rings them."""
         self.world = World(entities=())
         self.attention = Fixation()
         self.base: MovementAuthority | None = None
@@ -199,6 +202,8 @@ class Torso:
             self.relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
         for part in run.course.parts:
             self.runs[part] = run
+        for bell in self.homeward:
+            bell.ring()
         if head.is_shift(run.behavior):
             self.set_base(run.behavior, run.course, run.authority)
         elif isinstance(run.behavior, choreography.SETTLING):
