@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.foresee.forecast import Forecast
@@ -30,7 +31,11 @@ class Arc(Struct):
 
 
 class Model(Struct):
-    """What is known of a running net. base: no earlier than that. passed: when behaviors passed transitions."""
+    """What is known of a running net. base: no earlier than that. passed: when behaviors passed transitions.
+
+    latest: when the first passed a transition, where another, who had yet to pass it, was to wait there for the end
+    of its next phase. That one is not expected to wait any longer (docs/decisions/0043), if its phase can be slower.
+    """
 
     net: PetriNet
     factor: dict[str, float]
@@ -39,6 +44,7 @@ class Model(Struct):
     base: dict[int, float] = field(default_factory=dict)
     there: dict[int, float] = field(default_factory=dict)
     passed: dict[tuple[str, int], float] = field(default_factory=dict)
+    latest: dict[int, float] = field(default_factory=dict)
     come: set[tuple[str, int]] = field(default_factory=set)
     prolonged: dict[tuple[int, int], float] = field(default_factory=dict)
 
@@ -62,6 +68,28 @@ class Model(Struct):
             self.base[transition] = self.there[transition]
         else:
             self.base[transition] = max(at, self.base.get(transition, BEGAN))
+
+    def leave(self, behavior: str, transition: int, at: float) -> None:
+        """It has passed the transition."""
+        self.arrive(behavior, transition, at)
+        self.passed[behavior, transition] = at
+        waiting = {each.behavior for each in self.arcs() if each.is_bound and each.target == transition} - {""}
+        if transition not in self.facts and any((each, transition) not in self.passed for each in waiting):
+            self.latest.setdefault(transition, at)
+
+    def late(self, times: list[float]) -> set[int]:
+        """Transitions that others are to pass later, by these times, than the first has."""
+        return {each for each, at in self.latest.items() if each not in self.facts and times[each] > at + 1e-6}
+
+    def slower(self, arcs: Iterable[Arc], times: list[float] | None = None) -> list[Arc]:
+        """With phases that are slower than is natural: as these times need it; without these, as slow as can be."""
+        found = []
+        for arc in arcs:
+            if arc.is_bound and arc.behavior and self._fixed(arc) is None:
+                seconds = arc.least if times is None else max(arc.least, times[arc.target] - times[arc.source])
+                arc = replace(arc, seconds=min(arc.seconds, seconds))
+            found.append(arc)
+        return found
 
     def arcs(self) -> list[Arc]:
         """All that holds now; a phase that has begun counts from then, and one that has ended not at all."""
@@ -235,8 +263,7 @@ class Story:
             case "pass" if coming := [name for name, each in self.left.items() if each]:
                 name = chance.choice(coming)
                 here = self.left[name].pop(0)
-                model.arrive(name, here, self.now)
-                model.passed[name, here] = self.now
+                model.leave(name, here, self.now)
                 forecast.passed(name, here, self.now)
                 if all(here not in each for each in self.left.values()) and chance.random() < 0.8:
                     self.fix(here, max(self.now, model.there[here]))

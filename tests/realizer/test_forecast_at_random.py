@@ -1,7 +1,8 @@
 """The forecast of random nets while random facts come in, against a model that relaxes all of it anew each time.
 
 Where all can be kept, the times are the earliest; where phases must give way, they do so within their limits and all
-is kept; and where nothing helps, some upper bounds are given up, and the times are the earliest without these.
+is kept; and where nothing helps, some upper bounds are given up, and the times are the earliest without these. Who is
+left of an instant that another has passed waits there no longer for the end of a phase that can be slower.
 """
 
 import random
@@ -62,10 +63,15 @@ def test_phases_give_way_within_their_limits_where_all_can_be_kept_by_that(seed:
     story = Story(random.Random(seed), is_elastic=True, is_partial=False)
     for _ in range(14):
         story.forecast.update()
-        arcs, times = story.model.arcs(), story.forecast.times
-        natural, extreme = story.model.times(arcs), story.model.times(arcs, extreme=True)
+        model, arcs, times = story.model, story.model.arcs(), story.forecast.times
+        natural, extreme = model.times(arcs), model.times(arcs, extreme=True)
         if natural is not None:
-            assert times[: story.model.size] == pytest.approx(natural, abs=CLOSE)
+            late, slowest = model.late(natural), model.times(model.slower(arcs))
+            assert slowest is not None
+            for each in late:
+                assert times[each] == pytest.approx(max(model.latest[each], slowest[each]), abs=CLOSE)
+            expected = model.times(model.slower(arcs, times)) if late else natural
+            assert times[: model.size] == pytest.approx(expected, abs=CLOSE)
             assert not any(story.forecast.is_hurried(each) for each in story.factor)
         for arc in arcs:
             if not arc.is_bound or extreme is not None:
@@ -253,3 +259,70 @@ def test_an_upper_bound_that_only_its_own_phase_could_break_holds_nobody_back() 
         assert Forecast(Case(net, {}, []).plan, BEGAN, lambda id: 1.0, {}).bounded == bounded
     net = PetriNet(tuple(Transition(str(n), ()) for n in range(4)), (*starts, phase), (own,))
     assert Forecast(Case(net, {}, [2]).plan, BEGAN, lambda id: 1.0, {}).bounded == {1, 2}
+
+
+@pytest.mark.parametrize(
+    ("passed", "stretch", "expected"),
+    [(None, 1.0, 2.0), (2.5, 1.0, 2.5), (1.5, 1.0, 1.5), (0.5, 1.0, 1.0), (0.5, None, 0.5), (0.5, 0.0, 2.0)],
+)
+def test_who_is_left_of_an_instant_waits_there_no_longer_than_another_that_has_passed_it(
+    passed: float | None, stretch: float | None, expected: float
+) -> None:
+    """The phase of b takes 1 s, or as much longer as it can, and ends at 3 s: it was to begin at 2 s, with a."""
+    places = (Place("order", 0, 1), Place("phase", 1, 2, 1.0, 0.5, "b"), Place("order", 0, 2, 3.0, 3.0))
+    bounds = (Bound("phase", 2, 1, -1.0, stretch, "b"),)
+    one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(3)), places, bounds), {}, [])
+    told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
+    for each in range(3):
+        told.require(each)
+    if passed is not None:
+        told.passed("a", 1, BEGAN + passed)
+
+    told.update()
+    assert [at - BEGAN for at in told.times[:3]] == pytest.approx([0.0, expected, max(3.0, expected + 1.0)])
+    assert not told.is_hurried("b")
+
+
+def test_who_is_left_waits_no_longer_also_where_that_it_waits_could_not_be_kept_when_another_passed() -> None:
+    """Until the clock is stopped for 1 s, the phases are to begin by 0.5 s; b cannot be slow enough for that."""
+    places = (Place("order", 0, 1), Place("phase", 1, 2, 1.0, 0.5, "b"), Place("order", 0, 2, 3.0, 3.0))
+    bounds = (Bound("delay", 1, 0, -0.5), Bound("phase", 2, 1, -1.0, 1.0, "b"))
+    one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(3)), places, bounds), {}, [])
+    told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
+    for each in range(3):
+        told.require(each)
+
+    told.update()
+    assert [at - BEGAN for at in told.times[:3]] == pytest.approx([0.0, 0.0, 3.0])
+    told.passed("a", 1, BEGAN + 1.25)
+    told.prolong(0, 1, 1.0)
+    told.update()
+    assert [at - BEGAN for at in told.times[:3]] == pytest.approx([0.0, 1.25, 3.0])
+
+
+def test_a_delay_that_is_no_longer_than_planned_after_all_frees_what_gave_way_for_it() -> None:
+    """The phases of c, 1 s, and b, 0.5 s, end together; b begins at 1.5 s, and 0.5 s after c at least."""
+    places = (
+        *(Place("order", 0, each) for each in (1, 2, 3)),
+        Place("phase", 1, 3, 1.0, 1.0, "c"),
+        Place("phase", 2, 3, 0.5, 0.25, "b"),
+        Place("delay", 1, 2, 0.5, 0.5),
+    )
+    one = Case(
+        PetriNet(tuple(Transition(str(n), ()) for n in range(4)), places, (Bound("phase", 3, 1, -1.0, 0.0, "c"),)),
+        {}, [],
+    )  # fmt: skip
+    told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
+    for each in range(4):
+        told.require(each)
+    told.overdue(2, BEGAN + 1.5)
+
+    told.update()
+    assert [at - BEGAN for at in told.times[:4]] == pytest.approx([0.0, 1.0, 1.5, 2.0])
+    told.prolong(1, 2, 0.5)
+    told.update()
+    assert [at - BEGAN for at in told.times[:4]] == pytest.approx([0.0, 0.0, 1.5, 1.75])
+    told.prolong(1, 2, 0.0)
+    told.update()
+    assert [at - BEGAN for at in told.times[:4]] == pytest.approx([0.0, 1.0, 1.5, 2.0])
+    assert not told.is_hurried("b")

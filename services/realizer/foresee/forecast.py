@@ -179,10 +179,10 @@ class Forecast(LongestPaths):
 
         Where one of another block has passed it, the plan says how much later the others come.
         """
-        bounds = [self._arcs[number] for number in self._in[transition]]
+        bounds = [self._arcs[each] for each in self._in[transition] if self._arcs[each].is_on or each in self._broken]
         is_kept = self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
         if not (is_kept or is_foreign(behavior)) and any(
-            arc.is_on and arc.is_bound and arc.behavior not in ("", behavior) for arc in bounds
+            arc.is_bound and arc.behavior not in ("", behavior) for arc in bounds
         ):
             node = self._new_node()
             self.times[node] = at
@@ -279,6 +279,7 @@ class Forecast(LongestPaths):
                 arc.asked, arc.least = arc.asked + more, arc.least + more
                 if arc.is_on:
                     self._set_seconds(number, arc.asked)
+                self._see_reasons_again(source)
 
     def relearn(self, behaviors: Iterable[str]) -> None:
         """Take over the changed factors of these behaviors."""
