@@ -33,6 +33,8 @@ from engage_hri.services.control.refusals import infeasible
 from engage_hri.services.runtime.steps import Steps
 
 T = TypeVar("T")
+BREAKS = (Exception, SystemExit)
+"""Errors of a driver. Some SDKs call `sys.exit`."""
 _PACKAGE = str(Path(__file__).parents[2])
 
 
@@ -57,7 +59,7 @@ class GuardedBody(Body):
                 await stack.enter_async_context(self.body.connected())
             except EngageError as error:
                 raise self._placed(error) from error
-            except Exception as error:
+            except BREAKS as error:
                 raise RunFailed(self._fault(error, "as it connects")) from error
             is_left = False
             try:
@@ -66,7 +68,7 @@ class GuardedBody(Body):
             finally:
                 try:
                     await stack.aclose()
-                except Exception as error:
+                except BREAKS as error:
                     fault = self._fault(error, "as it leaves" if is_left else "while it is connected")
                     if not is_left:  # a task of its own has ended us
                         raise RunFailed(fault) from error
@@ -81,13 +83,13 @@ class GuardedBody(Body):
     async def _awaited(self, awaited: Awaitable[None]) -> None:
         try:
             await awaited
-        except Exception as error:
+        except BREAKS as error:
             self._tell(error, "in `prepare`")
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         try:
-            return self.body.estimate(behavior, pose, world)
-        except Exception as error:
+            return _of(Estimate, self.body.estimate(behavior, pose, world))
+        except BREAKS as error:
             return self._refusal(behavior, error)
 
     def rehearse(
@@ -95,7 +97,7 @@ class GuardedBody(Body):
     ) -> Sequence[Estimate]:
         try:
             return self.body.rehearse(items, world, others)
-        except Exception as error:
+        except BREAKS as error:
             return [self._refusal(item.behavior, error) for item in items]
 
     def rehearse_in_steps(
@@ -103,12 +105,12 @@ class GuardedBody(Body):
     ) -> Steps[Sequence[Estimate]]:
         try:
             return (yield from self.body.rehearse_in_steps(items, world, others))
-        except Exception as error:
+        except BREAKS as error:
             if len(items) == 1:
                 return [self._refusal(items[0].behavior, error)]
         return [self.estimate(item.behavior, item.pose, world) for item in items]  # not all need to break
 
-    def _refusal(self, behavior: BlockBehavior, error: Exception) -> Estimate:
+    def _refusal(self, behavior: BlockBehavior, error: BaseException) -> Estimate:
         fault = self._fault(error, "in an estimate")
         return infeasible(behavior.id, "CANNOT_CREATE_BEHAVIOR", replace(fault, where=behavior.id))
 
@@ -116,20 +118,27 @@ class GuardedBody(Body):
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         try:
-            async with aclosing(self.body.perform(behavior, authority)) as stream:
-                async for progress in stream:
-                    yield progress
-        except (EngageError, Revoked):
-            raise
-        except Exception as error:
+            stream = _of(AsyncGenerator, self.body.perform(behavior, authority))  # type: ignore[type-abstract]
+        except BREAKS as error:
             raise DriverBroken(self._fault(error, "as it moves")) from error
+        async with aclosing(stream):
+            while True:
+                try:
+                    progress = await anext(stream)
+                except StopAsyncIteration:
+                    return
+                except (EngageError, Revoked):
+                    raise
+                except (*BREAKS, GeneratorExit) as error:
+                    raise DriverBroken(self._fault(error, "as it moves")) from error
+                yield progress
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         try:
             await self.body.home(parts)
         except EngageError:
             raise
-        except Exception as error:
+        except BREAKS as error:
             raise BodyFailed(self._fault(error, "on the way home")) from error
 
     def see(self, world: World) -> None:
@@ -142,7 +151,7 @@ class GuardedBody(Body):
 
     def state(self) -> BodyState:
         unknown = BodyState(pose=self._last.pose, moving=False)
-        self._last = self._asked(self.body.state, unknown, "in `state`")
+        self._last = self._asked(lambda: _of(BodyState, self.body.state()), unknown, "in `state`")
         return self._last
 
     def idle(self) -> Idle:
@@ -169,7 +178,7 @@ class GuardedBody(Body):
     def _asked(self, call: Callable[[], T], otherwise: Any, when: str) -> T:
         try:
             told = call()
-        except Exception as error:
+        except BREAKS as error:
             self._tell(error, when)
             return otherwise  # type: ignore[no-any-return]
         self._broken.discard(when)
@@ -180,18 +189,18 @@ class GuardedBody(Body):
             call()
         except EngageError:
             raise
-        except Exception as error:
+        except BREAKS as error:
             raise InputRefused(self._fault(error, when)) from error
 
-    def _tell(self, error: Exception, when: str) -> None:
+    def _tell(self, error: BaseException, when: str) -> None:
         if when not in self._broken:
             self._broken.add(when)
             self.on_fault(self._fault(error, when))
 
-    def _fault(self, error: Exception, when: str) -> Fault:
+    def _fault(self, error: BaseException, when: str) -> Fault:
         if isinstance(error, EngageError):
             return self._placed(error).fault
-        while isinstance(error, ExceptionGroup):  # of a task group: all that have failed are there
+        while isinstance(error, BaseExceptionGroup):  # of a task group: all that have failed are there
             error = error.exceptions[0]
         return Fault(
             reason=f"its driver breaks {when}: {words_of(error)}", where=f"body {self.name}",
@@ -204,6 +213,13 @@ class GuardedBody(Body):
             error.fault = replace(error.fault, where=f"body {self.name}", service="control")
             error.args = (str(error.fault),)
         return error
+
+
+def _of(kind: type[T], told: object) -> T:
+    """What a driver tells, if it is what it is to be. Raises TypeError."""
+    if not isinstance(told, kind):
+        raise TypeError(f"it returns a {type(told).__name__}, and no {kind.__name__}")
+    return told
 
 
 def words_of(error: BaseException) -> str:

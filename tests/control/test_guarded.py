@@ -176,6 +176,30 @@ async def test_a_behavior_that_breaks_has_failed_after_what_it_told():
     assert is_named(stuck.value.fault, "on the way home")
 
 
+@pytest.mark.parametrize("error", [SystemExit, GeneratorExit, asyncio.TimeoutError])
+async def test_it_breaks_by_whatever_it_raises(error: type[Exception]):
+    body, _, _ = guarded("perform", error=error)
+    with pytest.raises(DriverBroken, match=f"its driver breaks as it moves: {error.__name__}: the port vanished"):
+        async for _ in body.perform(LOOK, MovementAuthority(LOOK, "end")):
+            pass
+
+
+@pytest.mark.parametrize("made", [None, 3])
+async def test_what_is_no_stream_no_state_and_no_estimate_breaks_as_well(made: Any):
+    body, driver, told = guarded()
+    driver.perform = lambda behavior, authority: made  # type: ignore[method-assign]
+    driver.state = driver.estimate = lambda *_: made  # type: ignore[assignment, method-assign]
+    with pytest.raises(DriverBroken, match="its driver breaks as it moves: TypeError"):
+        async for _ in body.perform(LOOK, MovementAuthority(LOOK, "end")):
+            pass
+
+    assert body.state() == BodyState(pose=BodyPose(), moving=False)
+    assert [each.reason for each in told] == [
+        f"its driver breaks in `state`: TypeError: it returns a {type(made).__name__}, and no BodyState"
+    ]
+    assert not body.estimate(LOOK, None, WORLD).feasible
+
+
 @pytest.mark.parametrize("error", [BehaviorRefused, BodyFailed])
 async def test_what_a_driver_says_on_purpose_stays_as_it_is(error: type[Exception]):
     body, _, _ = guarded("perform", error=error)
