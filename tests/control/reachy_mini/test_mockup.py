@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift, Wait
+from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
-from engage_hri.services.control.body import Arrived, Body, BodyFailed
+from engage_hri.services.control.body import Body, BodyFailed
 from engage_hri.services.control.reachy_mini import messages
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.connection import connected
@@ -75,20 +75,14 @@ async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
         await claim(suite, body)
 
 
-class Held(Stage):
-    """A behavior that can be awaited at a hold point."""
-
-    async def _perform(self) -> None:
-        self.is_held = asyncio.Event()
-        async for progress in self._body.perform(self._behavior, self.authority):
-            self.progress.append(progress)
-            if isinstance(progress, Arrived):
-                self.is_held.set()
-
-    async def wait(self) -> None:
-        await asyncio.sleep(0)
-        async with asyncio.timeout(20.0):
-            await self.is_held.wait()
+async def held(body: Body, behavior: BlockBehavior) -> Stage:
+    """Begin a behavior, and wait at its stroke. Raises what the body raises if it does not come there."""
+    stage = Stage(body, behavior, "stroke_start")
+    await stage.holding()
+    if stage.task.done():
+        stage.task.result()
+    assert stage.waits_at == ["stroke"], stage.progress
+    return stage
 
 
 # -- outages ------------------------------------------------------------------------------------------------------
@@ -122,12 +116,11 @@ async def test_an_outage_is_told_at_once_and_the_robot_works_again_after_it(mock
     body.on_fault = faults.append
     look = Gaze(id="look", target="near-right")
     async with body.connected():
-        held = Held(body, look, "stroke_start")
-        await held.wait()
+        stage = await held(body, look)
         since = asyncio.get_running_loop().time()
         outage(mockup)
         with pytest.raises(BodyFailed) as failed:
-            await held.over()
+            await stage.over()
         took = asyncio.get_running_loop().time() - since
         assert told in failed.value.fault.reason
         assert not body.estimate(look, None, WORLD).feasible
@@ -160,8 +153,7 @@ async def test_the_gaze_axis_is_what_the_daemon_s_matrix_of_the_head_says(mockup
     body.see(WORLD)
     async with body.connected():
         await performed(body, PostureShift(id="lean", lexeme="LEAN_FORWARD"))
-        stage = Held(body, Gaze(id="look", target="far-left"), "stroke_start")
-        await stage.wait()
+        stage = await held(body, Gaze(id="look", target="far-left"))
         await performed(body, Wait(id="settle", duration=0.5))
         told = mockup.ask("GET", "/api/state/full?use_pose_matrix=true")
         matrix = np.array(json.loads(told)["head_pose"]["m"]).reshape(4, 4)
