@@ -36,11 +36,11 @@ from engage_hri.services.control.reachy_mini.courses import Instant
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
 from engage_hri.services.control.reachy_mini.link import Daemon, Link
 from engage_hri.services.control.reachy_mini.messages import Measured
-from engage_hri.services.control.reachy_mini.moving import Moves
+from engage_hri.services.control.reachy_mini.moving import GAP, Moves
 from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.reachy_mini.tracks import Off
-from engage_hri.services.control.reachy_mini.watching import Watch
+from engage_hri.services.control.reachy_mini.watching import Rate, Watch
 from engage_hri.services.control.torso.course import Impossible
 from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
 from engage_hri.services.control.voice import speaking
@@ -48,8 +48,6 @@ from engage_hri.services.control.waiting import Bell
 
 FREEZE: Seconds = 0.5
 """Seconds that a track stands still when it is told to freeze, before it goes home."""
-GAP: Seconds = 0.15
-"""Seconds without a measurement, and so without a command, after which the plan goes on from where it was."""
 RESTS_ON = 2.0
 """The eyes rest on what they look at within this many times the angle that counts as on target."""
 
@@ -80,6 +78,7 @@ class ReachyMini(Body):
         """Of everything that waits for measurements."""
         self._sent = ""
         self._last_frame: Seconds = -inf
+        self._rate = Rate(GAP)
         self._rests_since: Seconds = -inf
         """End of the plan whose last command has been sent; -inf: it is under way."""
 
@@ -118,6 +117,8 @@ class ReachyMini(Body):
         if now - self._last_frame > GAP:
             self._moves.stand(self._last_frame, now)
         self._last_frame = now
+        if (rate := self._rate.fallen(now)) is not None:
+            self.on_fault(_slow(rate))
         for bell in list(self._bells):
             bell.ring()
         if not self._moves.correct(now) and self._rests_since == self._moves.end:
@@ -139,6 +140,7 @@ class ReachyMini(Body):
         now = self._loop.time()
         self._moves.measured = measured.pose
         self._last_frame, self._sent, self._rests_since = now, "", -inf
+        self._rate = Rate(GAP)
         for run in list(self._moves.runs.values()):  # it has failed, and is just about to say so
             self._moves.release(run)
         self._moves.rebase(joints.TRACKS)
@@ -307,7 +309,7 @@ class ReachyMini(Body):
 
     def _check(self, watch: Watch, off: Off, where: str, sync: str) -> None:
         """Raise BodyFailed if joints that are not where they should be make no way any more."""
-        if (waited := watch.stuck(abs(off.there - off.here), self._loop.time())) is not None:
+        if (waited := watch.stuck(abs(off.there - off.here), self._last_frame)) is not None:
             here, there = round(degrees(off.here), 1) + 0.0, degrees(off.there)
             reason = (
                 f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be for its "
@@ -370,6 +372,12 @@ def _over_the_network(settings: ReachyMiniSettings) -> AbstractAsyncContextManag
     from engage_hri.services.control.reachy_mini.connection import connected
 
     return connected(settings)
+
+
+def _slow(rate: float) -> Fault:
+    reason = f"the daemon sends {rate:.1f} measurements a second: the robot moves by fits and starts, and late"
+    advice = f"it takes {1.0 / GAP:.0f}; is the network slow, or the daemon's machine busy?"
+    return Fault(reason=reason, where="reachy_mini", advice=advice, service="control")
 
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:

@@ -18,6 +18,8 @@ from engage_hri.services.control.reachy_mini.messages import Measured
 
 AGAIN: Seconds = 0.5
 """Seconds between two attempts to find the daemon."""
+STARVED: Seconds = 0.1
+"""A timer that comes so late tells of a process that had no time."""
 
 
 class Lost(EngageError):
@@ -73,11 +75,7 @@ class Link:
 
     async def _converse(self, daemon: Daemon) -> None:
         """Take a measurement, and answer it. Raises Lost."""
-        try:
-            async with asyncio.timeout(self._silence):
-                text = await daemon.measurement()
-        except TimeoutError:
-            raise Lost(silent(self._silence)) from None
+        text = await self._heard(daemon)
         try:
             measured = messages.measured(text)
         except ValueError as error:
@@ -96,6 +94,22 @@ class Link:
                     await daemon.command(command)
             except TimeoutError:
                 raise Lost(silent(self._silence)) from None
+
+    async def _heard(self, daemon: Daemon) -> str | bytes:
+        """Wait for the next measurement. Raises Lost after the silence.
+
+        A process that had no time itself knows nothing of a silence: what was sent meanwhile has not been read yet.
+        """
+        loop = asyncio.get_running_loop()
+        for is_last in (False, True):
+            until = loop.time() + self._silence
+            try:
+                async with asyncio.timeout_at(until):
+                    return await daemon.measurement()
+            except TimeoutError:
+                if is_last or loop.time() - until < STARVED:
+                    break
+        raise Lost(silent(self._silence))
 
     def _lose(self, fault: Fault) -> None:
         """Tell of trouble, once until it is over."""

@@ -36,6 +36,8 @@ ASTRAY = radians(6.0)
 """Joints that are further than this from where they were sent have been moved by somebody else."""
 BEHIND: Seconds = 0.1
 """How far behind a sync point the joints may be measured to have passed it: measurements come now and then."""
+GAP: Seconds = 0.15
+"""Seconds without a measurement, and so without a command, after which the plan goes on from where it was."""
 SAMPLES = 6
 """Places of a path between a sync point and where the plan is, at which the joints may be to have come there."""
 
@@ -372,20 +374,20 @@ class Moves:
         nod.motion = Motion(self.way("nod", resting(tracks["nod"]), nod.base), now)
 
     def stand(self, since: Seconds, now: Seconds) -> None:
-        """Go on from where the plan was at an instant, at rest: no command has come through since then."""
+        """Go on from where the plan was at an instant, at rest: no command has come through since then.
+
+        `GAP` of the time that has passed counts, else a stream with many gaps would never bring anything to its goal.
+        """
+        now -= GAP
         for name, track in self.tracks.items():
             if track.motion.end <= since:
                 continue
-            run, q, left = (
-                self.runs.get(name),
-                track.motion.at(since).q,
-                track.motion.path.after(track.motion.s(since)),
-            )
+            run, q, s = self.runs.get(name), track.motion.at(since).q, track.motion.s(since)
             if run is not None and run.motion is track.motion:
-                pending = [sync for each in run.pending for sync in each.syncs]
-                left = track.motion.path.after(track.motion.s(since), pending)
+                left = track.motion.path.after(s, [sync for each in run.pending for sync in each.syncs])
                 self._play(run, Path(resting(q), left, self._limits[name]), now, track.aim)
             else:
+                left = track.motion.path.after(s)
                 track.motion = Motion(Path(resting(q), left, self._limits[name]), now)
 
 

@@ -1,4 +1,4 @@
-"""A daemon of a Reachy Mini on loop time, no better than the real one: `test_real.py` holds them against each other.
+"""A daemon of a Reachy Mini on loop time, no better than the real one: `test_mockup.py` compares them.
 
 The real mock-up takes a target at the end of a tick of 20 ms, and is there at the end of the next one. It goes where
 it is told at once, however far; it tells its joints 43 times a second when 50 are asked for; it begins folded down.
@@ -7,8 +7,9 @@ it is told at once, however far; it tells its joints 43 times a second when 50 a
 import asyncio
 import json
 import math
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from itertools import repeat
 from random import Random
 
 from engage_hri.schemas.faults import Fault
@@ -41,6 +42,8 @@ class FakeDaemon:
         """What it computes of the head from its motors, as the real one may after a jump."""
         self.commands: list[tuple[float, dict[str, float]]] = []
         """Everything that has been carried out, with its time."""
+        self.periods: Iterator[float] = repeat(PERIOD)
+        """Seconds to each next measurement."""
         self._queue: list[str] = []
         self._chance = Random(1)
         self._thawed = asyncio.Event()
@@ -100,7 +103,7 @@ class FakeDaemon:
                 raise Lost(Fault(reason="the daemon cannot be reached: no answer", advice="start it")) from None
 
     async def measurement(self, life: int) -> str:
-        await asyncio.sleep(PERIOD)
+        await asyncio.sleep(next(self.periods))
         await self._thawed.wait()
         if life != self._life:
             raise Lost(Fault(reason="the daemon has closed the connection", advice="start it"))
