@@ -216,7 +216,7 @@ class GuardedBody(Body):
 
 
 def _of(kind: type[T], told: object) -> T:
-    """What a driver tells, if it is what it is to be. Raises TypeError."""
+    """Pass on what a driver tells, if it is what it is to be. Raises TypeError."""
     if not isinstance(told, kind):
         raise TypeError(f"it returns a {type(told).__name__}, and no {kind.__name__}")
     return told

@@ -17,7 +17,7 @@ SKEW: Seconds = 0.25
 
 
 class Told:
-    """What a body has told of a behavior."""
+    """Points and words of a behavior that its body has told so far."""
 
     def __init__(self, behavior: BlockBehavior, authority: MovementAuthority, began: Seconds) -> None:
         """authority: as it is extended and revoked. began: loop time at which the behavior was begun."""

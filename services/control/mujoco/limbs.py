@@ -1,7 +1,7 @@
 """Parts of a described robot, each an ordinary body of one part: where it looks or points, by inverse kinematics."""
 
 import math
-from collections.abc import AsyncGenerator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import aclosing, suppress
 
 from msgspec.structs import replace
@@ -62,7 +62,9 @@ class Limb(OrdinaryBody):
     def go(self, goal: Angles, seconds: Seconds) -> None:
         self.stage.go(self.part, goal, seconds)
 
-    async def _move(self, goal: Angles, authority: MovementAuthority | None, sync: str) -> Seconds | None:
+    async def _move(
+        self, goal: Callable[[], Angles], authority: MovementAuthority | None, sync: str
+    ) -> Seconds | None:
         try:
             return await super()._move(goal, authority, sync)
         except BodyFailed as failed:
@@ -156,7 +158,9 @@ class ArmLimb(Limb):
 
     points_at = ""
 
-    async def _move(self, goal: Angles, authority: MovementAuthority | None, sync: str) -> Seconds | None:
+    async def _move(
+        self, goal: Callable[[], Angles], authority: MovementAuthority | None, sync: str
+    ) -> Seconds | None:
         if sync not in ("stroke", "stroke_end"):
             self.points_at = ""
         return await super()._move(goal, authority, sync)
