@@ -1,13 +1,15 @@
 """The base class of the ordinary robot with encoders that scatter, and a driver that gives the same angles twice."""
 
 import asyncio
+import math
 from random import Random
 
 import pytest
 
 from engage_hri.schemas.behaviors import Gaze, GazeShift
-from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Body, Reached
+from engage_hri.schemas.units import Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.control.body import Body, BodyFailed, Reached, TakenOver
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage
 from tests.control.test_docs import driver
 
@@ -75,3 +77,92 @@ async def test_a_shift_that_is_broken_off_is_not_told_to_its_end_since_another_w
         await asyncio.gather(first.over(), second.over())
 
     assert (first.passed, second.passed) == (["start"], ["start", "end"])
+
+
+class Sagging(driver().PanTilt):  # type: ignore[misc]
+    """While `sags` its tilt hangs down; with `is_dead` its motors take no command."""
+
+    sags, is_dead = 0.0, False
+
+    def angles(self) -> dict[str, float]:
+        measured = dict(super().angles())
+        return {**measured, "tilt": measured["tilt"] - self.sags}
+
+    def go(self, goal: dict[str, float], seconds: float) -> None:
+        if not self.is_dead:
+            self.sags = 0.0
+            super().go(goal, seconds)
+
+
+def beside(body: Body, target: Vector) -> float:
+    """Degrees between the axis of the eyes, as the joints have it, and the way to a place."""
+    angles = {it.joint: it.angle for it in body.state().pose.joints}
+    pan, tilt = angles["pan"], angles["tilt"]
+    axis = math.cos(tilt) * math.cos(pan), math.cos(tilt) * math.sin(pan), math.sin(tilt)
+    way = [there - here for there, here in zip(target, type(body).eyes, strict=True)]  # type: ignore[attr-defined]
+    share = sum(one * other for one, other in zip(axis, way, strict=True)) / math.hypot(*way)
+    return math.degrees(math.acos(min(1.0, share)))
+
+
+def walked(y: float) -> World:
+    """The world with a person who has walked aside."""
+    return World(entities=(Entity(id="human", kind="person", position=(1.3, y, 1.2)),))
+
+
+async def test_what_has_given_way_at_a_hold_goes_back_before_the_next_point() -> None:
+    body, target = Sagging(), WORLD.entity("near-right")
+    assert target is not None
+    async with body.connected():
+        body.see(WORLD)
+        stage = Stage(body, Gaze(id="g", target="near-right"), "start")
+        for number, sync in enumerate(("stroke", "relax"), 1):
+            await stage.holding(number)
+            body.sags = 0.5
+            assert beside(body, target.position) > 20.0
+            stage.authority.extend(sync)
+            await stage.until(lambda sync=sync: sync in stage.passed)  # type: ignore[misc]
+            assert beside(body, target.position) < 1.0
+        stage.authority.extend("end")
+        await stage.over()
+
+
+async def test_a_dead_motor_is_told_by_home_and_a_later_behavior_ends_it() -> None:
+    body = Sagging()
+    async with body.connected():
+        body.see(WORLD)
+        await Stage(body, GazeShift(id="g", target="far-left"), "end").over()
+        body.is_dead = True
+        with pytest.raises(BodyFailed, match=r"short of its goal .* to go to its home"):
+            await body.home()
+        body.is_dead = False
+        home = asyncio.create_task(body.home())
+        await asyncio.sleep(0.1)
+        look = Stage(body, Gaze(id="l", target="near-right"), "end")
+        with pytest.raises(TakenOver, match="another behavior has taken head on the way home"):
+            await home
+        await look.over()
+
+
+@pytest.mark.parametrize("behavior", [Gaze(id="g", target="human"), GazeShift(id="s", target="human")])
+@pytest.mark.parametrize("speed", [0.2, 0.8])
+async def test_the_eyes_follow_who_walks_and_say_so_only_while_they_are_there(behavior: Gaze, speed: float) -> None:
+    """Whoever walks at 0.8 m/s 1.3 m away is 35 degrees further each second; it looks 20 times a second."""
+    body = driver().PanTilt()
+    async with body.connected():
+        body.see(walked(0.0))
+        stage = Stage(body, behavior, "stroke" if isinstance(behavior, Gaze) else "end")
+        await asyncio.sleep(1.5)
+        offs, told = [], 0
+        for step in range(120):
+            y = 0.6 * math.sin(speed / 0.6 * step * 0.05)
+            body.see(walked(y))
+            await asyncio.sleep(0.05)
+            offs.append(beside(body, (1.3, y, 1.2)))
+            if body.state().looking_at == "human":
+                told += 1
+                assert offs[-1] <= math.degrees(body.capabilities.gaze_half_angle) + 0.1
+        stage.authority.revoke()
+        await stage.over()
+
+    assert max(offs) < 10.0
+    assert told > 90
