@@ -372,5 +372,8 @@ def _refuse_conflicts(members: Sequence[Member]) -> None:
                 other = owner.setdefault((kind, name), member)
                 if other is not member:
                     reason = f"{other.name} and {member.name} both have the {kind} {name!r}"
-                    advice = f"say whose it is, by the parts that each is to have: {name}={other.name}"
+                    rest = ",".join(part for part in member.parts if part not in other.parts)
+                    spec = member.name.rpartition("=")[2]
+                    advice = "say whose it is, by the parts that the other is to have"
+                    advice += f": {rest}={spec}" if rest else ""
                     raise InputRefused(Fault(reason=reason, where="control.body", advice=advice, service="control"))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.behaviors import BlockBehavior, Pointing
 from engage_hri.schemas.body import Capabilities, JointLimit, Ray
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
@@ -116,8 +116,10 @@ class DrivenBody(Body):
         Raises:
             BehaviorRefused: it can't be done.
         """
-        points = TYPES[type_name(behavior)].points
-        return [("stroke" if "stroke" in points else "end", self.aim(behavior, world))]
+        points, aim = TYPES[type_name(behavior)].points, self.aim(behavior, world)
+        if isinstance(behavior, Pointing):  # people follow an arm as soon as it points
+            return [("stroke_start", aim), ("stroke", aim), ("stroke_end", aim)]
+        return [("stroke" if "stroke" in points else "end", aim)]
 
     def position(self, behavior: BlockBehavior, world: World) -> Vector:
         """Look up the position of a behavior's target, metres.

@@ -8,7 +8,7 @@ A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodi
 
 import inspect
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
@@ -153,17 +153,39 @@ def _parts(asked: Named, body: Body, *, own_voice: bool) -> tuple[str, ...]:
 
 def _settings(asked: Named, driver: Driver, config: ControlConfig) -> Struct | None:
     kind = getattr(driver, "Settings", None)
-    given, where = config.drivers.get(asked.name), f"control.drivers.{asked.name}"
+    given, where = _given(asked, driver, config)
     if kind is None:
         if given:
             raise _refusal(f"this driver has no settings, and {', '.join(given)} are given", where, "leave them out")
         return None
+    if unknown := sorted(set(given) - set(kind.__struct_fields__)):
+        reason = f"no setting {', '.join(unknown)}"
+        raise _refusal(reason, where, f"known are {', '.join(kind.__struct_fields__) or 'none'}")
     try:
-        return msgspec.convert(given or {}, kind)  # type: ignore[no-any-return]
+        return msgspec.convert(given, kind)  # type: ignore[no-any-return]
     except msgspec.ValidationError as error:
         reason, _, place = str(error).partition(" - at `$")
         key = f"{where}{place.strip('`')}"
         raise _refusal(reason, key, f"known are {', '.join(kind.__struct_fields__)}") from error
+
+
+def _given(asked: Named, driver: Driver, config: ControlConfig) -> tuple[Mapping[str, Any], str]:
+    """The settings of a driver, and where they stand: by the name of its class, or of the file or entry point."""
+    names = dict.fromkeys((getattr(driver, "__name__", asked.name), asked.name))
+    found = next((name for name in names if name in config.drivers), None)
+    if found is None:
+        rest = [name for name in config.drivers if name not in _known(config)]
+        for name in names:
+            if close := get_close_matches(name, rest, n=1, cutoff=0.7):
+                raise _refusal(
+                    "no driver of this name is asked for", f"control.drivers.{close[0]}", f"do you mean {name}?"
+                )
+    return config.drivers.get(found or "", {}), f"control.drivers.{found or asked.name}"
+
+
+def _known(config: ControlConfig) -> set[str]:
+    """Names that settings may have."""
+    return {*(each.name for each in _asked(config)), *BUILT_IN, *(point.name for point in entry_points(group=GROUP))}
 
 
 # -- imports ------------------------------------------------------------------------------------------------------

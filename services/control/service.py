@@ -1,6 +1,7 @@
 """The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
 
 import asyncio
+import logging
 from contextlib import aclosing, nullcontext
 
 from engage_hri.schemas import keys
@@ -71,7 +72,10 @@ async def embody(
     """
     body = body or made(config)
     if "speech" not in body.capabilities.types:
-        bus.log.warning("control: the body %s has no voice: %s", body.capabilities.body, VOICE_ADVICE)
+        # Whoever starts it is to see this, whatever the log shows.
+        logging.getLogger("engage").warning(
+            "control: the body %s has no voice: %s", body.capabilities.body, VOICE_ADVICE
+        )
     async with body.connected() if connects else nullcontext(), asyncio.TaskGroup() as tasks:
         control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:

@@ -151,7 +151,7 @@ async def test_the_rays_are_of_whom_they_belong_to():
         (
             ("head", "voice"),
             ("voice",),
-            "A and B both have the part 'voice' (say whose it is, by the parts that each",
+            "A and B both have the part 'voice' (say whose it is, by the parts that the other is to have)",
         ),
         (ALL, ALL, "A and B both have the part 'head'"),
     ],

@@ -169,7 +169,7 @@ def test_what_is_no_body_is_refused_with_what_to_do(file: Path, name: str, text:
         (
             "Serial",
             {"bauds": 1},
-            "control.drivers.Serial: Object contains unknown field `bauds` (known are device, baud)",
+            "control.drivers.Serial: no setting bauds (known are device, baud)",
         ),
         ("Serial", {"baud": "fast"}, "control.drivers.Serial.baud: Expected `int`, got `str`"),
         (
@@ -191,3 +191,31 @@ async def test_a_voice_takes_the_place_of_the_one_of_the_body():
 
     assert isinstance(body, ComposedBody)
     assert body.capabilities.parts.count("voice") == 1
+
+
+async def test_settings_by_the_name_of_the_class_or_of_the_file_and_no_others(file: Path):
+    _write(file, PLAIN + SETTING)
+    for name in ("Set", "my_robot"):
+        body = _made(ControlConfig(body=str(file), drivers={name: {"port": "/dev/x"}}))
+        assert body.settings.port == "/dev/x"  # type: ignore[attr-defined]
+    with pytest.raises(InputRefused, match=r"control\.drivers\.Set: no setting prot \(known are port\)"):
+        drivers.made(ControlConfig(body=str(file), drivers={"Set": {"prot": "/dev/x"}}))
+    with pytest.raises(InputRefused, match=r"drivers\.Sett: no driver of this name .* \(do you mean Set\?\)"):
+        drivers.made(ControlConfig(body=str(file), drivers={"Sett": {"port": "/dev/x"}}))
+    drivers.made(ControlConfig(body=str(file), drivers={"espeak": {"file": "a.wav"}, "Other": {"port": "/dev/x"}}))
+
+
+SETTING = """
+import msgspec
+del Mine, Half
+
+class Settings(msgspec.Struct, frozen=True):
+    port: str = "/dev/null"
+
+class Set(Bare):
+    Settings = Settings
+
+    def __init__(self, settings):
+        super().__init__()
+        self.settings = settings
+"""
