@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import isfinite
 
 from engage_hri.schemas.behavior_types import TYPES, sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, Head, Speech
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Arrived, MovementAuthority, Progress, Reached, Spoke
@@ -30,12 +30,20 @@ class Told:
         self._passed = -1
         """Number of the last point that it has passed."""
         self._said = 0
+        self._strokes = behavior.repetition if isinstance(behavior, Head) else 1
+        self._struck = 1
+        """Strokes of a repeated movement that are over, once the first is."""
 
     def flaw(self, progress: Progress, now: Seconds) -> str:
         """Say what cannot be in what the body tells now; empty: nothing. now: loop time."""
         match progress:
             case Reached(sync=sync, at=at, arrived=arrived):
-                return self._untimely(sync, now, at, arrived) or self._unasked(sync) or self._passes(sync)
+                untimely = self._untimely(sync, now, at, arrived)
+                return untimely or (
+                    self._strikes(sync)
+                    if sync in self._later_strokes()
+                    else self._unasked(sync) or self._passes(sync)
+                )
             case Arrived(sync=sync, at=at):
                 return self._untimely(sync, now, at) or self._unpassed(sync)
             case Spoke(position=position, at=at):
@@ -58,6 +66,16 @@ class Told:
             if at < self._began - SKEW:
                 return f"{what!r} {self._began - at:.3f} s before the behavior began"
         return f"{what!r} before it had come there" if len(times) > 1 and times[1] > times[0] + SKEW else ""
+
+    def _later_strokes(self) -> list[str]:
+        """Name the points of a repeated movement that a body may tell of, or not."""
+        return [f"stroke:{number}" for number in range(2, self._strokes + 1)]
+
+    def _strikes(self, sync: str) -> str:
+        self._struck += 1
+        if sync == f"stroke:{self._struck}" and self._passed == self._points.index("stroke"):
+            return ""
+        return f"{sync!r} where it does not follow the stroke before it"
 
     def _unpassed(self, sync: str) -> str:
         if sync not in self._points:
