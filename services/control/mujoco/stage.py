@@ -73,8 +73,8 @@ class Stage:
     def suffer(self, on: Sequence[BodyFault]) -> None:
         """Take exactly these faults from now on."""
         self.pulse.step()
-        self.physics.suffer(faults.conditions(on, self.physics.motors, self.parts))
-        self.physics.noise = np.array(faults.noise(on, self.physics.joints, self.parts))
+        noise = faults.noise(on, self.physics.joints, self.parts)
+        self.physics.suffer(faults.conditions(on, self.physics.motors, self.parts), noise)
         self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
         self.pulse.wake()
 

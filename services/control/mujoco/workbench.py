@@ -27,7 +27,7 @@ class Workbench:
     def __init__(self, plan: Mapping[str, Radians], at: Seconds, seed: int = 0) -> None:
         table = tangram_table()
         self.model = mujoco.MjModel.from_xml_string(model.scene(table))
-        self.physics = Physics(self.model, model.MOTORS, at=at, seed=seed)
+        self.physics = Physics(self.model, model.MOTORS, LIMIT, at=at, seed=seed)
         self.physics.place({joint: plan[joint] for joint in self.physics.joints})
         self.measured: dict[str, Radians] = {}
         self.room = Room(self.physics)
@@ -60,8 +60,8 @@ class Workbench:
     def suffer(self, faults: Sequence[BodyFault]) -> None:
         """Take exactly these faults from now on."""
         physics = self.physics
-        physics.suffer(conditions(faults, physics.motors, PARTS))
-        physics.noise = np.array(noise(faults, physics.joints, PARTS))
+        told = noise(faults, physics.joints, PARTS)
+        physics.suffer(conditions(faults, physics.motors, PARTS), told)
         for box, place in obstacles(faults).items():
             physics.put(box, place)
         self._raise_table(table_rise(faults))
