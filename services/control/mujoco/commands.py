@@ -19,7 +19,7 @@ THERE = 1e-5
 
 
 class Commands:
-    """The commands of several servos. at: where each is told to be now, radians. rate: how fast that changes, rad/s."""
+    """Commands of several servos. at: where each is told to be now, radians. rate: how fast that changes, rad/s."""
 
     def __init__(self, speeds: Array, accelerations: Array) -> None:
         """speeds, accelerations: at most, of each joint, rad/s and rad/s^2."""

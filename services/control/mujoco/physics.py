@@ -1,7 +1,8 @@
 """Physics of a robot with position servos: the model, its motors, and what the encoders tell. Time is an argument.
 
-The servos get a position for each instant, and with it its rate of change; between two it is a straight line. That is
-the plan, or a way back to it (`commands`). What joints make of it is up to torque, inertia, gravity, friction, contact.
+The servos get a position for each instant, and with it its rate of change; between two it is a straight line. That
+is the plan, or a way back to it (`commands`). What joints make of it is up to torque, inertia, gravity, friction and
+contact.
 """
 
 import math
