@@ -67,7 +67,7 @@ class Physics:
         self.temperatures = np.full(len(motors), COLD)
         self._chance = np.random.default_rng(seed)
         self._error = np.zeros(len(motors))
-        self._offset = np.zeros(len(motors))
+        self._offset, self._corrected = np.zeros(len(motors)), np.zeros(len(motors))
         ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + joint) for joint in motors]
         self._q = np.array([model.jnt_qposadr[each] for each in ids], dtype=int)
         self._v = np.array([model.jnt_dofadr[each] for each in ids], dtype=int)
@@ -104,6 +104,12 @@ class Physics:
     def measured(self) -> Array:
         """Joint angles as the encoders tell them."""
         return self.angles + self._error + self._offset
+
+    @property
+    def beside(self) -> dict[str, Radians]:
+        """By how much the true angles are more than the measured ones, of joints of which they are not the same."""
+        by = zip(self.joints, (self.angles - self.measured).tolist(), strict=True)
+        return {joint: angle for joint, angle in by if abs(angle) > 1e-9}
 
     def told(self) -> Array:
         """Positions of the whole model, with joints where their encoders tell them."""
@@ -227,16 +233,32 @@ class Physics:
             self._stick[number] = condition.stiction
             if not condition.stiction:
                 self._bent[number] = self.data.qfrc_applied[self._v[number]] = 0.0
-            self._offset[number] = condition.offset
+            self._offset[number] = condition.offset + self._corrected[number]
             if condition.warm > self.temperatures[number]:
                 self.temperatures[number] = condition.warm
             elif condition.heating <= 1.0:
                 self.temperatures[number] = min(self.temperatures[number], COLD)
         self.model.dof_damping[self._v] = self._drag
         self.model.dof_frictionloss[self._v] = self._friction
+        self._heat(np.zeros(len(self.joints)), 0.0)
+        self._ease(changed)
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct what encoders tell, and servos believe, of some joints; that of others stays as it is.
+
+        offsets: by which a true angle is more than the encoder's.
+        """
+        before = self._corrected.copy()
+        for joint, offset in offsets.items():
+            number = self.joints.index(joint)
+            self._offset[number] += offset - self._corrected[number]
+            self._corrected[number] = offset
+        self._ease((np.abs(self._corrected - before) > 1e-12).tolist())
+
+    def _ease(self, changed: Sequence[bool]) -> None:
+        """Begin the commands of these joints anew from where their encoders tell them, with the weight they carry."""
         weight = (self.data.qfrc_bias - self.data.qfrc_gravcomp)[self._v]
         carried = np.clip(weight, -self._limit, self._limit) / self._stiffness
-        self._heat(np.zeros(len(self.joints)), 0.0)
         self.commands.ease(np.array(changed, dtype=bool), self.angles + self._offset + carried, self.speeds)
 
     def put(self, body: str, place: Vector) -> None:

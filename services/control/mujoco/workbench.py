@@ -52,6 +52,11 @@ class Workbench:
     def _reference(self, plan: Mapping[str, Radians]) -> Array:
         return np.array([plan[joint] for joint in self.physics.joints])
 
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct exactly these encoders by what a true angle is more than they tell."""
+        self.physics.calibrate({joint: offsets.get(joint, 0.0) for joint in self.physics.joints})
+        self._measure()
+
     def _measure(self) -> None:
         self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
 
