@@ -236,7 +236,7 @@ class ComposedBody(Body):
         return tuple(dict.fromkeys(fault for member in self._members for fault in member.body.faults))
 
     def switch_faults(self, faults: Sequence[BodyFault]) -> None:
-        whose: dict[str, list[BodyFault]] = {member.name: [] for member in self._members}
+        whose: dict[Member, list[BodyFault]] = {member: [] for member in self._members}
         for fault in faults:
             players = [member for member in self._members if member.plays(fault)]
             if not players:
@@ -246,12 +246,12 @@ class ComposedBody(Body):
                 )
                 raise InputRefused(Fault(reason=reason, where=where, service="control"))
             for member in players if not fault.part else players[:1]:
-                whose[member.name].append(fault)
+                whose[member].append(fault)
         before = [(member, member.body.faults) for member in self._members]
         try:
             for member in self._members:
                 if member.body.capabilities.faults:
-                    member.body.switch_faults(whose[member.name])
+                    member.body.switch_faults(whose[member])
         except InputRefused:
             for member, played in before:
                 if member.body.capabilities.faults:

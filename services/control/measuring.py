@@ -1,15 +1,17 @@
 """Measurements of where a body really looks and points: it does so at marks, and somebody says what it hit."""
 
-from collections.abc import Callable, Collection, Sequence
+import asyncio
+from collections.abc import AsyncGenerator, Awaitable, Callable, Collection, Sequence
 from contextlib import aclosing
 from math import degrees
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from engage_hri.schemas.behaviors import Gaze, Hand, Pointing
 from engage_hri.schemas.body import Ray
-from engage_hri.schemas.units import Meters, Vector
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import (
     Arrived,
@@ -18,8 +20,11 @@ from engage_hri.services.control.body import (
     BodyFailed,
     BodyState,
     MovementAuthority,
+    Progress,
 )
 from engage_hri.services.control.fitting import Measurement
+
+T = TypeVar("T")
 
 ON_TARGET = "stroke"
 """The last point that a look or a point may pass: it stands on its target from then on."""
@@ -30,6 +35,15 @@ COLUMNS: tuple[Meters, ...] = (-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45)
 ROWS: tuple[Meters, ...] = (0.38, 0.52, 0.66)
 FACES: tuple[Vector, ...] = ((1.3, -0.4, 1.2), (1.3, 0.0, 1.3), (1.3, 0.4, 1.2))
 OTHER_ROWS: tuple[Meters, ...] = (0.45, 0.59)
+PATIENCE: Seconds = 10.0
+"""Seconds that nothing may come of a look or a point, besides `SLOWEST` times what all of it takes."""
+SLOWEST = 30.0
+HOME: Seconds = 60.0
+"""Seconds in which a body comes home."""
+
+
+class Stuck(Exception):
+    """A look or a point that does not go on; the message says why it is believed to be."""
 
 
 class Eyes(Protocol):
@@ -71,19 +85,31 @@ async def measured(
 ) -> list[Measurement]:
     """Make the body look and point at all of the world that it can reach; returns where it really did.
 
-    parts: head, left_arm, right_arm. tell: told what could not be done.
+    parts: head, left_arm, right_arm. tell: told what could not be done. A part that gets stuck is measured no
+    further. Raises BodyFailed: it does not come home.
     """
     body.see(world)
     found: list[Measurement] = []
-    await body.home()
+    await _home(body)
     try:
         for part in parts:
-            for mark in world.objects:
-                measurement = await _one(body, world, part, mark, eyes, tell)
-                found += [measurement] if measurement is not None else []
+            try:
+                for mark in world.objects:
+                    measurement = await _one(body, world, part, mark, eyes, tell)
+                    found += [measurement] if measurement is not None else []
+            except Stuck as stuck:
+                tell(f"{stuck}; the {part} is measured no further")
     finally:
-        await body.home()
+        await _home(body)
     return found
+
+
+async def _home(body: Body) -> None:
+    try:
+        await _within(HOME, body.home())
+    except TimeoutError as late:
+        reason = f"it is not in its safe pose {HOME:g} s after it was told to go there"
+        raise BodyFailed(Fault(reason=reason, where="home", service="control")) from late
 
 
 async def _one(
@@ -92,12 +118,14 @@ async def _one(
     behavior: Gaze | Pointing = Gaze(id=f"look-{mark.id}", target=mark.id)
     if part != "head":
         behavior = Pointing(id=f"point-{mark.id}", target=mark.id, mode=HANDS[part])
-    if not body.estimate(behavior, None, world).feasible:
+    estimate = body.estimate(behavior, None, world)
+    if not estimate.feasible:
         return None
+    planned = sum(phase.natural for phase in estimate.phases)
     authority, found = MovementAuthority(behavior, ON_TARGET), None
     try:
         async with aclosing(body.perform(behavior, authority)) as stream:
-            async for progress in stream:
+            while (progress := await _next(stream, planned, f"{part} at {mark.id}")) is not None:
                 if isinstance(progress, Arrived):
                     state = body.state()
                     said = state.gaze if part == "head" else getattr(state, part)
@@ -108,3 +136,18 @@ async def _one(
     except (BehaviorRefused, BodyFailed) as error:
         tell(f"{part} at {mark.id}: {error}")
     return found
+
+
+async def _next(stream: AsyncGenerator[Progress, None], planned: Seconds, what: str) -> Progress | None:
+    """The next progress of a behavior; None: it is over. planned: seconds that it takes. Raises Stuck."""
+    limit = PATIENCE + SLOWEST * planned
+    try:
+        return await _within(limit, anext(stream, None))
+    except TimeoutError as late:
+        raise Stuck(f"{what}: nothing has come of it for {limit:.0f} s; {planned:.1f} s were planned") from late
+
+
+async def _within(seconds: Seconds, awaited: Awaitable[T]) -> T:
+    """Await something for some seconds at most. Raises TimeoutError."""
+    async with asyncio.timeout(seconds):
+        return await awaited

@@ -98,6 +98,14 @@ def test_a_line_that_is_no_measurement_is_named(engage: Engage, tmp_path: Path) 
     assert (result.code, result.err.strip()) == (3, f"{path}: no part was measured 3 times or more")
 
 
+def test_a_body_that_gets_stuck_ends_it_with_a_reason(engage: Engage, tmp_path: Path) -> None:
+    stuck = "control.variability.stall=[{part='right_arm',before='stroke'}]"
+    result = engage("calibrate", "body", "--part", "right_arm", "--set", stuck, "--out", tmp_path / "c.toml")
+
+    assert (result.code, result.err.strip()) == (3, "marks: no part was measured 3 times or more")
+    assert "nothing has come of it for" in result.out
+
+
 @pytest.mark.real_time
 async def test_who_sits_before_it_types_where_it_points(tmp_path: Path) -> None:
     world = tmp_path / "world.json"

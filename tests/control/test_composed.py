@@ -274,3 +274,26 @@ async def test_each_driver_moves_by_itself_what_it_has_here_and_no_more() -> Non
     assert idle.added == expected
     assert idle.added["jaw"] > 0.0
     assert idle.quick_at == min(face.body.idle().quick_at, rest.body.idle().quick_at)
+
+
+@pytest.mark.parametrize("names", [("A", "B"), ("simulated", "simulated")], ids=["two names", "one name"])
+async def test_a_fault_without_a_part_is_played_once_by_each_driver_that_can(names: tuple[str, str]) -> None:
+    """What counts is the driver, not how it was asked for: a body may be made of one kind of driver twice."""
+    head, arms = of("head", "face", "torso", name=names[0]), of("left_arm", "right_arm", name=names[1])
+    body, beside = composed([head, arms]), BodyFault(kind="miscalibrated", amount=4.0)
+    body.switch_faults((beside, BodyFault(kind="slow", part="right_arm", amount=2.0)))
+
+    assert head.body.faults == (beside,)
+    assert [fault.kind for fault in arms.body.faults] == ["miscalibrated", "slow"]
+    seen, believed = body.seen(), body.state()
+    assert seen is not None
+    assert seen.gaze is not None
+    assert believed.gaze is not None
+    cosine = sum(a * b for a, b in zip(seen.gaze.axis, believed.gaze.axis, strict=True))
+    alone = SimulatedBody()
+    alone.switch_faults((beside,))
+    told, state = alone.seen(), alone.state()
+    assert told is not None
+    assert told.gaze is not None
+    assert state.gaze is not None
+    assert cosine == pytest.approx(sum(a * b for a, b in zip(told.gaze.axis, state.gaze.axis, strict=True)))

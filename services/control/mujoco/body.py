@@ -19,10 +19,11 @@ from engage_hri.schemas.behaviors import BlockBehavior, Pointing
 from engage_hri.schemas.body import JointLimit, NoPointZone
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.extras import Seen
 from engage_hri.services.control.mujoco import along
 from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
@@ -32,7 +33,7 @@ from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.pulse import TICK, Pulse
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.workbench import Workbench
-from engage_hri.services.control.torso import homing, kinematics, tracks
+from engage_hri.services.control.torso import homing, kinematics, tracks, truth
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.course import CoursePoint
 from engage_hri.services.control.torso.files import repertoire_of
@@ -158,6 +159,18 @@ class MujocoBody(SimulatedBody):
         self.pulse.step()
         super().see(world)
         self.bench.room.lay(world)
+        self.pulse.wake()
+
+    # -- what it does not measure -------------------------------------------------------------------------------
+
+    def seen(self) -> Seen | None:
+        self.pulse.step()
+        return truth.seen(self._measured(), self.bench.physics.beside)
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        super().calibrate(offsets)
+        self.pulse.step()
+        self.bench.calibrate(offsets)
         self.pulse.wake()
 
     # -- faults -------------------------------------------------------------------------------------------------

@@ -47,9 +47,10 @@ class DescribedBody(ComposedBody):
         self._settings = settings or MujocoSettings()
         described, path = read(file)
         model, motors = _model(msgspec.json.encode(described), path)
-        physics = Physics(copy(model), motors, at=0.0, prefix=PREFIX, seed=self._settings.seed)
         ranges = {joint: tuple(model.joint(PREFIX + joint).range.tolist()) for joint in motors}
         limits = {name: limits_of(name, part, ranges) for name, part in described.parts.items()}
+        own = {limit.joint: limit for each in limits.values() for limit in each}
+        physics = Physics(copy(model), motors, own, at=0.0, prefix=PREFIX, seed=self._settings.seed)
         self.stage = Stage(described, physics, limits)
         physics.time = self.stage.pulse.now()
         self._limbs = _limbs(described, self.stage)

@@ -19,6 +19,7 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
 )
+from engage_hri.services.control.extras import Seen
 from engage_hri.services.control.mujoco.ik import ON_AXIS, Chain, Solution
 from engage_hri.services.control.mujoco.stage import Angles, Stage
 from engage_hri.services.control.ordinary import OrdinaryBody, Way
@@ -81,6 +82,20 @@ class Limb(OrdinaryBody):
     def state(self) -> BodyState:
         state = super().state()
         return replace(state, moving=state.moving or self.stage.is_moving(self.part))
+
+    def seen(self) -> Seen | None:
+        self.stage.pulse.step()
+        if self.stage.physics.beside.keys().isdisjoint(self.chain.joints):
+            return None
+        ray = self.chain.ray(self.stage.physics.data.qpos)
+        return Seen(gaze=ray) if self.part == "head" else Seen(**{self.part: ray})
+
+    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
+        angles = {each.joint: each.angle for each in pose.joints if each.joint in self.chain.joints}
+        return self.axis({**self.rest, **angles}) if part == self.part else None
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        self.stage.calibrate({joint: offsets.get(joint, 0.0) for joint in self.chain.joints})
 
     def axis(self, angles: Angles) -> Ray:
         """The axis of eyes or forearm at these angles, all other joints as they are."""

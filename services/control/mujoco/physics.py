@@ -1,18 +1,21 @@
 """Physics of a robot with position servos: the model, its motors, and what the encoders tell. Time is an argument.
 
-The servos get a planned position for each instant, and with it its rate of change; between two plans it is a straight
-line. What the joints make of it is up to torque, inertia, gravity, friction and contact.
+The servos get a position for each instant, and with it its rate of change; between two it is a straight line. That
+is the plan, or a way back to it (`commands`). What joints make of it is up to torque, inertia, gravity, friction and
+contact.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Radians, Seconds, Vector
+from engage_hri.services.control.mujoco.commands import Commands
 from engage_hri.services.control.mujoco.motors import COLD, WARM, Condition, Motor
 
 Array = NDArray[np.float64]
@@ -26,6 +29,8 @@ BEND: Radians = math.radians(0.15)
 """By which a sticky gear gives before it slips."""
 SLIPPING, SLIP_SPEED = 0.3, math.radians(3.0)
 """Share of the friction that is left while a sticky gear slips; rad/s from which on it does."""
+REACH, SPARE = 1.05, 0.002
+"""Distance from a joint to its command at most, as a share of what makes its motor give all it can; radians more."""
 STEPS_AT_ONCE = 50
 """Most steps in one call. A loop that was late catches up in several."""
 
@@ -41,24 +46,28 @@ class Contact(Struct, frozen=True):
 class Physics:
     """A model in motion. joints: those with a motor, in the order of all arrays here.
 
-    time: up to when it has been computed. noise: of each encoder, standard deviation in radians.
+    time: up to when it has been computed.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, motors: Mapping[str, Motor], *, at: Seconds, prefix: str = "", seed: int = 0
-    ) -> None:
-        """model: with a position servo for each joint in `motors`, named like it, both with the prefix."""
+        self, model: mujoco.MjModel, motors: Mapping[str, Motor], limits: Mapping[str, JointLimit], *, at: Seconds,
+        prefix: str = "", seed: int = 0,
+    ) -> None:  # fmt: skip
+        """model: with a position servo for each joint in `motors`, named like it, both with the prefix.
+
+        limits: of speed and acceleration of each of these joints, as commands keep them.
+        """
         self.model = model
         self.data = mujoco.MjData(model)
         self.joints = tuple(motors)
         self.motors = dict(motors)
         self.time = at
-        self.noise = np.zeros(len(motors))
+        self._noise = np.zeros(len(motors))
         self.conditions = {joint: Condition() for joint in motors}
         self.temperatures = np.full(len(motors), COLD)
         self._chance = np.random.default_rng(seed)
         self._error = np.zeros(len(motors))
-        self._offset = np.zeros(len(motors))
+        self._offset, self._corrected = np.zeros(len(motors)), np.zeros(len(motors))
         ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + joint) for joint in motors]
         self._q = np.array([model.jnt_qposadr[each] for each in ids], dtype=int)
         self._v = np.array([model.jnt_dofadr[each] for each in ids], dtype=int)
@@ -69,7 +78,11 @@ class Physics:
         self._limit = np.array([motor.limit for motor in motors.values()])
         self._stick, self._bent = np.zeros(len(motors)), np.zeros(len(motors))
         self._friction = np.array([motor.friction for motor in motors.values()])
-        self._reference = np.zeros(len(motors))
+        self._stiffness = np.array([motor.stiffness for motor in motors.values()])
+        own = [limits[joint] for joint in motors]
+        self.commands = Commands(
+            np.array([each.speed for each in own]), np.array([each.acceleration for each in own])
+        )
 
     # -- state --------------------------------------------------------------------------------------------------
 
@@ -77,7 +90,7 @@ class Physics:
         """Put joints where their encoders tell these angles, at once and at rest."""
         for joint, angle in angles.items():
             number = self.joints.index(joint)
-            self._reference[number] = angle
+            self.commands.put(number, angle)
             self.data.qpos[self._q[number]] = angle - self._offset[number]
             self.data.qvel[self._v[number]] = 0.0
         mujoco.mj_forward(self.model, self.data)
@@ -91,6 +104,12 @@ class Physics:
     def measured(self) -> Array:
         """Joint angles as the encoders tell them."""
         return self.angles + self._error + self._offset
+
+    @property
+    def beside(self) -> dict[str, Radians]:
+        """By how much the true angles are more than the measured ones, of joints of which they are not the same."""
+        by = zip(self.joints, (self.angles - self.measured).tolist(), strict=True)
+        return {joint: angle for joint, angle in by if abs(angle) > 1e-9}
 
     def told(self) -> Array:
         """Positions of the whole model, with joints where their encoders tell them."""
@@ -114,12 +133,9 @@ class Physics:
 
     def is_at_rest(self, reference: Array) -> bool:
         """True if nothing moves, and the plan does not, either."""
-        if (
-            np.max(np.abs(reference - self._reference), initial=0.0) > 1e-9
-            or np.max(np.abs(self.speeds), initial=0.0) > STILL
-        ):
+        if not self.commands.is_at_rest(reference) or np.max(np.abs(self.speeds), initial=0.0) > STILL:
             return False
-        hot = any(each.heating > 1.0 for each in self.conditions.values())
+        hot = bool((self.temperatures > WARM).any()) or any(each.heating > 1.0 for each in self.conditions.values())
         return not hot and float(np.max(np.abs(self.data.qvel), initial=0.0)) < 0.02
 
     def contacts(self) -> list[Contact]:
@@ -159,19 +175,21 @@ class Physics:
         if count <= 0:
             return True
         steps = min(count, STEPS_AT_ONCE)
-        slope = (reference - self._reference) / (count * step)
-        before, squares = self._reference, np.zeros(len(self.joints))
-        servo = before - self._offset  # a servo believes its encoder
+        reach = REACH * self._limit / self._stiffness + SPARE
+        angles, squares = self.angles + self._offset, np.zeros(len(self.joints))  # a servo believes its encoder
+        if steps < count:  # the rest in further calls
+            reference = self.commands.plan + (reference - self.commands.plan) * (steps / count)
+        start, slope = self.commands.advance(reference, steps * step, angles, self.speeds, reach)
+        servo = start - self._offset
         for number in range(1, steps + 1):
             self.data.ctrl[self._u] = servo + slope * (number * step) + self._lead * slope
             self._stick_or_slip(step)
             mujoco.mj_step(self.model, self.data)
             squares += self.torques**2
-        self._reference = before + slope * (steps * step)
         self.time += steps * step
         self._heat(squares / steps, steps * step)
-        if self.noise.any():
-            self._error = self.noise * self._chance.standard_normal(len(self.joints))
+        if self._noise.any():
+            self._error = self._noise * self._chance.standard_normal(len(self.joints))
         return steps == count
 
     def _stick_or_slip(self, step: Seconds) -> None:
@@ -201,8 +219,13 @@ class Physics:
 
     # -- faults -------------------------------------------------------------------------------------------------
 
-    def suffer(self, conditions: Mapping[str, Condition]) -> None:
-        """Put motors and gears into these conditions; those of the others are as new."""
+    def suffer(self, conditions: Mapping[str, Condition], noise: Sequence[Radians]) -> None:
+        """Put motors and gears into these conditions; those of the others are as new.
+
+        noise: of each encoder from the next step on, standard deviation.
+        """
+        self._noise, self._error = np.array(noise), np.zeros(len(self.joints))
+        changed = [self.conditions[joint] != conditions.get(joint, Condition()) for joint in self.joints]
         for number, (joint, motor) in enumerate(self.motors.items()):
             condition = self.conditions[joint] = conditions.get(joint, Condition())
             self._drag[number] = motor.drag + condition.drag
@@ -210,7 +233,7 @@ class Physics:
             self._stick[number] = condition.stiction
             if not condition.stiction:
                 self._bent[number] = self.data.qfrc_applied[self._v[number]] = 0.0
-            self._offset[number] = condition.offset
+            self._offset[number] = condition.offset + self._corrected[number]
             if condition.warm > self.temperatures[number]:
                 self.temperatures[number] = condition.warm
             elif condition.heating <= 1.0:
@@ -218,6 +241,25 @@ class Physics:
         self.model.dof_damping[self._v] = self._drag
         self.model.dof_frictionloss[self._v] = self._friction
         self._heat(np.zeros(len(self.joints)), 0.0)
+        self._ease(changed)
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct what encoders tell, and servos believe, of some joints; that of others stays as it is.
+
+        offsets: by which a true angle is more than the encoder's.
+        """
+        before = self._corrected.copy()
+        for joint, offset in offsets.items():
+            number = self.joints.index(joint)
+            self._offset[number] += offset - self._corrected[number]
+            self._corrected[number] = offset
+        self._ease((np.abs(self._corrected - before) > 1e-12).tolist())
+
+    def _ease(self, changed: Sequence[bool]) -> None:
+        """Begin the commands of these joints anew from where their encoders tell them, with the weight they carry."""
+        weight = (self.data.qfrc_bias - self.data.qfrc_gravcomp)[self._v]
+        carried = np.clip(weight, -self._limit, self._limit) / self._stiffness
+        self.commands.ease(np.array(changed, dtype=bool), self.angles + self._offset + carried, self.speeds)
 
     def put(self, body: str, place: Vector) -> None:
         """Put a body that nothing moves (`mocap`) somewhere else."""

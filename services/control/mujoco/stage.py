@@ -70,12 +70,19 @@ class Stage:
         """The model as the encoders tell it."""
         return self.physics.told()
 
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct what these encoders tell by what a true angle is more."""
+        self.pulse.step()
+        self.physics.calibrate(offsets)
+        self._measure()
+        self.pulse.wake()
+
     def suffer(self, on: Sequence[BodyFault]) -> None:
         """Take exactly these faults from now on."""
         self.pulse.step()
-        self.physics.suffer(faults.conditions(on, self.physics.motors, self.parts))
-        self.physics.noise = np.array(faults.noise(on, self.physics.joints, self.parts))
-        self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
+        noise = faults.noise(on, self.physics.joints, self.parts)
+        self.physics.suffer(faults.conditions(on, self.physics.motors, self.parts), noise)
+        self._measure()
         self.pulse.wake()
 
     def suspicion(self, joint: str) -> str:
@@ -93,8 +100,11 @@ class Stage:
 
     def _step(self, now: Seconds) -> bool:
         is_done = self.physics.advance(now, self._reference(now))
-        self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
+        self._measure()
         return is_done
+
+    def _measure(self) -> None:
+        self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
 
     def _is_at_rest(self, now: Seconds) -> bool:
         is_planned = any(now < motion.end for motion in self._motions.values())

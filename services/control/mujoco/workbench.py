@@ -27,7 +27,7 @@ class Workbench:
     def __init__(self, plan: Mapping[str, Radians], at: Seconds, seed: int = 0) -> None:
         table = tangram_table()
         self.model = mujoco.MjModel.from_xml_string(model.scene(table))
-        self.physics = Physics(self.model, model.MOTORS, at=at, seed=seed)
+        self.physics = Physics(self.model, model.MOTORS, LIMIT, at=at, seed=seed)
         self.physics.place({joint: plan[joint] for joint in self.physics.joints})
         self.measured: dict[str, Radians] = {}
         self.room = Room(self.physics)
@@ -52,6 +52,11 @@ class Workbench:
     def _reference(self, plan: Mapping[str, Radians]) -> Array:
         return np.array([plan[joint] for joint in self.physics.joints])
 
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct exactly these encoders by what a true angle is more than they tell."""
+        self.physics.calibrate({joint: offsets.get(joint, 0.0) for joint in self.physics.joints})
+        self._measure()
+
     def _measure(self) -> None:
         self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
 
@@ -60,8 +65,8 @@ class Workbench:
     def suffer(self, faults: Sequence[BodyFault]) -> None:
         """Take exactly these faults from now on."""
         physics = self.physics
-        physics.suffer(conditions(faults, physics.motors, PARTS))
-        physics.noise = np.array(noise(faults, physics.joints, PARTS))
+        told = noise(faults, physics.joints, PARTS)
+        physics.suffer(conditions(faults, physics.motors, PARTS), told)
         for box, place in obstacles(faults).items():
             physics.put(box, place)
         self._raise_table(table_rise(faults))

@@ -34,7 +34,7 @@ def model() -> object:
 
 
 def test_the_model_has_eyes_and_hands_where_the_kinematics_has_them():
-    physics, chance = Physics(model(), MOTORS, at=0.0), np.random.default_rng(0)
+    physics, chance = Physics(model(), MOTORS, kinematics.LIMIT, at=0.0), np.random.default_rng(0)
     for _ in range(20):
         angles = {j: float(chance.uniform(kinematics.LIMIT[j].low, kinematics.LIMIT[j].high)) for j in MOTORS}
         physics.place(angles)
