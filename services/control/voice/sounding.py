@@ -8,6 +8,7 @@ import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from math import inf
 from typing import Any, ClassVar
 
 from msgspec.structs import replace
@@ -15,6 +16,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     BehaviorRefused,
@@ -32,7 +34,7 @@ from engage_hri.services.control.voice.phrases import Piece, pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.speaker import Speaker, speech
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
-from engage_hri.services.control.voice.studio import LONGEST, Studio
+from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.wav import WavFile
@@ -56,7 +58,8 @@ class SoundingVoice(Speaker):
         self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",))
         self._loop = asyncio.get_running_loop()
         takes = self.synthesizer.Settings is not None
-        self._studio = Studio(self.synthesizer, self._settings if takes else None)
+        self._studio = Studio(self.synthesizer, self._settings if takes else None, self._settings.phrase_limit)
+        self._studio.on_fault = lambda fault: self.on_fault(fault)
         self._outlet: Outlet = Nowhere(self._loop.time)
         self._player: player.Player | None = None
         self._pace = 1.0
@@ -67,6 +70,11 @@ class SoundingVoice(Speaker):
         """True if loop time is real time: in virtual time nobody waits by the clock, and nothing is played."""
         return abs(self._loop.time() - time.monotonic()) < 1.0
 
+    @property
+    def _wait(self) -> Seconds:
+        """Seconds by the clock for which the loop may stand still for a phrase."""
+        return 0.0 if self._is_real else inf
+
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
         async with AsyncExitStack() as stack:
@@ -76,7 +84,7 @@ class SoundingVoice(Speaker):
                     self._studio.listen(self._loop)
                     await self._studio.made()
                 else:
-                    self._studio.make(LONGEST)
+                    self._studio.make(2 * MAKING)
             except SynthesisFailed as error:
                 raise InputRefused(error.fault) from error
             outlets: list[Outlet] = []
@@ -119,7 +127,7 @@ class SoundingVoice(Speaker):
         found = pieces(behavior, self._settings.language)
         if not found:
             return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
-        self._studio.ask([piece.phrase for piece in found], 0.0 if self._is_real else LONGEST)
+        self._studio.ask([piece.phrase for piece in found], self._wait)
         try:
             parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
         except SynthesisFailed as error:
@@ -160,7 +168,7 @@ class SoundingVoice(Speaker):
     def parts_of(self, behavior: Speech) -> Sequence[Piece]:
         """Cut a speech into phrases, and have them synthesized."""
         found = pieces(behavior, self._settings.language)
-        self._studio.ask([piece.phrase for piece in found], 0.0 if self._is_real else LONGEST)
+        self._studio.ask([piece.phrase for piece in found], self._wait, first=True)
         return found
 
 
@@ -185,7 +193,7 @@ class _Phrases(Parts):
         voice, piece = self._voice, self._pieces[number]
         try:
             if (part := voice._part(piece)) is None:
-                voice._studio.ask([piece.phrase], 0.0 if voice._is_real else LONGEST)
+                voice._studio.ask([piece.phrase], voice._wait, first=True)
                 part = voice._part(piece)
             return part
         except SynthesisFailed as error:
