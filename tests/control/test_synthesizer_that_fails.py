@@ -9,6 +9,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.world import World
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, MovementAuthority, Spoke
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
@@ -114,3 +115,15 @@ async def test_a_text_that_kills_it_twice_in_a_row_is_refused_for_a_while(
             await said(voice, "it dies")
 
     assert len(faults) == 3
+
+
+@pytest.mark.parametrize("text", ["there is nothing", "all silence"])
+async def test_words_of_which_nothing_is_heard_are_not_told_as_spoken(text: str, tmp_path: Path) -> None:
+    voice = ill(tmp_path)
+    async with voice.connected():
+        estimate = voice.estimate(Speech(id="s", text=text), None, World(entities=()))
+        with pytest.raises(BehaviorRefused, match=f"Ill makes no sound of '{text}'"):
+            await said(voice, text)
+        assert await said(voice, "… 😊 …") == []  # nothing that could be heard
+
+    assert not estimate.feasible
