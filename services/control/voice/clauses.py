@@ -46,7 +46,7 @@ class Clause(Struct, frozen=True):
 
 
 def clause(synthesizer: Synthesizer, phrase: Phrase) -> Clause:
-    """Synthesize and lay out a phrase. Raises SynthesisFailed, also for what is no sound, and for words in silence."""
+    """Synthesize and lay out a phrase. Raises SynthesisFailed, also for what is no sound, and for silent words."""
     made = laid_out(phrase.text, synthesizer.say(phrase), synthesizer.rate)
     if any(token.letters for token in tokens(phrase.text)) and not _is_heard(made.samples):
         language = f" in the language {phrase.language!r}" if phrase.language else ""

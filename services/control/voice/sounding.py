@@ -8,6 +8,7 @@ import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from functools import partial
 from math import inf
 from typing import Any, ClassVar
 
@@ -62,6 +63,7 @@ class SoundingVoice(Speaker):
         self._studio.on_fault = lambda fault: self.on_fault(fault)
         self._outlet: Outlet = Nowhere(self._loop.time)
         self._player: player.Player | None = None
+        self._wav: WavFile | None = None
         self._pace = 1.0
         """How much longer this voice takes than the model of `timeline`, from what it has said so far."""
 
@@ -88,14 +90,17 @@ class SoundingVoice(Speaker):
             except SynthesisFailed as error:
                 raise InputRefused(error.fault) from error
             outlets: list[Outlet] = []
-            if self._settings.file:
-                outlets.append(stack.enter_context(self._file()))
             program = player.found(self._settings) if self._is_real else None
             if program is not None:
                 self._player = player.Player(program, self._studio.rate)
                 await stack.enter_async_context(self._player.connected())
                 outlets.append(self._player)
-                stack.callback(self._player.watch(self._tell_fault))
+            if self._settings.file:
+                self._wav = stack.enter_context(self._file())
+                outlets.append(self._wav)
+            for each in outlets:
+                stack.callback(each.watch(partial(self._tell_fault, each)))
+                self._tell_fault(each)
             if outlets:
                 self._outlet = Several(outlets)
             yield
@@ -108,9 +113,9 @@ class SoundingVoice(Speaker):
             advice = "it is the `file` of the voice; a relative path counts from the folder of the process"
             raise RunFailed(Fault(reason=error.strerror or str(error), where=name, advice=advice)) from error
 
-    def _tell_fault(self) -> None:
-        if self._player is not None and self._player.fault is not None:
-            self.on_fault(self._player.fault)
+    def _tell_fault(self, outlet: Outlet) -> None:
+        if outlet.fault is not None:
+            self.on_fault(outlet.fault)
 
     # -- planning -----------------------------------------------------------------------------------------------
 
@@ -155,6 +160,8 @@ class SoundingVoice(Speaker):
             await self._player.revive()
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
+        if self._wav is not None:
+            self._wav.revive()
         parts = _Phrases(behavior, self)
         if (refused := parts.refused()) is not None:
             raise BehaviorRefused(replace(refused, where=behavior.id))
@@ -208,7 +215,3 @@ class EspeakVoice(SoundingVoice):
     """The voice `espeak`: eSpeak NG, with sound on a device, in a file, or nowhere."""
 
     name, synthesizer, Settings = "espeak", EspeakSynthesizer, EspeakSettings
-
-
-def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
-    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
