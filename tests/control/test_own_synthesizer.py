@@ -68,7 +68,7 @@ class Waiting(Synthesizer):
     def say(self, phrase):
         while not os.path.exists({file!r}):
             time.sleep(0.01)
-        return Said(bytes(2 * 3 * 16000))
+        return Said([0.5, -0.5] * (3 * 8000))
 
 class Voice(SoundingVoice):
     name, synthesizer, Settings = "waiting", Waiting, VoiceSettings

@@ -25,6 +25,8 @@ SETTLED: Seconds = 0.03
 """Silence before a word from which on the word begins where it is heard, and not where the engine says."""
 MARGIN: Seconds = 0.005
 """Silence that is left before and after the sound."""
+SILENT = 33
+"""Samples none of which is larger are no speech: -60 dB of the largest there can be, as noise of a converter is."""
 
 
 class Clause(Struct, frozen=True):
@@ -44,8 +46,19 @@ class Clause(Struct, frozen=True):
 
 
 def clause(synthesizer: Synthesizer, phrase: Phrase) -> Clause:
-    """Synthesize and lay out a phrase. Raises SynthesisFailed, also for what is no sound."""
-    return laid_out(phrase.text, synthesizer.say(phrase), synthesizer.rate)
+    """Synthesize and lay out a phrase. Raises SynthesisFailed, also for what is no sound, and for silent words."""
+    made = laid_out(phrase.text, synthesizer.say(phrase), synthesizer.rate)
+    if any(token.letters for token in tokens(phrase.text)) and not _is_heard(made.samples):
+        language = f" in the language {phrase.language!r}" if phrase.language else ""
+        raise refused(
+            f"{type(synthesizer).__name__} makes no sound of {phrase.text.strip()!r}{language}",
+            "does the engine read this script, and is it loud enough?",
+        )
+    return made
+
+
+def _is_heard(samples: bytes) -> bool:
+    return bool(samples) and int(np.abs(np.frombuffer(samples, "<i2").astype(np.int32)).max()) > SILENT
 
 
 def laid_out(text: str, said: Said, rate: int) -> Clause:

@@ -93,7 +93,6 @@ class EspeakSynthesizer(Synthesizer):
         self._words: list[tuple[int, int]] = []
         self._phones: list[tuple[str, int]] = []
         self._callback = _Callback(self._take)
-        self._library.espeak_SetSynthCallback(self._callback)
         self._language = ""
         self._speak_as(settings.language)
 
@@ -102,6 +101,7 @@ class EspeakSynthesizer(Synthesizer):
         self._sound, self._words, self._phones = bytearray(), [], []
         text, places = ssml(phrase) if phrase.prosody else (phrase.text, range(len(phrase.text)))
         data = text.encode("utf-8", "replace") + b"\0"
+        self._library.espeak_SetSynthCallback(self._callback)  # another one in this process may have been there
         flags = _UTF8 | (_SSML if phrase.prosody else 0)
         if self._library.espeak_Synth(data, len(data), 0, 1, 0, flags, None, None) != 0:
             raise refused("eSpeak NG has refused the text")

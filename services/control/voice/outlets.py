@@ -58,9 +58,13 @@ class Nowhere:
 
 
 class Several:
-    """Several outlets as one: sound is heard at the same time in each."""
+    """Several outlets as one: sound is heard at the same time in each.
+
+    The first is what people hear: its fault is that of all. Another one that fails is missing, and says so itself.
+    """
 
     def __init__(self, outlets: Sequence[Outlet]) -> None:
+        """Join outlets, at least one."""
         self._outlets = outlets
 
     @property
@@ -69,7 +73,7 @@ class Several:
 
     @property
     def fault(self) -> Fault | None:
-        return next((each.fault for each in self._outlets if each.fault is not None), None)
+        return self._outlets[0].fault
 
     def earliest(self) -> Seconds:
         return max(each.earliest() for each in self._outlets)

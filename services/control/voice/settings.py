@@ -17,6 +17,8 @@ class VoiceSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     language: a tag such as `de`, where the text does not name its language (`xml:lang`); empty: the voice's own.
     patience: seconds that a plan may wait for a phrase that was never said before. What is not there by then is
         estimated from its length.
+    phrase_limit: seconds that the synthesizer may take for one phrase of at most some 240 characters. One that takes
+        longer is ended, and the speech that waits for it fails; the next speech has another one.
     """
 
     device: str = "auto"
@@ -25,9 +27,12 @@ class VoiceSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     file: str = ""
     language: str = ""
     patience: Seconds = 0.1
+    phrase_limit: Seconds = 5.0
 
     def __post_init__(self) -> None:
         if self.latency is not None and not 0.0 <= self.latency <= 1.0:
             raise ValueError(f"latency is {self.latency}: expected 0..1 s")
         if not 0.0 <= self.patience <= 5.0:
             raise ValueError(f"patience is {self.patience}: expected 0..5 s")
+        if not 0.1 <= self.phrase_limit <= 60.0:
+            raise ValueError(f"phrase_limit is {self.phrase_limit}: expected 0.1..60 s")

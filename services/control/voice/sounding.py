@@ -8,6 +8,8 @@ import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from functools import partial
+from math import inf
 from typing import Any, ClassVar
 
 from msgspec.structs import replace
@@ -15,6 +17,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     BehaviorRefused,
@@ -32,7 +35,7 @@ from engage_hri.services.control.voice.phrases import Piece, pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.speaker import Speaker, speech
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
-from engage_hri.services.control.voice.studio import LONGEST, Studio
+from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.control.voice.wav import WavFile
@@ -56,9 +59,11 @@ class SoundingVoice(Speaker):
         self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",))
         self._loop = asyncio.get_running_loop()
         takes = self.synthesizer.Settings is not None
-        self._studio = Studio(self.synthesizer, self._settings if takes else None)
+        self._studio = Studio(self.synthesizer, self._settings if takes else None, self._settings.phrase_limit)
+        self._studio.on_fault = lambda fault: self.on_fault(fault)
         self._outlet: Outlet = Nowhere(self._loop.time)
         self._player: player.Player | None = None
+        self._wav: WavFile | None = None
         self._pace = 1.0
         """How much longer this voice takes than the model of `timeline`, from what it has said so far."""
 
@@ -66,6 +71,11 @@ class SoundingVoice(Speaker):
     def _is_real(self) -> bool:
         """True if loop time is real time: in virtual time nobody waits by the clock, and nothing is played."""
         return abs(self._loop.time() - time.monotonic()) < 1.0
+
+    @property
+    def _wait(self) -> Seconds:
+        """Seconds by the clock for which the loop may stand still for a phrase."""
+        return 0.0 if self._is_real else inf
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
@@ -76,18 +86,21 @@ class SoundingVoice(Speaker):
                     self._studio.listen(self._loop)
                     await self._studio.made()
                 else:
-                    self._studio.make(LONGEST)
+                    self._studio.make(2 * MAKING)
             except SynthesisFailed as error:
                 raise InputRefused(error.fault) from error
             outlets: list[Outlet] = []
-            if self._settings.file:
-                outlets.append(stack.enter_context(self._file()))
             program = player.found(self._settings) if self._is_real else None
             if program is not None:
                 self._player = player.Player(program, self._studio.rate)
                 await stack.enter_async_context(self._player.connected())
                 outlets.append(self._player)
-                stack.callback(self._player.watch(self._tell_fault))
+            if self._settings.file:
+                self._wav = stack.enter_context(self._file())
+                outlets.append(self._wav)
+            for each in outlets:
+                stack.callback(each.watch(partial(self._tell_fault, each)))
+                self._tell_fault(each)
             if outlets:
                 self._outlet = Several(outlets)
             yield
@@ -100,9 +113,9 @@ class SoundingVoice(Speaker):
             advice = "it is the `file` of the voice; a relative path counts from the folder of the process"
             raise RunFailed(Fault(reason=error.strerror or str(error), where=name, advice=advice)) from error
 
-    def _tell_fault(self) -> None:
-        if self._player is not None and self._player.fault is not None:
-            self.on_fault(self._player.fault)
+    def _tell_fault(self, outlet: Outlet) -> None:
+        if outlet.fault is not None:
+            self.on_fault(outlet.fault)
 
     # -- planning -----------------------------------------------------------------------------------------------
 
@@ -119,7 +132,7 @@ class SoundingVoice(Speaker):
         found = pieces(behavior, self._settings.language)
         if not found:
             return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
-        self._studio.ask([piece.phrase for piece in found], 0.0 if self._is_real else LONGEST)
+        self._studio.ask([piece.phrase for piece in found], self._wait)
         try:
             parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
         except SynthesisFailed as error:
@@ -147,6 +160,8 @@ class SoundingVoice(Speaker):
             await self._player.revive()
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
+        if self._wav is not None:
+            self._wav.revive()
         parts = _Phrases(behavior, self)
         if (refused := parts.refused()) is not None:
             raise BehaviorRefused(replace(refused, where=behavior.id))
@@ -160,7 +175,7 @@ class SoundingVoice(Speaker):
     def parts_of(self, behavior: Speech) -> Sequence[Piece]:
         """Cut a speech into phrases, and have them synthesized."""
         found = pieces(behavior, self._settings.language)
-        self._studio.ask([piece.phrase for piece in found], 0.0 if self._is_real else LONGEST)
+        self._studio.ask([piece.phrase for piece in found], self._wait, first=True)
         return found
 
 
@@ -185,7 +200,7 @@ class _Phrases(Parts):
         voice, piece = self._voice, self._pieces[number]
         try:
             if (part := voice._part(piece)) is None:
-                voice._studio.ask([piece.phrase], 0.0 if voice._is_real else LONGEST)
+                voice._studio.ask([piece.phrase], voice._wait, first=True)
                 part = voice._part(piece)
             return part
         except SynthesisFailed as error:
@@ -200,7 +215,3 @@ class EspeakVoice(SoundingVoice):
     """The voice `espeak`: eSpeak NG, with sound on a device, in a file, or nowhere."""
 
     name, synthesizer, Settings = "espeak", EspeakSynthesizer, EspeakSettings
-
-
-def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
-    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")

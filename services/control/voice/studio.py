@@ -2,6 +2,9 @@
 
 Where time is real the loop does not stand still for them: before a new text is estimated, a tenth of a second may go
 by, in which other work goes on. What is not there by then comes later; whoever needs it waits for it.
+
+A synthesizer that freezes is ended after `limit`, and another one is started. A text at which one died is tried once
+more at once; what fails then is refused for a while, and not for ever: it may have died of something else.
 """
 
 import asyncio
@@ -12,11 +15,12 @@ import sys
 import time
 import weakref
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
 import msgspec
+from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
@@ -27,8 +31,16 @@ from engage_hri.services.control.waiting import Bell
 
 LARGEST = 64 * 2**20
 """Bytes of sound that are kept: some 25 minutes."""
-LONGEST: Seconds = 30.0
-"""Seconds after which a synthesizer that does not answer is ended."""
+LIMIT: Seconds = 5.0
+"""Seconds that one phrase may take; see `VoiceSettings.phrase_limit`."""
+MAKING: Seconds = 30.0
+"""Seconds that a synthesizer may take until it is made: it may have a model to load."""
+AGAIN: Seconds = 60.0
+"""Seconds for which a text is refused that could not be said, before it is tried again."""
+NEWS: Seconds = 1.0
+"""Seconds for which a text is refused at which a synthesizer froze once: whoever waits for it is to hear of it."""
+MOST_DEATHS = 1000
+"""Texts of which it is remembered that a process died at them."""
 _STEP = 65536
 
 
@@ -42,13 +54,23 @@ class _Asked(NamedTuple):
     at: Seconds
 
 
+class _Refused(NamedTuple):
+    """What came of a phrase that cannot be said. until: on the clock; from then on it is tried again when asked."""
+
+    fault: Fault
+    until: Seconds
+
+
 class Studio:
     """A synthesizer in a process of its own. It is started when it is first asked, and ends with this object.
 
-    rate: samples per second; 0: not known yet.
+    rate: samples per second; 0: not known yet. on_fault: called when the process is lost.
     """
 
-    def __init__(self, synthesizer: type[Synthesizer], settings: msgspec.Struct | None) -> None:
+    def __init__(
+        self, synthesizer: type[Synthesizer], settings: msgspec.Struct | None, limit: Seconds = LIMIT
+    ) -> None:
+        """Start nothing yet. settings: of the synthesizer; None: it takes none. limit: seconds for one phrase."""
         module = sys.modules.get(synthesizer.__module__)
         self._order = Order(
             synthesizer.__module__,
@@ -57,11 +79,16 @@ class Studio:
             b"" if settings is None else msgspec.json.encode(settings),
         )
         self.rate = 0
-        self._known: OrderedDict[Phrase, Clause | Fault] = OrderedDict()
+        self.on_fault: Callable[[Fault], None] = lambda fault: None
+        self._limit = limit
+        self._known: OrderedDict[Phrase, Clause | _Refused] = OrderedDict()
         self._size = 0
         self._line: OrderedDict[Phrase, None] = OrderedDict()
         self._asked: _Asked | None = None
-        self._broken: Fault | None = None
+        self._died_at: OrderedDict[Phrase | None, None] = OrderedDict()
+        """What a process was asked when it died, and has not done since. None: to make the synthesizer."""
+        self._broken: _Refused | None = None
+        self._timer: asyncio.TimerHandle | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._end: weakref.finalize[..., Studio] | None = None
         self._buffer = bytearray()
@@ -71,8 +98,8 @@ class Studio:
     def known(self, phrase: Phrase) -> Clause | None:
         """The sound of a phrase, if it is there. Raises SynthesisFailed: it cannot be said."""
         found = self._known.get(phrase)
-        if isinstance(found, Fault):
-            raise SynthesisFailed(found)
+        if isinstance(found, _Refused):
+            raise SynthesisFailed(found.fault)
         if found is not None:
             self._known.move_to_end(phrase)
         return found
@@ -88,23 +115,26 @@ class Studio:
         finally:
             self._bells.remove(bell)
 
-    def ask(self, phrases: Sequence[Phrase], wait: Seconds) -> bool:
+    def ask(self, phrases: Sequence[Phrase], wait: Seconds, *, first: bool = False) -> bool:
         """Ask for phrases to be synthesized, in this order, and wait until they are there or the time is over.
 
-        phrases: those that are known cost nothing. wait: seconds by the clock, in which the loop stands still.
+        phrases: those that are known cost nothing. wait: seconds by the clock, in which the loop stands still; inf:
+        until all are there or refused. first: before all others that are asked for.
 
         Returns whether all are there.
         """
-        self._line.update(dict.fromkeys(phrase for phrase in phrases if phrase not in self._known))
+        self._forget_refusals(phrases)
+        wanted = [phrase for phrase in phrases if phrase not in self._known]
+        self._line.update(dict.fromkeys(wanted))
+        for phrase in reversed(wanted) if first else ():
+            self._line.move_to_end(phrase, last=False)
         deadline = time.monotonic() + wait
         while True:
             self._go_on()
             if all(phrase in self._known for phrase in phrases):
                 return True
-            left = deadline - time.monotonic()
-            if left <= 0.0 or self._process is None or self._process.stdout is None:
+            if not self._waited(deadline):
                 return False
-            select.select([self._process.stdout], [], [], min(left, 1.0))
 
     def make(self, wait: Seconds) -> bool:
         """Start the process, and wait until the synthesizer is there or the time is over. Raises SynthesisFailed."""
@@ -112,11 +142,9 @@ class Studio:
         while not self.rate:
             self._go_on()
             if self._broken is not None:
-                raise SynthesisFailed(self._broken)
-            left = deadline - time.monotonic()
-            if self.rate or left <= 0.0 or self._process is None or self._process.stdout is None:
+                raise SynthesisFailed(self._broken.fault)
+            if self.rate or not self._waited(deadline):
                 break
-            select.select([self._process.stdout], [], [], min(left, 1.0))
         return bool(self.rate)
 
     async def made(self) -> None:
@@ -134,6 +162,7 @@ class Studio:
         self._listens = loop
         if self._process is not None and self._process.stdout is not None:
             loop.add_reader(self._process.stdout.fileno(), self._go_on)
+            self._expect(self._asked)
 
     def watch(self, bell: Bell) -> None:
         """Ring a bell at each answer, until `unwatch`."""
@@ -149,23 +178,67 @@ class Studio:
         if process is not None and process.stdout is not None and self._listens is not None:
             with suppress(RuntimeError):  # the loop is closed
                 self._listens.remove_reader(process.stdout.fileno())
-        self.rate, self._asked, self._buffer = 0, None, bytearray()
+        self.rate, self._buffer = 0, bytearray()
+        self._expect(None)
         if self._end is not None:
             self._end()
 
     # -- the process --------------------------------------------------------------------------------------------
 
     def _go_on(self) -> None:
-        """Take what has come, and ask for the next phrase."""
+        """Take what has come, end what takes too long, and ask for the next phrase."""
         self._take()
-        if self._asked is not None and time.monotonic() - self._asked.at > LONGEST:
-            self._lose(f"the synthesizer does not answer for {LONGEST:.0f} s")
+        if self._asked is not None and self._left(self._asked) <= 0.0:
+            seconds = time.monotonic() - self._asked.at
+            self._lose(f"the synthesizer does not answer for {seconds:.1f} s", is_frozen=True)
+        if self._broken is not None and time.monotonic() >= self._broken.until:
+            self._broken = None
+        if self._broken is not None:
+            self._refuse_all(self._broken)
         while self._line and next(iter(self._line)) in self._known:
             self._line.popitem(last=False)
         if self._process is None and self._broken is None:
             self._start()
         if self.rate and self._asked is None and self._line:
             self._send(next(iter(self._line)))
+
+    def _look_again(self) -> None:
+        self._timer = None
+        self._go_on()
+
+    def _left(self, asked: _Asked) -> Seconds:
+        """Seconds that the process still has for what it was asked."""
+        return asked.at + (self._limit if asked.phrase is not None else max(MAKING, self._limit)) - time.monotonic()
+
+    def _expect(self, asked: _Asked | None) -> None:
+        """Take note of what the process works on, and look again when it is late."""
+        self._asked = asked
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if asked is not None and self._listens is not None:
+            self._timer = self._listens.call_later(max(0.0, self._left(asked)), self._look_again)
+
+    def _waited(self, deadline: Seconds) -> bool:
+        """Let the loop stand still until there is something to take, or some time has passed.
+
+        Returns whether it is worth looking again: an answer may come, and the clock is before `deadline`.
+        """
+        left = deadline - time.monotonic()
+        if left <= 0.0:
+            return False
+        if self._process is None or self._process.stdout is None:
+            return self._broken is None  # it was lost in this moment, and may be started again
+        patience = 1.0 if self._asked is None else max(0.0, self._left(self._asked))
+        select.select([self._process.stdout], [], [], min(left, patience, 1.0))
+        return True
+
+    def _forget_refusals(self, phrases: Sequence[Phrase]) -> None:
+        """Forget what came of phrases that may be tried again."""
+        for phrase in phrases:
+            found = self._known.get(phrase)
+            if isinstance(found, _Refused) and time.monotonic() >= found.until:
+                self._size -= _bytes(self._known.pop(phrase))
 
     def _start(self) -> None:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
@@ -178,11 +251,11 @@ class Studio:
         os.set_blocking(process.stdout.fileno(), False)
         if self._listens is not None:
             self._listens.add_reader(process.stdout.fileno(), self._go_on)
-        self._asked = _Asked(None, time.monotonic())
+        self._expect(_Asked(None, time.monotonic()))
         self._write(packed(self._order))
 
     def _send(self, phrase: Phrase) -> None:
-        self._asked = _Asked(phrase, time.monotonic())
+        self._expect(_Asked(phrase, time.monotonic()))
         self._write(packed(phrase))
 
     def _write(self, message: bytes) -> None:
@@ -212,54 +285,80 @@ class Studio:
             self._answered(msgspec.msgpack.decode(content, type=Answer))
 
     def _answered(self, answer: Answer) -> None:
-        asked, self._asked = self._asked, None
-        phrase = asked.phrase if asked is not None else None
-        match answer:
-            case Made(rate):
-                self.rate = rate
-            case Failed(fault) if phrase is None:
-                self._fail(fault)
-            case Failed(fault) if phrase is not None:
-                self._keep(phrase, fault)
-            case Spoken(clause) if phrase is not None:
-                self._keep(phrase, clause)
-        for bell in self._bells:
-            bell.ring()
+        asked = self._asked
+        self._expect(None)
+        if asked is not None:
+            self._died_at.pop(asked.phrase, None)
+            phrase = asked.phrase
+            match answer:
+                case Made(rate):
+                    self.rate = rate
+                case Failed(fault) if phrase is None:
+                    self._broken = self._refused(fault)
+                    self._refuse_all(self._broken)
+                case Failed(fault) if phrase is not None:
+                    self._keep(phrase, self._refused(fault))
+                case Spoken(clause) if phrase is not None:
+                    self._keep(phrase, clause)
+        self._ring()
 
-    def _keep(self, phrase: Phrase, result: Clause | Fault) -> None:
+    def _keep(self, phrase: Phrase, result: Clause | _Refused) -> None:
         self._known[phrase] = result
         self._line.pop(phrase, None)
         self._size += _bytes(result)
         while self._size > LARGEST and len(self._known) > 1:
             self._size -= _bytes(self._known.popitem(last=False)[1])
 
-    def _lose(self, reason: str) -> None:
-        """The process is gone or is not to be trusted.
+    def _lose(self, reason: str, *, is_frozen: bool = False) -> None:
+        """The process is gone or is not to be trusted; another one is started.
 
-        What it was asked is not asked again; another one is started.
+        What it was asked is asked again, unless it is the second time, or whoever needs it has waited long enough.
         """
         asked = self._asked
         self.close()
-        fault = Fault(reason=reason, service="control")
-        if asked is not None and asked.phrase is not None:
-            self._keep(asked.phrase, Fault(reason=f"{reason}, at this text", service="control"))
-        elif asked is not None:
-            self._fail(fault)
+        what = "" if asked is None else _named(asked.phrase)
+        fault = Fault(reason=f"{reason}{what}", where="synthesizer", advice="it is started again", service="control")
+        if asked is not None:
+            is_second = asked.phrase in self._died_at
+            self._died_at[asked.phrase] = None
+            if len(self._died_at) > MOST_DEATHS:
+                self._died_at.popitem(last=False)
+            if is_second:
+                fault = replace(fault, reason=f"{fault.reason}, for the second time; refused for {AGAIN:.0f} s")
+            if asked.phrase is None and (is_second or is_frozen):
+                self._broken = self._refused(replace(fault, advice="its own words are on standard error"))
+                self._refuse_all(self._broken)
+            elif asked.phrase is not None and (is_second or is_frozen):
+                self._keep(asked.phrase, self._refused(fault, AGAIN if is_second else NEWS))
+        self.on_fault(fault)
+        self._ring()
+
+    def _refused(self, fault: Fault, seconds: Seconds = AGAIN) -> _Refused:
+        return _Refused(fault, time.monotonic() + seconds)
+
+    def _refuse_all(self, refused: _Refused) -> None:
+        """Nothing can be said."""
+        for phrase in list(self._line):
+            self._keep(phrase, refused)
+
+    def _ring(self) -> None:
         for bell in self._bells:
             bell.ring()
-
-    def _fail(self, fault: Fault) -> None:
-        self._broken = fault
-        for phrase in self._line:
-            self._known[phrase] = fault
-        self._line.clear()
 
 
 def _size(buffer: bytearray) -> int:
     return int.from_bytes(buffer[:HEAD], "little")
 
 
-def _bytes(result: Clause | Fault) -> int:
+def _named(phrase: Phrase | None) -> str:
+    """Say at what the process was lost."""
+    if phrase is None:
+        return ", while it was made"
+    text = phrase.text if len(phrase.text) <= 60 else phrase.text[:59] + "…"
+    return f", at {text!r}"
+
+
+def _bytes(result: Clause | _Refused) -> int:
     return len(result.samples) + 500 if isinstance(result, Clause) else 500
 
 

@@ -29,6 +29,8 @@ class WavFile:
         self.fault: Fault | None = None
         self._file, self._name, self._rate, self._origin, self._now = file, name, rate, origin, now
         self._size = 0
+        self._is_told = False
+        """Its fault is known, and told again only after it has taken sound."""
         self._on_fault: list[Callable[[], None]] = []
         self._write(0, _header(0, rate, origin))
 
@@ -37,6 +39,10 @@ class WavFile:
 
     def __exit__(self, *error: object) -> None:
         self._file.close()
+
+    def revive(self) -> None:
+        """Try again after a fault: there may be room now."""
+        self.fault = None
 
     def earliest(self) -> Seconds:
         return self._now()
@@ -48,9 +54,9 @@ class WavFile:
         if place + len(samples) > LARGEST:
             self._fail("the file is full", "a WAV file holds 4 GiB; name another one")
             return
-        self._write(_HEADER + place, samples)
-        self._size = max(self._size, place + len(samples))
-        self._write(0, _header(self._size, self._rate, self._origin))
+        if self._write(_HEADER + place, samples):
+            self._size = max(self._size, place + len(samples))
+            self._is_told = not self._write(0, _header(self._size, self._rate, self._origin))
 
     def rest(self) -> None:
         """Need nothing: what is not written is silence."""
@@ -59,16 +65,20 @@ class WavFile:
         self._on_fault.append(on_fault)
         return lambda: self._on_fault.remove(on_fault)
 
-    def _write(self, place: int, content: bytes) -> None:
+    def _write(self, place: int, content: bytes) -> bool:
         try:
             self._file.seek(place)
-            self._file.write(content)
+            while content:
+                content = content[self._file.write(content) :]
         except OSError as error:
             self._fail(error.strerror or str(error), "is the disk full?")
+        return self.fault is None
 
     def _fail(self, reason: str, advice: str) -> None:
-        self.fault = Fault(reason=f"the sound file: {reason}", where=self._name, advice=advice, service="control")
-        for each in list(self._on_fault):
+        reason = f"the sound file {self._name}: {reason}"
+        self.fault = Fault(reason=reason, where=self._name, advice=advice, service="control")
+        is_told, self._is_told = self._is_told, True
+        for each in () if is_told else list(self._on_fault):
             each()
 
 

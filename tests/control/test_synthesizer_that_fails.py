@@ -1,0 +1,129 @@
+"""A synthesizer that freezes, dies or says nothing: what is heard of it, and that the next speech is said."""
+
+import asyncio
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, MovementAuthority, Spoke
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.drivers import made
+from engage_hri.services.control.voice import studio
+
+ILL = """
+import os, time
+import numpy as np
+from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.sounding import SoundingVoice
+from engage_hri.services.control.voice.synthesis import Said, Synthesizer
+
+def first_time(name):
+    try:
+        os.close(os.open({folder!r} + "/" + name, os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        return False
+    return True
+
+class Ill(Synthesizer):
+    rate = 16000
+
+    def say(self, phrase):
+        if "freezes" in phrase.text or ("stumbles" in phrase.text and first_time("stumbled")):
+            time.sleep(1000)
+        if "dies" in phrase.text or ("trips" in phrase.text and first_time("tripped")):
+            os._exit(7)
+        if "nothing" in phrase.text:
+            return Said(b"")
+        samples = np.arange(16000) / 16000
+        loudness = 0.0005 if "silence" in phrase.text else 0.3
+        return Said(loudness * np.sin(2 * np.pi * 120 * samples))
+
+class Voice(SoundingVoice):
+    name, synthesizer, Settings = "ill", Ill, VoiceSettings
+"""
+
+
+def ill(tmp_path: Path) -> Body:
+    (tmp_path / "ill.py").write_text(ILL.format(folder=str(tmp_path)), encoding="utf-8")
+    drivers = {"Voice": {"device": "none", "phrase_limit": 0.5}}
+    return made(ControlConfig(body=f"{tmp_path}/ill.py:Voice", drivers=drivers))
+
+
+async def said(voice: Body, text: str) -> list[str]:
+    speech = Speech(id="s", text=text)
+    return [
+        each.word async for each in voice.perform(speech, MovementAuthority(speech, "end")) if isinstance(each, Spoke)
+    ]
+
+
+def listening(voice: Body) -> Sequence[Fault]:
+    faults: list[Fault] = []
+    voice.on_fault = faults.append
+    return faults
+
+
+@pytest.mark.real_time
+async def test_a_speech_whose_synthesizer_freezes_fails_and_the_loop_goes_on(tmp_path: Path) -> None:
+    voice = ill(tmp_path)
+    faults = listening(voice)
+    async with voice.connected():
+        speaking = asyncio.create_task(said(voice, "this freezes"))
+        done, _ = await asyncio.wait([speaking], timeout=0.2)
+        assert not done
+        with pytest.raises(BodyFailed, match=r"does not answer for 0\.5 s, at 'this freezes'"):
+            await asyncio.wait_for(speaking, 20.0)
+        assert await said(voice, "all is well") == ["all", "is", "well"]
+
+    assert [each.where for each in faults] == ["synthesizer"]
+
+
+@pytest.mark.parametrize("text", ["it trips once", "it stumbles once"])
+async def test_a_text_at_which_the_synthesizer_failed_once_is_said(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(studio, "NEWS", 0.0)
+    voice = ill(tmp_path)
+    faults = listening(voice)
+    async with voice.connected():
+        if "stumbles" in text:
+            with pytest.raises((BodyFailed, BehaviorRefused), match="does not answer"):
+                await said(voice, text)
+        assert await said(voice, text) == text.split()
+
+    assert len(faults) == 1
+
+
+async def test_a_text_that_kills_it_twice_in_a_row_is_refused_for_a_while(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(studio, "AGAIN", 0.3)
+    voice = ill(tmp_path)
+    faults = listening(voice)
+    async with voice.connected():
+        for _ in range(2):
+            with pytest.raises(BehaviorRefused, match=r"ended.*, at 'it dies', for the second time"):
+                await said(voice, "it dies")
+        assert len(faults) == 2
+        assert await said(voice, "all is well") == ["all", "is", "well"]
+        time.sleep(0.3)  # noqa: ASYNC251 - it is refused by the clock
+        with pytest.raises(BehaviorRefused, match="for the second time"):
+            await said(voice, "it dies")
+
+    assert len(faults) == 3
+
+
+@pytest.mark.parametrize("text", ["there is nothing", "all silence"])
+async def test_words_of_which_nothing_is_heard_are_not_told_as_spoken(text: str, tmp_path: Path) -> None:
+    voice = ill(tmp_path)
+    async with voice.connected():
+        estimate = voice.estimate(Speech(id="s", text=text), None, World(entities=()))
+        with pytest.raises(BehaviorRefused, match=f"Ill makes no sound of '{text}'"):
+            await said(voice, text)
+        assert await said(voice, "… 😊 …") == []  # nothing that could be heard
+
+    assert not estimate.feasible
