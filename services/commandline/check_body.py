@@ -56,7 +56,10 @@ class Options(Configured):
 
 
 def main(options: Options) -> int:
-    """Check. Exit 1 if a law is broken, 2 if there is no such body, 3 if it cannot be connected."""
+    """Check. Exit 1 if a law is broken, 2 if there is no such body, 3 if it cannot be connected.
+
+    Raises KeyboardInterrupt if it was stopped, once it has printed what was judged so far.
+    """
     if missing := [name for name in NEEDED if find_spec(name) is None]:
         reason = f"check-body needs {' and '.join(missing).replace('_', '-')}"
         raise InputRefused(Fault(reason=reason, advice="install the extra: pip install 'engage-hri[check]'"))
@@ -77,6 +80,8 @@ def main(options: Options) -> int:
         print(as_json(report), flush=True)
     else:
         Terminal(highlight=False).print(rendered(report))
+    if report.is_stopped:
+        raise KeyboardInterrupt
     return DONE if report.is_good else BROKEN
 
 

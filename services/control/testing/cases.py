@@ -1,17 +1,28 @@
 """One behavior that a law is judged by, the connection of the body meanwhile, and what went wrong in words."""
 
 import asyncio
+import traceback
 from collections.abc import Sequence, Set
 from contextlib import suppress
+from pathlib import Path
+from sysconfig import get_paths
 from types import TracebackType
 from typing import Any
+
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import EngageError
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed
+from engage_hri.services.control.guarded import words_of
 from engage_hri.services.control.testing.laws import Finding, LawBroken, named
 from engage_hri.services.control.testing.stage import PATIENCE, Stage
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
+
+_SUITE = str(Path(__file__).parent)
+_PACKAGE = str(Path(__file__).parents[3])
+_LIBRARY = tuple(f"{Path(get_paths()['stdlib']) / name}" for name in ("asyncio", "contextlib.py", "concurrent"))
+"""Modules of Python through which errors of tasks come."""
 
 
 class Case:
@@ -70,21 +81,13 @@ def findings_of(error: BaseException, behavior: str = "") -> Sequence[Finding] |
     """Put what went wrong with a body in words; None: it is no fault of a body."""
     match error:
         case LawBroken():
-            return [
-                each
-                if each.behavior
-                else Finding(
-                    behavior=behavior,
-                    sync=each.sync,
-                    expected=each.expected,
-                    measured=each.measured,
-                    advice=each.advice,
-                )
-                for each in error.findings
-            ]
+            return [each if each.behavior else replace(each, behavior=behavior) for each in error.findings]
         case BodyFailed() | BehaviorRefused():
             did = "failed" if isinstance(error, BodyFailed) else "refused"
-            return [Finding(behavior=behavior, expected="that it can do this", measured=f"it {did}: {error.fault}")]
+            measured = f"it {did}: {error.fault}"
+            return [
+                Finding(behavior=behavior, expected="that it can do this", measured=measured, cause=cause_of(error))
+            ]
         case EngageError():
             return [Finding(behavior=behavior, expected="a body that can be had", measured=str(error.fault))]
         case Deadlock() | TimeRanOut():
@@ -94,29 +97,57 @@ def findings_of(error: BaseException, behavior: str = "") -> Sequence[Finding] |
                     expected="that it comes to an end",
                     measured=str(error),
                     advice="something waits for what never comes",
+                    cause=cause_of(error),
                 )
             ]
-        case AssertionError() | Exception():
+        case _ if _is_ours(error):
+            measured = f"{words_of(error)}{place_of(error)}"
+            advice = "this is a bug of the suite, or it cannot deal with what the body has told before"
+            return [Finding(behavior=behavior, expected="that the suite can go on", measured=measured, advice=advice)]
+        case Exception():
             return [
                 Finding(
                     behavior=behavior,
                     expected="no error but BehaviorRefused and BodyFailed",
-                    measured=f"{type(error).__name__}: {error}{place_of(error)}",
+                    measured=f"{words_of(error)}{place_of(error)}",
                     advice="control fails the behavior and takes the body home at such an error",
+                    cause=cause_of(error),
                 )
             ]
     return None
 
 
+def cause_of(error: BaseException) -> str:
+    """Say what is behind an error, in the same words wherever it shows."""
+    match error:
+        case BodyFailed() | BehaviorRefused():
+            return f"it {'failed' if isinstance(error, BodyFailed) else 'refused'}: {error.fault.reason}"
+        case Deadlock() | TimeRanOut():
+            return "something waits for what never comes"
+    return f"its driver breaks: {words_of(error)}{place_of(error)}"
+
+
 def place_of(error: BaseException) -> str:
-    """Say where an error was raised: ` at pan_tilt.py, line 14`, the innermost place that is not the suite's own."""
-    trace, found = error.__traceback__, ""
-    while trace is not None:
-        file = trace.tb_frame.f_code.co_filename
-        if "/control/testing/" not in file.replace("\\", "/"):
-            found = f" at {file.replace(chr(92), '/').rpartition('/')[2]}, line {trace.tb_lineno}"
-        trace = trace.tb_next
-    return found
+    """Say where an error was raised: ` at pan_tilt.py, line 14`.
+
+    That is the last place in the driver: outside of this package if there is one, and of Python's library.
+    """
+    frames = _beyond_the_suite(error) or traceback.extract_tb(error.__traceback__)
+    chosen = [each for each in frames if not each.filename.startswith((_PACKAGE, *_LIBRARY))]
+    chosen = chosen or [each for each in frames if not each.filename.startswith(_LIBRARY)] or list(frames)
+    return f" at {Path(chosen[-1].filename).name}, line {chosen[-1].lineno}" if chosen else ""
+
+
+def _is_ours(error: BaseException) -> bool:
+    """True for an error that the suite itself has raised."""
+    return bool(error.__traceback__) and not _beyond_the_suite(error)
+
+
+def _beyond_the_suite(error: BaseException) -> Sequence[traceback.FrameSummary]:
+    """The places that an error has come through since it left the suite, the innermost last."""
+    frames = traceback.extract_tb(error.__traceback__)
+    last = max((number for number, each in enumerate(frames) if each.filename.startswith(_SUITE)), default=-1)
+    return frames[last + 1 :]
 
 
 async def still_running(before: Set["asyncio.Task[Any]"]) -> list["asyncio.Task[Any]"]:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from inspect import getdoc
 from pathlib import Path
-from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -19,13 +18,13 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.references import type_name
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD, behaviors_in
-from engage_hri.services.control.testing.cases import Connection, findings_of
+from engage_hri.services.control.testing.cases import findings_of
+from engage_hri.services.control.testing.causes import told_once
 from engage_hri.services.control.testing.contract import BodyContract
+from engage_hri.services.control.testing.first import FirstLook, look
 from engage_hri.services.control.testing.laws import Finding, named
 from engage_hri.services.control.testing.played import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
@@ -36,8 +35,6 @@ from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
 Make = Callable[[], Body]
 Progress = Callable[[str, int, int], None]
 """Called with the law that is tried, and the numbers of trials done and in all."""
-LOOKS = 20
-"""Estimates whose time is taken."""
 _judged: list[type[BodyContract]] = []
 """The class that the file of the running check takes."""
 
@@ -48,20 +45,27 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     make: makes it, in a running event loop. driver: its name, for the report. law: only laws whose names have these
     words; empty: all. progress: see `Progress`.
 
-    Raises InputRefused if there is no such law, EngageError if the body cannot be had, KeyboardInterrupt.
+    Ctrl-C ends it with what was judged so far; while it is only looked at, with KeyboardInterrupt.
+
+    Raises InputRefused if there is no such law, EngageError if the body cannot be had.
     """
     since = time.monotonic()
-    report = _described(make, stated, driver)
+    seen = _looked_at(make, stated, driver)
+    report = _reported(seen, stated, driver)
+    if not seen.is_there:
+        return replace(report, seconds=time.monotonic() - since)
     collected = _Collected(law.lower().replace("`", ""), progress)
-    with _judging(_suite(make, stated, report.capabilities)) as arguments:
+    with _judging(_suite(make, stated, seen)) as arguments:
         code = pytest.main(arguments, plugins=[collected])
-    if code == pytest.ExitCode.INTERRUPTED:
-        raise KeyboardInterrupt
     if code == pytest.ExitCode.NO_TESTS_COLLECTED:
         raise InputRefused(Fault(reason=f"no law has {law!r} in its name", advice="without it all names are printed"))
-    if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+    if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED):
         raise RuntimeError(f"pytest ended with {code!r}")
-    return replace(report, laws=tuple(collected.laws()), seconds=time.monotonic() - since)
+    laws, causes = told_once(collected.laws(), seen.causes)
+    return replace(
+        report, laws=laws, causes=causes, not_tried=tuple(collected.not_tried()), seconds=time.monotonic() - since,
+        is_stopped=code == pytest.ExitCode.INTERRUPTED,
+    )  # fmt: skip
 
 
 def judged() -> type[BodyContract]:
@@ -69,16 +73,17 @@ def judged() -> type[BodyContract]:
     return _judged[-1]
 
 
-def _suite(make: Make, stated: Stated, able: Capabilities) -> type[BodyContract]:
+def _suite(make: Make, stated: Stated, seen: FirstLook) -> type[BodyContract]:
     settings = {
         "make": lambda self: make(),
-        "faults": lambda self: played(make, playable(able)),
+        "faults": lambda self: played(make, playable(seen.capabilities)),
         "tolerance": stated.tolerance,
         "noise": stated.noise,
         "accuracy": stated.accuracy,
         "age": 0.005 if stated.real_time else 0.001,
         "world": stated.world or WORLD,
         "behaviors": _behaviors(stated),
+        "unable": seen.unable,
     }
     suite = type("TestBody", (BodyContract,), settings)
     return pytest.mark.real_time(suite) if stated.real_time else suite
@@ -91,45 +96,23 @@ def _behaviors(stated: Stated) -> tuple[BlockBehavior, ...]:
 # -- what it is ---------------------------------------------------------------------------------------------------
 
 
-def _described(make: Make, stated: Stated, driver: str) -> BodyReport:
-    """Connect the body once, and say what it is."""
+def _looked_at(make: Make, stated: Stated, driver: str) -> FirstLook:
+    """Connect the body once, and see what it is. Raises InputRefused."""
     with asyncio.Runner(loop_factory=None if stated.real_time else virtual_loop) as runner:
         try:
-            return runner.run(_describe(make, stated, driver))
+            return runner.run(look(make, stated.world or WORLD, _behaviors(stated), stated.noise))
         except (Deadlock, TimeRanOut, TimeoutError) as error:
             advice = "a body with a clock of its own (hardware, a daemon, a socket) is checked with --real-time"
             reason = f"it waits for what never comes: {error}"
             raise InputRefused(Fault(reason=reason, where=f"body {driver}", advice=advice)) from error
 
 
-async def _describe(make: Make, stated: Stated, driver: str) -> BodyReport:
-    body, world = make(), stated.world or WORLD
-    connection = Connection(body)
-    await connection.enter()
-    try:
-        body.see(world)
-        asked, not_asked = [], []
-        behaviors = _behaviors(stated)
-        for behavior in behaviors:
-            if type_name(behavior) not in body.capabilities.types:
-                continue
-            estimate = body.estimate(behavior, None, world)
-            if estimate.feasible:
-                asked.append(behavior)
-            else:
-                not_asked.append(f"{named(behavior)}: {estimate.fault.reason if estimate.fault else 'not feasible'}")
-        times = []
-        for number in range(LOOKS if asked else 0):
-            since = time.perf_counter()
-            body.estimate(asked[number % len(asked)], None, world)
-            times.append(time.perf_counter() - since)
-        return BodyReport(
-            driver=driver, capabilities=body.capabilities, stated=stated, asked=tuple(map(named, asked)),
-            not_asked=tuple(not_asked), unknown=tuple(unchecked(body.capabilities, behaviors)),
-            estimate=median(times) if times else 0.0,
-        )  # fmt: skip
-    finally:
-        await connection.leave()
+def _reported(seen: FirstLook, stated: Stated, driver: str) -> BodyReport:
+    return BodyReport(
+        driver=driver, capabilities=seen.capabilities, stated=stated, asked=tuple(map(named, seen.asked)),
+        not_asked=seen.not_asked, unknown=tuple(unchecked(seen.capabilities, _behaviors(stated))),
+        estimate=seen.estimate, causes=seen.causes,
+    )  # fmt: skip
 
 
 # -- how pytest runs it -------------------------------------------------------------------------------------------
@@ -186,6 +169,8 @@ class _Collected:
         self._progress = progress
         self._tried: dict[str, _Tried] = {}
         self._done = self._count = 0
+        self._asked: dict[str, None] = {}
+        """Names of all laws that were asked for, in their order."""
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Keep the laws that were asked for, by topic and in the order in which they are written."""
@@ -193,6 +178,7 @@ class _Collected:
         order = {topic: number for number, topic in enumerate(TOPICS)}
         items[:] = sorted(kept, key=lambda item: order[_topic(item)])
         self._count = len(items)
+        self._asked = dict.fromkeys(map(_words, items))
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(
@@ -221,11 +207,17 @@ class _Collected:
     def laws(self) -> Iterator[CheckedLaw]:
         """List the laws with what was found."""
         for name, tried in self._tried.items():
+            if not tried.trials:
+                continue
             yield CheckedLaw(
                 law=name, topic=tried.topic, says=tried.says, usually=tried.usually, trials=tried.trials,
                 verdict=verdict(tried.findings, tried.passed), findings=tuple(tried.findings),
                 reasons=tuple(tried.reasons), seconds=tried.seconds,
             )  # fmt: skip
+
+    def not_tried(self) -> Iterator[str]:
+        """Names of the laws that were asked for, and that none of their trials has come to an end of."""
+        return (name for name in self._asked if name not in self._tried or not self._tried[name].trials)
 
 
 TOPICS = tuple(base.topic for base in BodyContract.__mro__ if issubclass(base, Suite) and "topic" in vars(base))

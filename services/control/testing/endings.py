@@ -219,8 +219,8 @@ class EndingLaws(Suite):
 
         Usually all words are told as the synthesiser returns, before the sound is played.
         """
-        if "speech" not in body.capabilities.types:
-            does_not_apply("it has no voice")
+        if "speech" not in self.types(body):
+            self.lacks(body, "it has no voice", "speech")
         words = ["one", "two", "three", "four", "five", "six", "seven"]
         speech = Speech(id="long", text=" ".join(words))
         stage = Stage(body, speech, "end")

@@ -15,7 +15,7 @@ from engage_hri.services.control.testing.asked import HOLDS
 from engage_hri.services.control.testing.laws import broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, recorded
 from engage_hri.services.control.testing.stage import Stage, default, done, standing, times
-from engage_hri.services.control.testing.suite import STILL, Suite, does_not_apply, trials
+from engage_hri.services.control.testing.suite import STILL, Suite, trials
 
 SETTLING: Seconds = 0.5
 """Time for the last tenths of a degree, once the joints are near enough to say that they have arrived."""
@@ -286,8 +286,8 @@ class HoldingLaws(Suite):
         Usually the synthesiser is asked for the whole text and can only be cut. Play word by word, or pause the sound
         at the next word time.
         """
-        if "speech" not in body.capabilities.types:
-            does_not_apply("it has no voice")
+        if "speech" not in self.types(body):
+            self.lacks(body, "it has no voice", "speech")
         text = "this is one, and that: another piece. And 那边 也有 一个"
         chance = Random(seed)
         speech = Speech(id="s", text=text, marks=(Mark("m", text.index("that")), Mark("n", text.index("piece") + 2)))

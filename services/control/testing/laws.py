@@ -31,12 +31,17 @@ from engage_hri.schemas.body import BodyPose
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 
+NEVER_ENDS = "what is begun never ends"
+NOTHING_MOVES = "nothing moves"
+"""Causes for which much cannot be judged; words follow them."""
+
 
 class Finding(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One way in which a law was broken.
 
     behavior: what was performed; empty: it concerns none. sync: the sync point in question; empty: none.
-    advice: what to do about this one; empty: what the law says of itself.
+    advice: what to do about this one; empty: what the law says of itself. cause: what is behind it, in the same words
+    wherever it shows; empty: nothing but what the law is about.
     """
 
     expected: str
@@ -44,6 +49,7 @@ class Finding(Struct, frozen=True, kw_only=True, omit_defaults=True):
     behavior: str = ""
     sync: str = ""
     advice: str = ""
+    cause: str = ""
 
     def __str__(self) -> str:
         place = ", ".join(filter(None, (self.behavior, self.sync)))
@@ -61,12 +67,18 @@ class LawBroken(AssertionError):
 
 
 def broken(
-    behavior: BlockBehavior | str = "", sync: str = "", *, expected: str, measured: str, advice: str = ""
+    behavior: BlockBehavior | str = "",
+    sync: str = "",
+    *,
+    expected: str,
+    measured: str,
+    advice: str = "",
+    cause: str = "",
 ) -> NoReturn:
     """Raise LawBroken with this finding."""
     __tracebackhide__ = True
     place = behavior if isinstance(behavior, str) else named(behavior)
-    finding = Finding(behavior=place, sync=sync, expected=expected, measured=measured, advice=advice)
+    finding = Finding(behavior=place, sync=sync, expected=expected, measured=measured, advice=advice, cause=cause)
     raise LawBroken([finding])
 
 

@@ -29,7 +29,7 @@ class PointsLaws(Suite):
         Usually the targets of the suite's `world` are out of this robot's range, or its lexemes have other names:
         set `world` and `behaviors` to what it can do.
         """
-        kinds = body.capabilities.types
+        kinds = self.types(body) or self.lacks(body, "it has no types", *body.capabilities.types)
         known = [each for each in self.behaviors if type_name(each) in kinds]
         if not any(body.estimate(each, None, self.world).feasible for each in known):
             broken(
@@ -37,7 +37,7 @@ class PointsLaws(Suite):
                 measured=f"none; its types are {listed(kinds)}",
                 advice="set `behaviors` and `world` of the suite to what this robot can do where it stands",
             )
-        for kind in body.capabilities.types:
+        for kind in kinds:
             asked = [each for each in self.behaviors if type_name(each) == kind]
             estimates = [body.estimate(each, None, self.world) for each in asked]
             if estimates and not any(each.feasible for each in estimates):
@@ -158,7 +158,7 @@ class PointsLaws(Suite):
             Locomotion(id="walk", target="human")
         ] * ("locomotion" not in body.capabilities.types)
         if not unable:
-            does_not_apply("it has no behavior with a target")
+            self.lacks(body, "it has no behavior with a target", *self.unable)
         before = await self.pose(body)
         for behavior in unable:
             words = named(behavior)
@@ -182,9 +182,11 @@ class PointsLaws(Suite):
         Usually the last word is left out, or `position` counts words. A mark is passed where its characters have been
         said.
         """
+        if "speech" not in self.types(body):
+            self.lacks(body, "it has no voice", "speech")
         speeches = [each for each in self.able(body) if isinstance(each, Speech)]
         if not speeches:
-            does_not_apply("it has no voice")
+            does_not_apply("it can say nothing of what it is asked to")
         for speech in speeches:
             await self._check_words(body, speech)
 

@@ -1,20 +1,21 @@
 """The report for people. Pure: a report in, text out, as wide as the terminal."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from engage_hri.services.control.testing.laws import Finding, degrees, ms
-from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Verdict
+from engage_hri.services.control.testing.laws import NEVER_ENDS, NOTHING_MOVES, Finding, degrees, ms
+from engage_hri.services.control.testing.report import BodyReport, Cause, CheckedLaw, Verdict
 
 SHOWN = 4
 """Findings of one law that are shown; the JSON has all."""
 MARKS: dict[Verdict, tuple[str, str]] = {
-    "holds": ("holds", "green"), "broken": ("BROKEN", "bold red"), "does not apply": ("--", "dim"),
+    "holds": ("holds", "green"), "broken": ("BROKEN", "bold red"), "not judged": ("", ""),
+    "does not apply": ("--", "dim"),
 }  # fmt: skip
 NEVER = ("goes on", "for ever", "never comes", "nothing", "stays true", "does not return")
 """Words of findings that a body with a clock of its own has in virtual time."""
@@ -25,8 +26,12 @@ def rendered(report: BodyReport) -> RenderableType:
     parts: list[RenderableType] = [_head(report), Text(), _body(report), Text()]
     if report.capabilities.joints:
         parts += [_joints(report), Text()]
+    if report.causes:
+        parts += [*(_cause(each) for each in report.causes), Text()]
+    above = {cause.what for cause in report.causes}
     for topic in dict.fromkeys(each.topic for each in report.laws):
-        parts += [Text(topic, style="bold"), *_laws([each for each in report.laws if each.topic == topic]), Text()]
+        laws = [each for each in report.laws if each.topic == topic]
+        parts += [Text(topic, style="bold"), *_laws(laws, above), Text()]
     return Group(*parts, *_end(report))
 
 
@@ -75,9 +80,21 @@ def _joints(report: BodyReport) -> Table:
 # -- what was found -----------------------------------------------------------------------------------------------
 
 
-def _laws(laws: Sequence[CheckedLaw]) -> Iterator[RenderableType]:
+def _cause(cause: Cause) -> Text:
+    text = Text(f"{cause.what}: ", style="bold red")
+    if cause.laws:
+        text.append(f"{len(cause.laws)} {'law' if len(cause.laws) == 1 else 'laws'} could not be judged by that")
+    else:
+        text.append("no law was judged" if not cause.behaviors else "the laws were judged without it")
+    if cause.behaviors and not cause.what.startswith(NOTHING_MOVES):
+        text.append(f" ({', '.join(cause.behaviors)})", style="dim")
+    return text
+
+
+def _laws(laws: Sequence[CheckedLaw], above: Container[str]) -> Iterator[RenderableType]:
     table: Table | None = None
-    for law in laws:
+    unjudged = "; ".join(law.law for law in laws if law.verdict == "not judged")
+    for law in (each for each in laws if each.verdict != "not judged"):
         if table is None:
             table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
             table.add_column(width=6)
@@ -87,18 +104,22 @@ def _laws(laws: Sequence[CheckedLaw]) -> Iterator[RenderableType]:
         table.add_row(Text(mark, style=style), Text(law.law + why, style="dim" if why else ""))
         if law.verdict == "broken":
             yield table
-            yield Padding(Group(*_broken(law)), (0, 0, 1, 8))
+            yield Padding(Group(*_broken(law, above)), (0, 0, 1, 8))
             table = None
     if table is not None:
         yield table
+    if unjudged:
+        yield Padding(Text(f"not judged: {unjudged}", style="dim"), (0, 0, 0, 8))
 
 
-def _broken(law: CheckedLaw) -> Iterator[Text]:
+def _broken(law: CheckedLaw, above: Container[str]) -> Iterator[Text]:
+    """What a law says, and what was found; what is told above is not told again."""
     yield Text(law.says, style="italic")
-    for finding in law.findings[:SHOWN]:
+    findings = [each for each in law.findings if each.cause not in above]
+    for finding in findings[:SHOWN]:
         yield _finding(finding)
-    if len(law.findings) > SHOWN:
-        yield Text(f"and {len(law.findings) - SHOWN} more; --json has all", style="dim")
+    if len(findings) > SHOWN:
+        yield Text(f"and {len(findings) - SHOWN} more; --json has all", style="dim")
     yield Text.assemble(("usually: ", "yellow"), law.usually)
 
 
@@ -115,11 +136,20 @@ def _finding(finding: Finding) -> Text:
 
 
 def _end(report: BodyReport) -> Iterator[Text]:
-    holds, broken, other = (len(report.of(each)) for each in MARKS)
-    took = f"It took {report.seconds:.1f} s."
-    rest = f"{_laws_that(other, 'does', 'do')} not apply. {took}"
-    if not holds and not broken:
+    count = {each: len(report.of(each)) for each in MARKS}
+    holds, broken, unjudged = count["holds"], count["broken"], count["not judged"]
+    if report.is_stopped:
+        tried = f"Stopped: {_laws_that(len(report.laws), 'was', 'were')} judged"
+        yield Text(f"{tried}, {len(report.not_tried)} not: {'; '.join(report.not_tried)}.", style="bold yellow")
+    rest = f"{_laws_that(count['does not apply'], 'does', 'do')} not apply. It took {report.seconds:.1f} s."
+    if unjudged:
+        rest = f"{unjudged} could not be judged, {rest}"
+    if not report.laws:
+        yield Text(f"Nothing could be judged. It took {report.seconds:.1f} s.", style="bold red")
+    elif not holds and not broken:
         yield Text(f"Nothing could be checked: {rest}", style="bold red")
+    elif not broken and not report.is_good:
+        yield Text(f"{_laws_that(holds, 'holds', 'hold')}, {rest}", style="bold red")
     elif broken:
         style = "bold red"
         yield Text(
@@ -128,7 +158,7 @@ def _end(report: BodyReport) -> Iterator[Text]:
     else:
         yield Text(f"{_laws_that(holds, 'holds', 'hold')}, none is broken, {rest}", style="bold green")
     if any("faults" in reason for law in report.of("does not apply") for reason in law.reasons):
-        yield Text("No fault was played: a test of your own can name some (`faults`, docs/control.md).", style="dim")
+        yield Text("No fault was played: a test of your own can name some (`faults`, docs/contract.md).", style="dim")
     if _looks_like_another_clock(report):
         yield Text(
             "Much of it never came. A body with a clock of its own (hardware, a daemon, a thread) is checked with "
@@ -141,6 +171,10 @@ def _laws_that(count: int, does: str, do: str) -> str:
 
 
 def _looks_like_another_clock(report: BodyReport) -> bool:
+    if report.stated.real_time:
+        return False
+    if any(cause.what.startswith((NEVER_ENDS, NOTHING_MOVES)) for cause in report.causes):
+        return True
     findings = [each for law in report.of("broken") for each in law.findings]
     waits = [each for each in findings if any(words in each.measured for words in NEVER)]
-    return not report.stated.real_time and len(report.of("broken")) > 9 and 2 * len(waits) > len(findings)
+    return len(report.of("broken")) > 9 and 2 * len(waits) > len(findings)

@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.testing.laws import Finding
 
-Verdict = Literal["holds", "broken", "does not apply"]
+Verdict = Literal["holds", "broken", "not judged", "does not apply"]
 
 
 class Stated(Struct, frozen=True, kw_only=True):
@@ -27,6 +27,18 @@ class Stated(Struct, frozen=True, kw_only=True):
     accuracy: Radians
     real_time: bool = False
     world: World | None = None
+
+
+class Cause(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What keeps laws from being judged.
+
+    what: in words. behaviors: those that it keeps from being performed, in words; empty: it was found elsewhere.
+    laws: names of the laws in which it showed, or which had nothing left to be judged by.
+    """
+
+    what: str
+    behaviors: tuple[str, ...] = ()
+    laws: tuple[str, ...] = ()
 
 
 class CheckedLaw(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -53,7 +65,8 @@ class BodyReport(Struct, frozen=True, kw_only=True):
 
     driver: the name that it was asked for by. asked: behaviors that it was asked for, in words. not_asked: those that
     it cannot do, with the reason. unknown: types that it has, and the suite has no behavior of. estimate: median time
-    that one estimate took. seconds: time of the whole check on the wall clock.
+    that one estimate took. causes: what broke many laws, or the first look already. not_tried: laws that it did not
+    come to. is_stopped: true if somebody has stopped it. seconds: time of the whole check on the wall clock.
     """
 
     driver: str
@@ -64,12 +77,16 @@ class BodyReport(Struct, frozen=True, kw_only=True):
     unknown: tuple[str, ...]
     estimate: Seconds
     laws: tuple[CheckedLaw, ...] = ()
+    causes: tuple[Cause, ...] = ()
+    not_tried: tuple[str, ...] = ()
+    is_stopped: bool = False
     seconds: Seconds = 0.0
 
     @property
     def is_good(self) -> bool:
-        """True if some law holds, and none is broken."""
-        return bool(self.of("holds")) and not self.of("broken")
+        """True if some law holds, and nothing is broken or left out."""
+        is_whole = not (self.causes or self.of("broken") or self.of("not judged") or self.is_stopped)
+        return is_whole and bool(self.of("holds"))
 
     def of(self, verdict: Verdict) -> list[CheckedLaw]:
         """List the laws of which this is true."""

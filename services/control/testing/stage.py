@@ -7,7 +7,7 @@ from typing import ClassVar
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
-from engage_hri.services.control.testing.laws import broken, listed, ms
+from engage_hri.services.control.testing.laws import NEVER_ENDS, broken, listed, ms
 
 PATIENCE: Seconds = 30.0
 """Time within which any behavior comes to its next hold point, or to its end."""
@@ -94,12 +94,14 @@ class Stage:
         """Wait for the end. Raises LawBroken if it does not come, and what the body raises."""
         await asyncio.wait([self.task], timeout=patience)
         if not self.task.done():
+            is_free = self.authority.revoked is None and self.authority.covers(self.authority.points[-1])
             broken(
                 self.behavior,
                 self.next_point,
                 expected=f"an end within {ms(patience)}{self._cut}",
                 measured=f"it goes on; passed: {listed(self.passed)}; has waited at: {listed(self.waits_at)}",
                 advice="does `perform` look at the authority while it moves and waits (`watch`, `granted`)?",
+                cause=f"{NEVER_ENDS}, having passed {listed(self.passed)}" if is_free else "",
             )
         self.task.result()
         return self.progress

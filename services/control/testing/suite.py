@@ -40,6 +40,7 @@ class Suite:
     accuracy: how near the joints come to where they are to be, and the eyes to a target, radians.
     behaviors: what it is asked to do; of each type that it has at least one. world: where their targets are.
     seeds: number of random trials of each law that has some; None: many in virtual time, one in real time.
+    unable: types of behaviors that nothing is judged by, since it is known already that they break, with the words.
     """
 
     topic: ClassVar[str] = ""
@@ -51,6 +52,7 @@ class Suite:
     behaviors: tuple[BlockBehavior, ...] = BEHAVIORS
     world = WORLD
     seeds: int | None = None
+    unable: Mapping[str, str] = {}
 
     def make(self) -> Body:
         """Make the body, in the running event loop, not connected."""
@@ -109,14 +111,32 @@ class Suite:
 
     def able(self, body: Body) -> list[BlockBehavior]:
         """List the suite's behaviors that the body says it can do. If there are none, no law applies."""
+        types = self.types(body)
         able = [
             each
             for each in self.behaviors
-            if type_name(each) in body.capabilities.types and body.estimate(each, None, self.world).feasible
+            if type_name(each) in types and body.estimate(each, None, self.world).feasible
         ]
         if not able:
-            does_not_apply("it can do nothing of what it is asked for")
+            self.lacks(body, "it can do nothing of what it is asked for", *body.capabilities.types)
         return able
+
+    def types(self, body: Body) -> tuple[str, ...]:
+        """List the types of behaviors that it has and can be judged by."""
+        return tuple(kind for kind in body.capabilities.types if kind not in self.unable)
+
+    def lacks(self, body: Body, what: str, *kinds: str) -> NoReturn:
+        """End a test that needs behaviors of these types: its law does not apply, or cannot be judged.
+
+        what: the body lacks, in words. kinds: of types that it has, but breaks at.
+
+        Raises LawBroken with what these break by, if it has one of them.
+        """
+        whys = {self.unable[kind] for kind in kinds if kind in self.unable and kind in body.capabilities.types}
+        if whys:
+            expected = "a behavior to judge it by"
+            raise LawBroken([Finding(expected=expected, measured=why, cause=why) for why in sorted(whys)])
+        does_not_apply(what)
 
     def cases(
         self, body: Body, which: Callable[[BlockBehavior], bool] = lambda _: True, lacks: str = "no such behavior"
@@ -130,7 +150,8 @@ class Suite:
         __tracebackhide__ = True
         behaviors = [each for each in self.able(body) if which(each)]
         if not behaviors:
-            does_not_apply(f"it has {lacks}")
+            unable = [each for each in self.behaviors if type_name(each) in self.unable and which(each)]
+            self.lacks(body, f"it has {lacks}", *map(type_name, unable))
         findings: list[Finding] = []
         for behavior in behaviors:
             yield Case(body, behavior, findings)

@@ -125,7 +125,8 @@ class TruthLaws(Suite):
         """
         witness = await crowded(self, body, CROWDS[crowd], Random(f"{crowd} {seed}"))
         if witness is None:
-            does_not_apply(f"it has nothing for the crowd of {crowd}")
+            kinds = (type_name(make("any", Random(0), ["any"])) for make in CROWDS[crowd])
+            self.lacks(body, f"it has nothing for the crowd of {crowd}", *kinds)
         if lies := await witness.close():
             raise LawBroken(lies)
 
@@ -139,7 +140,7 @@ class TruthLaws(Suite):
             does_not_apply("no faults are named (`faults` of the suite)")
         make, lies = self.faults()[fault], list[Finding]()
         async with self.connected(make) as body:
-            able = [each for each in self.behaviors if type_name(each) in body.capabilities.types]
+            able = [each for each in self.behaviors if type_name(each) in self.types(body)]
         for behavior in able:
             async with self.connected(make) as body:
                 lies += await self._with_fault(body, behavior)

@@ -259,7 +259,7 @@ def arms(state: BodyState, mode: str | None) -> tuple[Ray | None, ...]:
 async def crowded(suite: Suite, body: Body, makers: Sequence[Maker], chance: Random) -> Witness | None:
     """Begin, extend, hold, release and abort at random; None if the body has none of these behaviors."""
     targets = [entity.id for entity in suite.world.entities]
-    able = [make for make in makers if type_name(make("any", chance, targets)) in body.capabilities.types]
+    able = [make for make in makers if type_name(make("any", chance, targets)) in suite.types(body)]
     if not able:
         return None
     witness = Witness(suite, body)
