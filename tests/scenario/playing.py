@@ -68,10 +68,12 @@ async def play(
     condition: Condition = "operational",
     habits: Habits | None = None,
     sensors: SimulationConfig | None = None,
+    control: ControlConfig | None = None,
     **manager: Any,
 ) -> Record:
     """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
-    sensors: how person and table are perceived; exactly, by default. manager: its configuration.
+    sensors: how person and table are perceived; exactly, by default. control: in place of the torso with `noise`.
+    manager: its configuration.
     """
     received: list[Received] = []
     finished = asyncio.Event()
@@ -82,7 +84,9 @@ async def play(
         finished.set()
 
     services: dict[str, Service] = {
-        "control": partial(embody, config=ControlConfig(variability=Variability(seed=seed, noise=noise))),
+        "control": partial(
+            embody, config=control or ControlConfig(variability=Variability(seed=seed, noise=noise))
+        ),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
         "generation": partial(generate, config=GenerationConfig(condition=condition)),
