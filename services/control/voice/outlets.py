@@ -11,7 +11,11 @@ class Outlet(Protocol):
     """A way for sound. All times are loop times, seconds.
 
     lead: how long before a sound is to be heard it has to be played. fault: why nothing is heard any more.
+    is_live: true if it may be late: then `late` is to be asked before anything is told as heard.
     """
+
+    @property
+    def is_live(self) -> bool: ...
 
     @property
     def lead(self) -> Seconds: ...
@@ -31,6 +35,20 @@ class Outlet(Protocol):
     def rest(self) -> None:
         """Take note that silence follows what was played."""
 
+    def late(self) -> Seconds | None:
+        """Say by how much all that was played is late: it should have been heard by now, and was not even taken.
+
+        From then on that is the plan, for what is played next, too; so it is to be asked again and again.
+
+        Returns None if nothing is late; 0 if it is as late as when last asked, and nothing was taken since.
+        """
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        """Take back what was played and would be heard from `at` on. It is called at that time.
+
+        tail: the last samples before it as they should have been, for an outlet that can still change them.
+        """
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         """Call `on_fault` when there is one, until the returned function is called."""
 
@@ -40,6 +58,7 @@ class Nowhere:
 
     lead: Seconds = 0.0
     fault: Fault | None = None
+    is_live = False
 
     def __init__(self, now: Callable[[], Seconds]) -> None:
         self._now = now
@@ -53,6 +72,12 @@ class Nowhere:
     def rest(self) -> None:
         """Need nothing."""
 
+    def late(self) -> Seconds | None:
+        return None
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        """Need nothing."""
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         return lambda: None
 
@@ -60,12 +85,17 @@ class Nowhere:
 class Several:
     """Several outlets as one: sound is heard at the same time in each.
 
-    The first is what people hear: its fault is that of all. Another one that fails is missing, and says so itself.
+    The first is what people hear: all goes by its time, and its fault is that of all. Another one that fails is
+    missing, and says so itself.
     """
 
     def __init__(self, outlets: Sequence[Outlet]) -> None:
         """Join outlets, at least one."""
         self._outlets = outlets
+
+    @property
+    def is_live(self) -> bool:
+        return self._outlets[0].is_live
 
     @property
     def lead(self) -> Seconds:
@@ -85,6 +115,13 @@ class Several:
     def rest(self) -> None:
         for each in self._outlets:
             each.rest()
+
+    def late(self) -> Seconds | None:
+        return self._outlets[0].late()
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        for each in self._outlets:
+            each.cut(at, tail)
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         ends = [each.watch(on_fault) for each in self._outlets]

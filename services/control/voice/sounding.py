@@ -156,8 +156,8 @@ class SoundingVoice(Speaker):
         await self._voice.wait_for_silence(authority)
         if authority.revoked is not None:
             return
-        if self._player is not None and self._player.fault is not None:
-            await self._player.revive()
+        if self._player is not None:
+            await self._player.ready()
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
         if self._wav is not None:
@@ -168,8 +168,6 @@ class SoundingVoice(Speaker):
         words = utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
         async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
             async for progress in utterance:
-                if self._player is not None:
-                    self._player.check()
                 yield progress
 
     def parts_of(self, behavior: Speech) -> Sequence[Piece]:

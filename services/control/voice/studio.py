@@ -55,7 +55,7 @@ class _Asked(NamedTuple):
 
 
 class _Refused(NamedTuple):
-    """What came of a phrase that cannot be said. until: on the clock; from then on it is tried again when asked."""
+    """The refusal of a phrase. until: on the clock; from then on it is tried again when asked."""
 
     fault: Fault
     until: Seconds
