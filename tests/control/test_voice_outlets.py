@@ -13,11 +13,21 @@ import numpy as np
 import pytest
 
 from engage_hri.schemas.behaviors import Speech
-from engage_hri.schemas.faults import Fault
-from engage_hri.services.control.body import BodyFailed, MouthShape, MovementAuthority, Progress, Reached, Spoke
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import (
+    BehaviorRefused,
+    BodyFailed,
+    MouthShape,
+    MovementAuthority,
+    Progress,
+    Reached,
+    Spoke,
+)
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.clauses import clause
-from engage_hri.services.control.voice.outlets import Nowhere, Outlet, Several
+from engage_hri.services.control.voice.outlets import STUCK, Gag, Nowhere, Outlet, Several
 from engage_hri.services.control.voice.parts import sounding
 from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
@@ -64,7 +74,9 @@ async def test_a_file_without_room_is_told_once_and_the_loudspeaker_goes_on(monk
     async with voice.connected():
         assert voice._wav is not None
         loudspeaker = Nowhere(asyncio.get_running_loop().time)
-        monkeypatch.setattr(voice, "_outlet", Several([loudspeaker, voice._wav]))
+        monkeypatch.setattr(
+            voice, "_outlet", Gag(Several([loudspeaker, voice._wav]), asyncio.get_running_loop().time)
+        )
         for _ in range(2):
             assert await said(voice, "one two") == ["one", "two"]
 
@@ -151,7 +163,7 @@ def takers(monkeypatch: pytest.MonkeyPatch) -> list[Taker]:
 
 
 TEXT = "one two three four five six seven"
-"""Its words begin at 0, 0.2, 0.4, 0.7, 0.95, 1.2 and 1.4 s as `Tones` says it, 50 ms after the end of the one before."""
+"""As `Tones` says it words begin at 0, 0.2, 0.4, 0.7, 0.95, 1.2 and 1.4 s, 50 ms after the one before."""
 ENDS = [0.15, 0.35, 0.65, 0.9, 1.15, 1.35, 1.65]
 
 
@@ -227,7 +239,7 @@ async def test_a_device_that_stops_stops_words_and_lips_and_is_a_fault(takers: l
     assert found.points == ["start"]
     assert len(found.words) <= sum(end <= at + kept + player.LATE + 0.006 for end in ENDS)
     assert found.moved <= at + kept + player.LATE + 2 * CHECK + 1e-6
-    assert found.ended <= at + kept + player.LATE + player.STUCK + 2 * CHECK
+    assert found.ended <= at + kept + player.LATE + STUCK + 2 * CHECK
 
 
 async def test_a_short_speech_is_not_done_before_the_device_has_taken_it(takers: list[Taker]) -> None:
@@ -297,3 +309,41 @@ async def test_a_player_that_stops_on_purpose_fails_the_speech_and_the_next_one_
         assert await said(voice, "one two") == ["one", "two"]
 
     assert [each.where for each in faults] == ["sound device"]
+
+
+async def test_a_voice_that_is_made_mute_says_no_more_and_fails() -> None:
+    voice = Voice()
+    loop, lips = asyncio.get_running_loop(), list[tuple[float, Sequence[MouthShape]]]()
+    voice.on_lips = lambda shapes: lips.append((loop.time(), shapes))
+    speech, words = Speech(id="s", text=TEXT), list[str]()
+
+    async def tell() -> None:
+        async for each in voice.perform(speech, MovementAuthority(speech, "end")):
+            words.extend([each.word] if isinstance(each, Spoke) else [])
+
+    async with voice.connected():
+        begin = loop.time()
+        loop.call_later(0.5, voice.switch_faults, [BodyFault(kind="mute")])
+        with pytest.raises(BodyFailed, match="s: the voice is mute: no sound is taken"):
+            await tell()
+        assert loop.time() - begin == pytest.approx(0.5 + STUCK, abs=2 * CHECK)
+        with pytest.raises(BodyFailed, match="mute"):
+            await said(voice, TEXT)
+        voice.switch_faults([])
+        assert await said(voice, "one two") == ["one", "two"]
+
+    assert words == ["one", "two"]
+    assert next(at for at, shapes in lips if not shapes) - begin <= 0.5 + 2 * CHECK + 1e-6
+
+
+async def test_a_voice_that_knows_that_it_is_mute_refuses() -> None:
+    voice = Voice()
+    async with voice.connected():
+        asyncio.get_running_loop().call_later(0.5, voice.switch_faults, [BodyFault(kind="voiceless")])
+        with pytest.raises(BodyFailed, match="s: the voice is mute"):
+            await said(voice, TEXT)
+        with pytest.raises(BehaviorRefused, match="s: the voice is mute"):
+            await said(voice, TEXT)
+        assert not voice.estimate(Speech(id="s", text=TEXT), None, World(entities=())).feasible
+        with pytest.raises(InputRefused, match="cannot play 'stall'"):
+            voice.switch_faults([BodyFault(kind="stall")])

@@ -6,6 +6,9 @@ from typing import Protocol
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 
+STUCK: Seconds = 0.8
+"""So long an outlet may take nothing while it is late, before it counts as dead."""
+
 
 class Outlet(Protocol):
     """A way for sound. All times are loop times, seconds.
@@ -131,3 +134,79 @@ class Several:
                 end()
 
         return unwatch
+
+
+class Gag:
+    """An outlet that can be made to take no sound, as a device that has stopped: the fault `mute`."""
+
+    def __init__(self, outlet: Outlet, now: Callable[[], Seconds]) -> None:
+        """Let sound through to an outlet. now: loop time."""
+        self.outlet = outlet
+        self._now = now
+        self._is_mute = False
+        self._fault: Fault | None = None
+        self._since: Seconds | None = None
+        """Loop time at which it was first asked whether sound is late."""
+        self._asked: Seconds = 0.0
+        self._watchers: list[Callable[[], None]] = []
+
+    @property
+    def is_live(self) -> bool:
+        return self._is_mute or self.outlet.is_live
+
+    @property
+    def lead(self) -> Seconds:
+        return self.outlet.lead
+
+    @property
+    def fault(self) -> Fault | None:
+        return self._fault or self.outlet.fault
+
+    def switch(self, *, is_mute: bool) -> None:
+        """Take no more sound, or take it again. What was played is not heard to its end."""
+        if is_mute and not self._is_mute:
+            self.outlet.cut(self._now(), b"")
+        self._is_mute = is_mute
+        self.revive()
+        for each in list(self._watchers):
+            each()
+
+    def revive(self) -> None:
+        """Try again after a fault."""
+        self._fault = self._since = None
+
+    def earliest(self) -> Seconds:
+        return self.outlet.earliest()
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        if not self._is_mute:
+            self.outlet.play(samples, at)
+
+    def rest(self) -> None:
+        if not self._is_mute:
+            self.outlet.rest()
+
+    def late(self) -> Seconds | None:
+        if not self._is_mute:
+            return self.outlet.late()
+        now = self._now()
+        if self._since is None:
+            self._since = self._asked = now
+        late, self._asked = now - self._asked, now
+        if now - self._since > STUCK:
+            self._fault = Fault(reason=f"the voice is mute: no sound is taken for {STUCK} s", service="control")
+        return late
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        if not self._is_mute:
+            self.outlet.cut(at, tail)
+
+    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
+        unwatch = self.outlet.watch(on_fault)
+        self._watchers.append(on_fault)
+
+        def end() -> None:
+            unwatch()
+            self._watchers.remove(on_fault)
+
+        return end

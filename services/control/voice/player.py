@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.voice.outlets import STUCK
 from engage_hri.services.control.voice.pipe import FedProcess
 from engage_hri.services.control.voice.settings import VoiceSettings
 
@@ -22,8 +23,6 @@ FLUSH: Seconds = 0.12
 """Silence after the last sound: a player may keep a little until there is more."""
 LATE: Seconds = 0.02
 """So much sound may be due that the player has not taken, before what is told waits for it."""
-STUCK: Seconds = 0.8
-"""So long the player may take nothing while it is late, before the device counts as dead."""
 STARTING: Seconds = 3.0
 """So long a player that was just started may take nothing: a device may have to wake up. Words wait for it."""
 PIPE = 4096
