@@ -25,12 +25,16 @@ from engage_hri.services.control.body import (
     Reached,
     Spoke,
 )
+from engage_hri.services.control.composed import Member, composed
+from engage_hri.services.control.testing import Stage
+from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.clauses import clause
 from engage_hri.services.control.voice.outlets import STUCK, Gag, Nowhere, Outlet, Several
 from engage_hri.services.control.voice.parts import sounding
 from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.silent import SilentVoice
 from engage_hri.services.control.voice.sounding import SoundingVoice
 from engage_hri.services.control.voice.speaking import CHECK, OnePart, utter_parts
 from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer
@@ -347,3 +351,19 @@ async def test_a_voice_that_knows_that_it_is_mute_refuses() -> None:
         assert not voice.estimate(Speech(id="s", text=TEXT), None, World(entities=())).feasible
         with pytest.raises(InputRefused, match="cannot play 'stall'"):
             voice.switch_faults([BodyFault(kind="stall")])
+
+
+@pytest.mark.parametrize("voice", [Voice, SilentVoice])
+async def test_the_lips_of_a_face_move_with_words_that_are_heard(voice: type[Voice | SilentVoice]) -> None:
+    torso = SimulatedBody()
+    parts = tuple(part for part in torso.capabilities.parts if part != "voice")
+    body = composed([Member("simulated", torso, parts), Member("other", voice(), ("voice",))])
+    async with body.connected():
+        stage, jaws = Stage(body, Speech(id="s", text="one, two, three"), "end"), list[float]()
+        while not stage.task.done():
+            jaws.append(body.idle().added.get("jaw", 0.0))
+            await asyncio.sleep(0.01)
+        await stage.over()
+
+    assert (max(jaws) > 0.3) == (voice is Voice)
+    assert any(isinstance(each, Spoke) for each in stage.progress)
