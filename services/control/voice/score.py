@@ -1,4 +1,4 @@
-"""What is to come in a speech, in time order: words, marks, and where sound is handed over. Pure."""
+"""Items of a speech that are to come, in time order: words, marks, and where sound is handed over. Pure."""
 
 from array import array
 
