@@ -1,6 +1,7 @@
 """A synthesizer that freezes, dies or says nothing: what is heard of it, and that the next speech is said."""
 
 import asyncio
+import signal
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +15,9 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, MovementAuthority, Spoke
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
+from engage_hri.services.control.guarded import GuardedBody
 from engage_hri.services.control.voice import studio
+from engage_hri.services.control.voice.sounding import SoundingVoice
 
 ILL = """
 import os, time
@@ -66,6 +69,23 @@ def listening(voice: Body) -> Sequence[Fault]:
     faults: list[Fault] = []
     voice.on_fault = faults.append
     return faults
+
+
+LONG = "freezes" + 100_000 * "x"
+"""A phrase of one word that does not fit into a pipe."""
+
+
+@pytest.mark.real_time
+async def test_a_long_text_does_not_make_the_loop_wait_for_a_synthesizer_that_is_frozen(tmp_path: Path) -> None:
+    voice = ill(tmp_path)
+    async with voice.connected():
+        assert isinstance(voice, GuardedBody)
+        assert isinstance(voice.body, SoundingVoice)
+        assert voice.body._studio._process is not None
+        voice.body._studio._process.send_signal(signal.SIGSTOP)
+        with pytest.raises(BodyFailed, match=r"does not answer for 0\.\d s, at 'freezesxxx"):
+            await said(voice, LONG)
+        assert await said(voice, "x" * 100_000) == ["x" * 100_000]
 
 
 @pytest.mark.real_time

@@ -8,7 +8,8 @@ it.
 import asyncio
 import shutil
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
+from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
@@ -97,7 +98,7 @@ class Player:
         """Run the player. Raises RunFailed: it does not run, or ends at once."""
         try:
             await self.ready()
-            await self._live(PROBE)
+            await self._live()
             if self.fault is not None:
                 fault = self.fault
                 raise RunFailed(fault)
@@ -144,6 +145,8 @@ class Player:
         late = untaken - (self._heard_until - now) if untaken else 0.0
         if late <= LATE and not stands:
             self._stands = None
+            if not untaken and self._written > PIPE:
+                self._started = -inf  # it has taken more than what it may read ahead as it starts
             return None
         if self._stands is None or not stands:
             self._stands = now, taken
@@ -213,17 +216,14 @@ class Player:
         for each in list(self._on_fault):
             each()
 
-    async def _live(self, seconds: Seconds) -> None:
-        """Wait for so long, or until there is a fault; sound of silence shows whether there is a device."""
-        failed = asyncio.Event()
-        unwatch = self.watch(failed.set)
+    async def _live(self) -> None:
+        """Wait until the player has taken a little silence, and has lived for a while, or until there is a fault."""
+        begin = self._loop.time()
         self.rest()
-        try:
-            if self.fault is None:
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(failed.wait(), seconds)
-        finally:
-            unwatch()
+        while self.fault is None and (now := self._loop.time()) < begin + STARTING:
+            if now >= begin + PROBE and not self._untaken:
+                return
+            await asyncio.sleep(_STEP)
 
     async def _end(self) -> None:
         if self._timer is not None:
