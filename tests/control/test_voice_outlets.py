@@ -287,7 +287,8 @@ async def test_an_abort_takes_back_what_was_handed_over_after_the_word(
     assert np.flatnonzero(np.abs(samples) > 100)[-1] / Tones.rate == pytest.approx(
         lead + max([end for end in ENDS if end <= last], default=0.0), abs=0.01
     )
-    if first.killed_at is not None:  # else nothing was handed over after the word
+    assert (first.killed_at is not None) == any(at < end + 0.05 <= at + lead for end in ENDS[:-1])  # handed over
+    if first.killed_at is not None:
         assert first.killed_at == pytest.approx(begin + lead + last, abs=0.006)
         assert len(takers) == 2
     assert takers[-1].killed_at is None
