@@ -111,7 +111,9 @@ KINDS: Mapping[str, FaultKind] = {
         usual=4.0, low=-45.0, high=45.0,
     ),
     "mute": FaultKind(
-        does="The voice makes no sound and does not know it: words and marks are reported, and nobody hears them.",
+        does="The voice makes no sound. One without sound of its own (`silent`, the simulated one) does not know it: "
+        "words and marks are reported, and nobody hears them. One that sounds (`espeak`) notices that no sound is "
+        "taken: words and lips stop, and the speech fails.",
     ),
     "voiceless": FaultKind(
         does="The voice cannot speak and knows it: it refuses what it is to say, and what it is saying fails.",

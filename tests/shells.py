@@ -32,6 +32,7 @@ SHELLS = {
     "services/control/reachy_mini/connection.py",  # HTTP and WebSockets
     "services/control/voice/player.py",  # runs the program that plays
     "services/control/voice/studio.py",  # runs the process of the synthesizer
+    "services/control/voice/pipe.py",  # runs the process of a player
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
     "services/simulation/still.py",  # a world, published once

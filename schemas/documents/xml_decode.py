@@ -43,7 +43,7 @@ from engage_hri.schemas.documents.xml_source import (
     prefixed_name,
     split,
 )  # fmt: skip
-from engage_hri.schemas.documents.xml_speech import MARKS, spoken
+from engage_hri.schemas.documents.xml_speech import MARKS, language, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated, in_draft_spelling
@@ -207,7 +207,8 @@ class _Document:
         wishes = chain([f"{reference}-text"], (f"{reference}-text-{number}" for number in count(2)))
         id = next(wish for wish in wishes if wish not in self._ids)
         timing = (of.Timing("start", f"{reference}:end"),)
-        return of.Speech(id=id, text=words, timing=timing, required=required, line=line)
+        spoken_in = language(self._source, element)
+        return of.Speech(id=id, text=words, language=spoken_in, timing=timing, required=required, line=line)
 
     @cached_property
     def _ids(self) -> Set[str | None]:
@@ -265,6 +266,7 @@ class _Document:
         self._leave_out_strays(element, raw["id"])
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
+        raw["language"] = raw.get("language") or language(self._source, element)
         if said.is_attribute:
             del element.attrib["text"]  # It has been read.
         raw["markup"] = said.markup or raw.get("markup", "")

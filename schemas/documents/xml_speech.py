@@ -27,6 +27,8 @@ from engage_hri.schemas.faults import InputRefused
 
 MARKS = ("sync", "tm", "mark")
 _WHITE = re.compile("[ \t\r\n]+")
+_LANGUAGE = re.compile("[A-Za-z]{1,8}(-[A-Za-z0-9]{1,8})*")
+"""The form of a tag for a language, RFC 3066 as `xml:lang` has it."""
 
 
 class Spoken(NamedTuple):
@@ -62,6 +64,22 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
     if texts and any(part.strip() for part in [speech.text or "", *(child.tail or "" for child in speech)]):
         raise source.refusal("words beside <text>", speech, advice="put all words inside <text>")
     return reading.result("" if description is None else serialized(description))
+
+
+def language(source: Source, speech: etree._Element) -> str:
+    """Read the language of a <speech>: the nearest `xml:lang` of its <text>, itself and what it stands in.
+
+    Raises InputRefused for what is no tag. Empty: there is none.
+    """
+    texts = [child for child in speech if _kind(child) == "text"]
+    for element in (*texts, speech, *speech.iterancestors()):
+        tag = element.get(f"{{{XML}}}lang")
+        if tag is not None:
+            if tag and not _LANGUAGE.fullmatch(tag):
+                advice = "a tag such as `de` or `pt-BR`"
+                raise source.refusal(f"xml:lang={tag!r} is no language", element, advice=advice)
+            return str(tag)
+    return ""
 
 
 def _ssml(speech: etree._Element) -> etree._Element | None:

@@ -1,9 +1,11 @@
 """A synthesizer that freezes, dies or says nothing: what is heard of it, and that the next speech is said."""
 
 import asyncio
+import signal
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,7 +15,9 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, MovementAuthority, Spoke
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
+from engage_hri.services.control.guarded import GuardedBody
 from engage_hri.services.control.voice import studio
+from engage_hri.services.control.voice.sounding import SoundingVoice
 
 ILL = """
 import os, time
@@ -67,6 +71,23 @@ def listening(voice: Body) -> Sequence[Fault]:
     return faults
 
 
+LONG = "freezes" + 100_000 * "x"
+"""A phrase of one word that does not fit into a pipe."""
+
+
+@pytest.mark.real_time
+async def test_a_long_text_does_not_make_the_loop_wait_for_a_synthesizer_that_is_frozen(tmp_path: Path) -> None:
+    voice = ill(tmp_path)
+    async with voice.connected():
+        assert isinstance(voice, GuardedBody)
+        assert isinstance(voice.body, SoundingVoice)
+        assert voice.body._studio._process is not None
+        voice.body._studio._process.send_signal(signal.SIGSTOP)
+        with pytest.raises(BodyFailed, match=r"does not answer for 0\.\d s, at 'freezesxxx"):
+            await said(voice, LONG)
+        assert await said(voice, "x" * 100_000) == ["x" * 100_000]
+
+
 @pytest.mark.real_time
 async def test_a_speech_whose_synthesizer_freezes_fails_and_the_loop_goes_on(tmp_path: Path) -> None:
     voice = ill(tmp_path)
@@ -101,7 +122,6 @@ async def test_a_text_at_which_the_synthesizer_failed_once_is_said(
 async def test_a_text_that_kills_it_twice_in_a_row_is_refused_for_a_while(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(studio, "AGAIN", 0.3)
     voice = ill(tmp_path)
     faults = listening(voice)
     async with voice.connected():
@@ -110,7 +130,8 @@ async def test_a_text_that_kills_it_twice_in_a_row_is_refused_for_a_while(
                 await said(voice, "it dies")
         assert len(faults) == 2
         assert await said(voice, "all is well") == ["all", "is", "well"]
-        time.sleep(0.3)  # noqa: ASYNC251 - it is refused by the clock
+        later = SimpleNamespace(monotonic=lambda: time.monotonic() + studio.AGAIN)
+        monkeypatch.setattr(studio, "time", later)
         with pytest.raises(BehaviorRefused, match="for the second time"):
             await said(voice, "it dies")
 

@@ -6,12 +6,19 @@ from typing import Protocol
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 
+STUCK: Seconds = 0.8
+"""So long an outlet may take nothing while it is late, before it counts as dead."""
+
 
 class Outlet(Protocol):
     """A way for sound. All times are loop times, seconds.
 
     lead: how long before a sound is to be heard it has to be played. fault: why nothing is heard any more.
+    is_live: true if it may be late: then `late` is to be asked before anything is told as heard.
     """
+
+    @property
+    def is_live(self) -> bool: ...
 
     @property
     def lead(self) -> Seconds: ...
@@ -31,6 +38,20 @@ class Outlet(Protocol):
     def rest(self) -> None:
         """Take note that silence follows what was played."""
 
+    def late(self) -> Seconds | None:
+        """Say by how much all that was played is late: it should have been heard by now, and was not even taken.
+
+        From then on that is the plan, for what is played next, too; so it is to be asked again and again.
+
+        Returns None if nothing is late; 0 if it is as late as when last asked, and nothing was taken since.
+        """
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        """Take back what was played and would be heard from `at` on. It is called at that time.
+
+        tail: the last samples before it as they should have been, for an outlet that can still change them.
+        """
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         """Call `on_fault` when there is one, until the returned function is called."""
 
@@ -40,6 +61,7 @@ class Nowhere:
 
     lead: Seconds = 0.0
     fault: Fault | None = None
+    is_live = False
 
     def __init__(self, now: Callable[[], Seconds]) -> None:
         self._now = now
@@ -53,6 +75,12 @@ class Nowhere:
     def rest(self) -> None:
         """Need nothing."""
 
+    def late(self) -> Seconds | None:
+        return None
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        """Need nothing."""
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         return lambda: None
 
@@ -60,12 +88,17 @@ class Nowhere:
 class Several:
     """Several outlets as one: sound is heard at the same time in each.
 
-    The first is what people hear: its fault is that of all. Another one that fails is missing, and says so itself.
+    The first is what people hear: all goes by its time, and its fault is that of all. Another one that fails is
+    missing, and says so itself.
     """
 
     def __init__(self, outlets: Sequence[Outlet]) -> None:
         """Join outlets, at least one."""
         self._outlets = outlets
+
+    @property
+    def is_live(self) -> bool:
+        return self._outlets[0].is_live
 
     @property
     def lead(self) -> Seconds:
@@ -86,6 +119,13 @@ class Several:
         for each in self._outlets:
             each.rest()
 
+    def late(self) -> Seconds | None:
+        return self._outlets[0].late()
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        for each in self._outlets:
+            each.cut(at, tail)
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         ends = [each.watch(on_fault) for each in self._outlets]
 
@@ -94,3 +134,79 @@ class Several:
                 end()
 
         return unwatch
+
+
+class Gag:
+    """An outlet that can be made to take no sound, as a device that has stopped: the fault `mute`."""
+
+    def __init__(self, outlet: Outlet, now: Callable[[], Seconds]) -> None:
+        """Let sound through to an outlet. now: loop time."""
+        self.outlet = outlet
+        self._now = now
+        self._is_mute = False
+        self._fault: Fault | None = None
+        self._since: Seconds | None = None
+        """Loop time at which it was first asked whether sound is late."""
+        self._asked: Seconds = 0.0
+        self._watchers: list[Callable[[], None]] = []
+
+    @property
+    def is_live(self) -> bool:
+        return self._is_mute or self.outlet.is_live
+
+    @property
+    def lead(self) -> Seconds:
+        return self.outlet.lead
+
+    @property
+    def fault(self) -> Fault | None:
+        return self._fault or self.outlet.fault
+
+    def switch(self, *, is_mute: bool) -> None:
+        """Take no more sound, or take it again. What was played is not heard to its end."""
+        if is_mute and not self._is_mute:
+            self.outlet.cut(self._now(), b"")
+        self._is_mute = is_mute
+        self.revive()
+        for each in list(self._watchers):
+            each()
+
+    def revive(self) -> None:
+        """Try again after a fault."""
+        self._fault = self._since = None
+
+    def earliest(self) -> Seconds:
+        return self.outlet.earliest()
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        if not self._is_mute:
+            self.outlet.play(samples, at)
+
+    def rest(self) -> None:
+        if not self._is_mute:
+            self.outlet.rest()
+
+    def late(self) -> Seconds | None:
+        if not self._is_mute:
+            return self.outlet.late()
+        now = self._now()
+        if self._since is None:
+            self._since = self._asked = now
+        late, self._asked = now - self._asked, now
+        if now - self._since > STUCK:
+            self._fault = Fault(reason=f"the voice is mute: no sound is taken for {STUCK} s", service="control")
+        return late
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        if not self._is_mute:
+            self.outlet.cut(at, tail)
+
+    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
+        unwatch = self.outlet.watch(on_fault)
+        self._watchers.append(on_fault)
+
+        def end() -> None:
+            unwatch()
+            self._watchers.remove(on_fault)
+
+        return end

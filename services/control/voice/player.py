@@ -7,30 +7,32 @@ it.
 
 import asyncio
 import shutil
-import subprocess
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
+from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.voice.outlets import STUCK
+from engage_hri.services.control.voice.pipe import FedProcess
 from engage_hri.services.control.voice.settings import VoiceSettings
-
-try:
-    import fcntl
-except ImportError:  # on Windows the pipe keeps its size
-    fcntl = None  # type: ignore[assignment]
 
 MARGIN: Seconds = 0.08
 """How much earlier than needed sound is handed over: for the buffer of the player, and a loop that is late."""
 FLUSH: Seconds = 0.12
 """Silence after the last sound: a player may keep a little until there is more."""
-STUCK: Seconds = 0.8
-"""So much sound may be overdue in our own buffer before the device counts as dead."""
+LATE: Seconds = 0.02
+"""So much sound may be due that the player has not taken, before what is told waits for it."""
+STARTING: Seconds = 3.0
+"""So long a player that was just started may take nothing: a device may have to wake up. Words wait for it."""
 PIPE = 4096
-"""Bytes in the pipe: a tenth of a second. What does not fit there is seen to be stuck."""
+"""Bytes in the pipe: a tenth of a second. What is there is known, and what the player has taken is not."""
 PROBE: Seconds = 0.25
 """How long a player that is started has to live before it is believed to have a device."""
+DYING = 50
+"""Steps for which it is waited until a player is dead that was killed: a second."""
+_STEP: Seconds = 0.02
 ADVICE = "install one of them (Debian: alsa-utils, pulseaudio-utils, pipewire-bin or sox), or set device=none or file"
 
 
@@ -66,26 +68,37 @@ PLAYERS: dict[str, PlayerProgram] = {
 
 
 class Player:
-    """An outlet to a sound device. After a fault the next `revive` starts the player anew."""
+    """An outlet to a sound device. After a fault, or a cut, the next `ready` starts the player anew."""
+
+    is_live = True
 
     def __init__(self, program: PlayerProgram, rate: int) -> None:
+        """Start nothing yet. rate: samples per second."""
         self._command = tuple(word.replace("{rate}", str(rate)) for word in program.command)
         self._rate, self._latency = rate, program.latency
         self._loop = asyncio.get_running_loop()
         self.lead: Seconds = program.latency + MARGIN
         self.fault: Fault | None = Fault(reason="the player was not started", service="control")
         self._on_fault: list[Callable[[], None]] = []
-        self._process: subprocess.Popen[bytes] | None = None
-        self._transport: asyncio.WriteTransport | None = None
+        self._process: FedProcess | None = None
+        self._dying: FedProcess | None = None
+        """The player before this one: until it is dead the device may be taken."""
+        self._timer: asyncio.TimerHandle | None = None
         self._heard_until: Seconds = 0.0
         """Loop time at which all that was written has been heard."""
+        self._written = 0
+        """Bytes."""
+        self._started: Seconds = 0.0
+        """Loop time."""
+        self._stands: tuple[Seconds, int] | None = None
+        """Since when, in loop time, the player has taken no more than so many bytes, though it is late."""
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
         """Run the player. Raises RunFailed: it does not run, or ends at once."""
         try:
-            await self.revive()
-            await self._live(PROBE)
+            await self.ready()
+            await self._live()
             if self.fault is not None:
                 fault = self.fault
                 raise RunFailed(fault)
@@ -93,113 +106,133 @@ class Player:
         finally:
             await self._end()
 
-    async def revive(self) -> None:
-        """Start the player if it is not running."""
-        if self.fault is None and self._process is not None:
-            return
-        await self._end()
-        try:
-            # Not asyncio's own: it starts a thread for each child in Python 3.11.
-            self._process = subprocess.Popen(  # noqa: ASYNC220
-                self._command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL
-            )
-        except OSError as error:
-            self._fail(f"the player {self._command[0]} does not start: {error.strerror or error}", ADVICE)
-            return
-        pipe = self._process.stdin
-        assert pipe is not None
-        if fcntl is not None and hasattr(fcntl, "F_SETPIPE_SZ"):
-            with suppress(OSError):
-                fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, PIPE)
-        self.fault, self._heard_until = None, 0.0
-        self._transport, _ = await self._loop.connect_write_pipe(lambda: _Ending(self._lost), pipe)
-        self._transport.set_write_buffer_limits(high=2**40)
+    async def ready(self) -> None:
+        """Start the player if it is not running, when the one before it is dead."""
+        if self.fault is not None:
+            self._drop()
+            self.fault = None
+        for _ in range(DYING):
+            if self._try_to_start():
+                return
+            await asyncio.sleep(_STEP)
+        self._fail(f"the player {self._command[0]} does not die", "does its sound device hang?")
 
     def earliest(self) -> Seconds:
-        return max(self._heard_until, self._loop.time() + self.lead)
+        now = self._loop.time()
+        self._heard_until = max(self._heard_until, now + self._untaken)
+        return max(self._heard_until, now + self.lead)
 
     def play(self, samples: bytes, at: Seconds) -> None:
-        if self.fault is not None or self._transport is None:
+        if self.fault is not None or self._process is None:
             return
-        self._check()
-        dry = self._loop.time() + self._latency
-        since = max(self._heard_until, dry)
+        now = self._loop.time()
+        since = max(self._heard_until, now + self._untaken, now + self._latency)
         silence = max(0, round((at - since) * self._rate))
-        self._transport.write(bytes(2 * silence) + samples)
+        self._write(bytes(2 * silence) + samples)
         self._heard_until = since + (silence + len(samples) // 2) / self._rate
 
     def rest(self) -> None:
-        if self.fault is None and self._transport is not None:
-            self._transport.write(bytes(2 * round(FLUSH * self._rate)))
+        if self.fault is None and self._process is not None:
+            self._write(bytes(2 * round(FLUSH * self._rate)))
             self._heard_until = max(self._heard_until, self._loop.time() + self._latency) + FLUSH
+
+    def late(self) -> Seconds | None:
+        if self.fault is not None or self._process is None:
+            return None
+        now, untaken = self._loop.time(), self._untaken
+        taken = self._written - self._process.untaken
+        stands = self._stands is not None and taken == self._stands[1]
+        late = untaken - (self._heard_until - now) if untaken else 0.0
+        if late <= LATE and not stands:
+            self._stands = None
+            if not untaken and self._written > PIPE:
+                self._started = -inf  # it has taken more than what it may read ahead as it starts
+            return None
+        if self._stands is None or not stands:
+            self._stands = now, taken
+        elif now > max(self._stands[0] + STUCK, self._started + STARTING):
+            reason = f"the sound device has taken no sound for {now - self._stands[0]:.1f} s"
+            self._fail(reason, "is it held by another program?")
+            return None
+        self._heard_until = max(self._heard_until, now + untaken)
+        return max(0.0, late)
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        """End the player: that is the only way to take sound back. Another one is started at once."""
+        if self.fault is None:
+            self._drop()
+            self._start_again()
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         self._on_fault.append(on_fault)
         return lambda: self._on_fault.remove(on_fault)
 
-    def check(self) -> None:
-        """Look whether the device takes the sound in time."""
-        if self.fault is None:
-            self._check()
+    # -- the program --------------------------------------------------------------------------------------------
 
-    def _check(self) -> None:
-        assert self._transport is not None
-        unsent = self._transport.get_write_buffer_size() / 2 / self._rate
-        ahead = max(0.0, self._heard_until - self._loop.time())
-        if unsent > ahead + STUCK:
-            self._fail(
-                f"the sound device takes no sound: {unsent:.1f} s of it wait", "is it held by another program?"
-            )
+    @property
+    def _untaken(self) -> Seconds:
+        """Seconds of sound that the player has not taken."""
+        return 0.0 if self._process is None else self._process.untaken / 2 / self._rate
+
+    def _write(self, samples: bytes) -> None:
+        assert self._process is not None
+        self._process.write(samples)
+        self._written += len(samples)
+
+    def _drop(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            self._dying = process
+
+    def _start_again(self) -> None:
+        self._timer = None
+        if self.fault is None and not self._try_to_start():
+            self._timer = self._loop.call_later(_STEP, self._start_again)
+
+    def _try_to_start(self) -> bool:
+        """Start the player if it is not running, unless the one before it is not dead yet: then return False."""
+        if self._process is not None:
+            return True
+        if self._dying is not None and not self._dying.is_dead:
+            return False
+        self._dying = self._stands = None
+        self._heard_until, self._written, self._started = 0.0, 0, self._loop.time()
+        try:
+            self._process = FedProcess(self._command, PIPE, self._lost)
+        except OSError as error:
+            self._fail(f"the player {self._command[0]} does not start: {error.strerror or error}", ADVICE)
+        return True
 
     def _lost(self) -> None:
-        process, self._transport = self._process, None
-        if process is None or self.fault is not None:
-            return
-        code = process.poll()
+        assert self._process is not None
+        code = self._process.process.poll()
         how = "has closed its input" if code is None else f"has ended with code {code}"
         self._fail(f"the player {self._command[0]} {how}", "its own words are on standard error; is there a device?")
 
     def _fail(self, reason: str, advice: str) -> None:
         self.fault = Fault(reason=reason, where="sound device", advice=advice, service="control")
+        self._drop()
         for each in list(self._on_fault):
             each()
 
-    async def _live(self, seconds: Seconds) -> None:
-        """Wait for so long, or until there is a fault; sound of silence shows whether there is a device."""
-        failed = asyncio.Event()
-        unwatch = self.watch(failed.set)
+    async def _live(self) -> None:
+        """Wait until the player has taken a little silence, and has lived for a while, or until there is a fault."""
+        begin = self._loop.time()
         self.rest()
-        try:
-            if self.fault is None:
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(failed.wait(), seconds)
-        finally:
-            unwatch()
+        while self.fault is None and (now := self._loop.time()) < begin + STARTING:
+            if now >= begin + PROBE and not self._untaken:
+                return
+            await asyncio.sleep(_STEP)
 
     async def _end(self) -> None:
-        transport, process = self._transport, self._process
-        self._transport = self._process = None
-        if transport is not None:
-            transport.abort()
-        if process is not None:
-            with suppress(ProcessLookupError):
-                process.terminate()
-            for _ in range(40):
-                if process.poll() is not None:
-                    return
-                await asyncio.sleep(0.025)
-            process.kill()
-            process.wait()
-
-
-class _Ending(asyncio.BaseProtocol):
-    """Tells when the other end of the pipe is closed."""
-
-    def __init__(self, on_end: Callable[[], None]) -> None:
-        self._on_end = on_end
-
-    def connection_lost(self, error: Exception | None) -> None:
-        self._on_end()
+        if self._timer is not None:
+            self._timer.cancel()
+        self._drop()
+        for _ in range(DYING):
+            if self._dying is None or self._dying.is_dead:
+                return
+            await asyncio.sleep(_STEP)
 
 
 def found(settings: VoiceSettings) -> PlayerProgram | None:

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -24,16 +25,17 @@ from engage_hri.services.control.body import (
     BodyFailed,
     MovementAuthority,
     Progress,
+    Reached,
 )
 from engage_hri.services.control.refusals import unsupported
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
 from engage_hri.services.control.voice.estimate import speech_estimate
-from engage_hri.services.control.voice.outlets import Nowhere, Outlet, Several
+from engage_hri.services.control.voice.outlets import Gag, Nowhere, Outlet, Several
 from engage_hri.services.control.voice.parts import Part, expected, joined, silent, sounding, unspeakable
 from engage_hri.services.control.voice.phrases import Piece, pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
-from engage_hri.services.control.voice.speaker import Speaker, speech
+from engage_hri.services.control.voice.speaker import FAULTS, Speaker, speech, voiceless
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
 from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
@@ -56,12 +58,12 @@ class SoundingVoice(Speaker):
         """Make the voice. settings: None: as they are by default."""
         super().__init__()
         self._settings: VoiceSettings = self.Settings() if settings is None else settings
-        self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",))
+        self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",), faults=FAULTS)
         self._loop = asyncio.get_running_loop()
         takes = self.synthesizer.Settings is not None
         self._studio = Studio(self.synthesizer, self._settings if takes else None, self._settings.phrase_limit)
         self._studio.on_fault = lambda fault: self.on_fault(fault)
-        self._outlet: Outlet = Nowhere(self._loop.time)
+        self._outlet = Gag(Nowhere(self._loop.time), self._loop.time)
         self._player: player.Player | None = None
         self._wav: WavFile | None = None
         self._pace = 1.0
@@ -102,7 +104,7 @@ class SoundingVoice(Speaker):
                 stack.callback(each.watch(partial(self._tell_fault, each)))
                 self._tell_fault(each)
             if outlets:
-                self._outlet = Several(outlets)
+                self._outlet.outlet = Several(outlets)
             yield
 
     def _file(self) -> WavFile:
@@ -117,6 +119,10 @@ class SoundingVoice(Speaker):
         if outlet.fault is not None:
             self.on_fault(outlet.fault)
 
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        super().switch_faults(faults)
+        self._outlet.switch(is_mute=self._voice.is_mute)
+
     # -- planning -----------------------------------------------------------------------------------------------
 
     def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
@@ -129,6 +135,8 @@ class SoundingVoice(Speaker):
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if not isinstance(behavior, Speech):
             return unsupported(behavior)
+        if self._is_voiceless:
+            return unspeakable(behavior, voiceless(behavior))
         found = pieces(behavior, self._settings.language)
         if not found:
             return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
@@ -153,24 +161,29 @@ class SoundingVoice(Speaker):
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         behavior = speech(behavior)
+        if self._is_voiceless:
+            raise BehaviorRefused(voiceless(behavior))
         await self._voice.wait_for_silence(authority)
         if authority.revoked is not None:
             return
-        if self._player is not None and self._player.fault is not None:
-            await self._player.revive()
+        if self._player is not None:
+            await self._player.ready()
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
         if self._wav is not None:
             self._wav.revive()
+        self._outlet.revive()
         parts = _Phrases(behavior, self)
         if (refused := parts.refused()) is not None:
             raise BehaviorRefused(replace(refused, where=behavior.id))
         words = utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
         async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
             async for progress in utterance:
-                if self._player is not None:
-                    self._player.check()
                 yield progress
+                if isinstance(progress, Reached) and progress.sync == "end":
+                    return
+        if self._is_voiceless:
+            raise BodyFailed(voiceless(behavior))
 
     def parts_of(self, behavior: Speech) -> Sequence[Piece]:
         """Cut a speech into phrases, and have them synthesized."""

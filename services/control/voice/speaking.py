@@ -4,14 +4,12 @@ A voice hands sound over `lead` seconds before it is heard. So each word has two
 whether it may be is decided, and when it is heard and told of. Without a sound device they are one.
 """
 
-from array import array
 from collections import deque
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import aclosing
 from math import inf
 from typing import Protocol
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech, Wait
@@ -27,12 +25,13 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.voice.outlets import Nowhere, Outlet
 from engage_hri.services.control.voice.parts import Part, silent
+from engage_hri.services.control.voice.score import FADE, Cut, Gap, Item, More, faded, items_of
 from engage_hri.services.control.voice.visemes import Lips
 from engage_hri.services.control.waiting import Bell
 
 OnLips = Callable[[Sequence[MouthShape]], None]
-FADE: Seconds = 0.004
-"""Seconds in which sound fades where it is cut between two words, so that it does not click."""
+CHECK: Seconds = 0.05
+"""How often it is looked whether a device takes the sound."""
 
 
 class Parts(Protocol):
@@ -58,35 +57,6 @@ class OnePart:
         return lambda: None
 
 
-class _Gap(Struct, frozen=True):
-    """Silence before a word.
-
-    part: the number of its part. since, until: seconds in the part, from this word to the next one. word: its end.
-    """
-
-    part: int
-    since: Seconds
-    until: Seconds
-    word: "_Item"
-
-
-class _More(Struct, frozen=True):
-    """The place at which the next part has to be ready. part: its number."""
-
-    part: int
-
-
-class _Item(Struct, frozen=True):
-    """A thing that is to come at `at`, seconds from the start of the utterance.
-
-    is_gap: of a mark between two words.
-    """
-
-    at: Seconds
-    what: Reached | Spoke | _Gap | _More
-    is_gap: bool = False
-
-
 async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
     """Say a text in silence, word by word. pace: 2 takes twice as long. Like `utter_parts`."""
     bell = Bell()
@@ -105,8 +75,9 @@ async def utter_parts(
 ) -> AsyncGenerator[Progress, None]:
     """Say a text word by word. At a mark between two words the voice pauses until it may pass the mark.
 
-    While it is held it pauses before the next word, too. If the authority is revoked, the voice finishes the words
-    that were handed over: the current one, and perhaps the next. Raises BodyFailed: nothing is heard any more.
+    While it is held it pauses before the next word, too. If the authority is revoked, the voice finishes the word
+    that is heard, and takes back what was handed over after it. What a device has not taken is not told as heard:
+    words and lips wait for it. Raises BodyFailed: nothing is heard any more.
     """
     bell = Bell()
     ends = [authority.watch(bell.ring), outlet.watch(bell.ring), parts.watch(bell)]
@@ -141,12 +112,16 @@ class _Utterance:
         self._outlet, self._on_lips, self._bell = outlet, on_lips, bell
         self._begin = outlet.earliest() if outlet.lead else bell.now()
         self._ready: list[Part] = []
-        self._ahead: deque[_Item] = deque([_Item(0.0, _More(0))])
+        self._ahead: deque[Item] = deque([Item(0.0, More(0))])
         """What is not handed over yet, in time order."""
-        self._coming: deque[_Item] = deque()
+        self._coming: deque[Item] = deque()
         """What is handed over and not told yet."""
-        self._word: _Item | None = None
+        self._word: Item | None = None
         """The word that was handed over last, until its end is in `_coming`."""
+        self._handed: list[tuple[Gap, Seconds]] = []
+        """The words that were handed over, and when each begins."""
+        self._lates = 0
+        """How many times in a row the device was late."""
         self._lips: list[Lips] = []
         self._tail: tuple[bytes, Seconds, int] | None = None
         """The last samples of a word, which fade if no word follows at once; when they sound, and their rate."""
@@ -164,12 +139,15 @@ class _Utterance:
         due = [self._begin + self._coming[0].at] if self._coming else []
         if self._ahead:
             due.append(self._begin + self._ahead[0].at - (0.0 if self._waits else self._outlet.lead))
+        if self._sounds:
+            due.append(self._bell.now() + CHECK)
         return min((each for each in due if not self._bell.is_past(each)), default=inf)
 
     def hand_over(self) -> None:
         """Hand over all that is due and may be said. Raises BodyFailed."""
         if self._outlet.fault is not None:
             raise BodyFailed(replace(self._outlet.fault, where=self._behavior.id))
+        self._keep_up()
         if self._authority.revoked is not None:
             self._cut()
         while self._ahead:
@@ -193,6 +171,9 @@ class _Utterance:
                 return None
             item = self._coming.popleft()
             at = self._begin + item.at
+            if isinstance(item.what, Cut):
+                self._outlet.cut(at, item.what.tail)
+                return self.next_told()
             if isinstance(item.what, Spoke):
                 return replace(item.what, at=at)
             assert isinstance(item.what, Reached)
@@ -211,26 +192,64 @@ class _Utterance:
         if not self._is_done and self._lips:
             self._on_lips(())
 
+    # -- a device that may be late ------------------------------------------------------------------------------
+
+    @property
+    def _sounds(self) -> bool:
+        """True if there is sound with a device that may be late."""
+        return self._outlet.is_live and (self._word is not None or bool(self._coming))
+
+    def _keep_up(self) -> None:
+        """Put off all that is to be told, and the lips, for sound that the device has not taken in time.
+
+        Raises BodyFailed: it takes no more.
+        """
+        if not self._sounds:
+            return
+        late = self._outlet.late()
+        if self._outlet.fault is not None:
+            raise BodyFailed(replace(self._outlet.fault, where=self._behavior.id))
+        if late is not None:
+            self._begin += late
+            self._lates += 1
+            if self._lates == 1:
+                self._tell_lips()
+            elif self._is_cut:
+                self._stop()
+            elif self._lates == 2 and self._lips:
+                self._on_lips(())
+        elif self._lates:
+            self._lates = 0
+            if not self._is_paused:
+                self._tell_lips()
+
+    def _stop(self) -> None:
+        """Wait no more for the end of the last word."""
+        self._coming.clear()
+        self._word = self._tail = None
+        self._outlet.cut(self._bell.now(), b"")
+
     # -- handing over -------------------------------------------------------------------------------------------
 
-    def _may_go(self, item: _Item) -> bool:
+    def _may_go(self, item: Item) -> bool:
         match item.what:
-            case _More(part=number):
+            case More(part=number):
                 return self._parts.part(number) is not None
-            case _Gap():
+            case Gap():
                 return not self._authority.held
             case Reached(sync=sync) if item.is_gap:
                 return self._authority.covers(sync)
         return True
 
-    def _do(self, item: _Item) -> None:
+    def _do(self, item: Item) -> None:
         match item.what:
-            case _More(part=number):
+            case More(part=number):
                 part = self._parts.part(number)
                 assert part is not None
                 self._begin_part(part, number, item.at)
-            case _Gap() as gap:
+            case Gap() as gap:
                 self._word = gap.word
+                self._handed.append((gap, item.at))
                 self._play(gap, item.at)
             case Reached() as reached:
                 arrived, self._arrived = self._arrived, None
@@ -245,20 +264,40 @@ class _Utterance:
     def _begin_part(self, part: Part, number: int, at: Seconds) -> None:
         start = self._ready[-1].end if self._ready else 0
         self._ready.append(part)
-        self._ahead.extend(_score(self._behavior, part, number, start, at))
+        self._ahead.extend(items_of(self._behavior, part, number, start, at))
         self._lips += [Lips(each.at + at, each.opening, each.width) for each in part.lips]
         self._tell_lips()
 
     def _cut(self) -> None:
-        """Say no more than the words that were handed over."""
-        if not self._is_cut:
-            self._is_cut = True
-            words = [item for item in self._coming if isinstance(item.what, Spoke)]
-            self._coming = deque([*words, *([self._word] if self._word is not None else [])])
-            self._ahead.clear()
+        """Say no more than the word that is heard now."""
+        if self._is_cut:
+            return
+        self._is_cut = True
+        self._ahead.clear()
+        words = [item for item in self._coming if isinstance(item.what, Spoke)]
+        words += [] if self._word is None else [self._word]
+        self._coming = deque(words)
+        until = self._bell.now() - self._begin
+        if self._lates < 2:
+            until = next((gap.word.at for gap, at in self._handed if at < until < gap.word.at), until)
+        if not self._outlet.lead or not words or words[-1].at <= until:
             self._rest()
+            return
+        kept = [word for word in words if word.at <= until]
+        cut = Item(until, Cut(faded(self._before(until))))
+        place = sum(word.at < until for word in kept)
+        self._coming = deque([*kept[:place], cut, *kept[place:]])
+        self._tail = None
 
-    def _play(self, gap: _Gap, at: Seconds) -> None:
+    def _before(self, until: Seconds) -> bytes:
+        """The last samples before a time, as many as are to fade."""
+        gap, at = next(((gap, at) for gap, at in reversed(self._handed) if at < until), (None, 0.0))
+        if gap is None or not (part := self._ready[gap.part]).samples:
+            return b""
+        end = 2 * round((gap.since + until - at) * part.rate)
+        return part.samples[max(0, end - 2 * round(FADE * part.rate)) : end]
+
+    def _play(self, gap: Gap, at: Seconds) -> None:
         part = self._ready[gap.part]
         if not part.samples:
             return
@@ -276,7 +315,7 @@ class _Utterance:
         if self._tail is not None:
             tail, sounds, _ = self._tail
             self._tail = None
-            self._outlet.play(_faded(tail), self._begin + sounds)
+            self._outlet.play(faded(tail), self._begin + sounds)
             self._outlet.rest()
 
     def _pause(self) -> None:
@@ -285,7 +324,7 @@ class _Utterance:
             if self._lips:
                 self._on_lips(())
 
-    def _resume(self, item: _Item) -> None:
+    def _resume(self, item: Item) -> None:
         """Go on after a pause: all that is to come is later."""
         due = self._begin + item.at
         if self._outlet.lead:
@@ -304,45 +343,6 @@ class _Utterance:
         self._lips = self._lips[passed[-1] if passed else 0 :]
         if self._lips:
             self._on_lips([MouthShape(self._begin + each.at, each.opening, each.width) for each in self._lips])
-
-
-def _faded(samples: bytes) -> bytes:
-    values = array("h", samples)
-    count = len(values)
-    return array("h", [value * (count - place) // count for place, value in enumerate(values)]).tobytes()
-
-
-def _score(behavior: Speech, part: Part, number: int, start: int, base: Seconds) -> list[_Item]:
-    """List all that is to come in a part, in time order. start: characters of the text before it.
-
-    Reports of one instant are in the order of the text: a word, the mark after it, the gap before the next.
-    """
-    last, utterance = len(behavior.text), part.utterance
-    is_last = part.end >= last
-    score: list[tuple[Seconds, int, _Item]] = []
-    if number == 0:
-        score.append((0.0, -1, _Item(0.0, Reached("start", 0.0, 0.0))))
-    told = {}
-    for word in utterance.words:
-        told[word.position] = _Item(base + word.end, Spoke(word.text, word.position, word.end))
-        score.append((word.end, word.position, told[word.position]))
-    for mark in sorted(behavior.marks, key=lambda mark: mark.position):
-        if start <= mark.position < part.end or (is_last and mark.position >= part.end):
-            at = utterance.said_by(mark.position)
-            item = _Item(base + at, Reached(mark.id, at, at), utterance.is_gap(mark.position))
-            score.append((at, mark.position, item))
-    said = [word for word in utterance.words if word.end > word.start]
-    following = [word.start for word in said[1:]] + [utterance.seconds] * bool(said)
-    for word, until in zip(said, following, strict=True):
-        gap = _Gap(number, word.start if word is not said[0] else 0.0, until, told[word.position])
-        score.append((word.start, word.position - len(word.text), _Item(base + word.start, gap)))
-    if is_last:
-        end = _Item(base + utterance.seconds, Reached("end", 0.0, 0.0))
-        score.append((utterance.seconds, last, end))
-    else:
-        after = utterance.seconds + part.pause
-        score.append((after, part.end, _Item(base + after, _More(number + 1))))
-    return [item for _, _, item in sorted(score, key=lambda each: each[:2])]
 
 
 async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

@@ -55,7 +55,7 @@ class _Asked(NamedTuple):
 
 
 class _Refused(NamedTuple):
-    """What came of a phrase that cannot be said. until: on the clock; from then on it is tried again when asked."""
+    """The refusal of a phrase. until: on the clock; from then on it is tried again when asked."""
 
     fault: Fault
     until: Seconds
@@ -91,7 +91,7 @@ class Studio:
         self._timer: asyncio.TimerHandle | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._end: weakref.finalize[..., Studio] | None = None
-        self._buffer = bytearray()
+        self._buffer, self._unsent = bytearray(), bytearray()
         self._bells: list[Bell] = []
         self._listens: asyncio.AbstractEventLoop | None = None
 
@@ -178,7 +178,9 @@ class Studio:
         if process is not None and process.stdout is not None and self._listens is not None:
             with suppress(RuntimeError):  # the loop is closed
                 self._listens.remove_reader(process.stdout.fileno())
-        self.rate, self._buffer = 0, bytearray()
+                if process.stdin is not None:
+                    self._listens.remove_writer(process.stdin.fileno())
+        self.rate, self._buffer, self._unsent = 0, bytearray(), bytearray()
         self._expect(None)
         if self._end is not None:
             self._end()
@@ -230,7 +232,9 @@ class Studio:
         if self._process is None or self._process.stdout is None:
             return self._broken is None  # it was lost in this moment, and may be started again
         patience = 1.0 if self._asked is None else max(0.0, self._left(self._asked))
-        select.select([self._process.stdout], [], [], min(left, patience, 1.0))
+        full = [self._process.stdin] if self._unsent and self._process.stdin is not None else []
+        select.select([self._process.stdout], full, [], min(left, patience, 1.0))
+        self._push()
         return True
 
     def _forget_refusals(self, phrases: Sequence[Phrase]) -> None:
@@ -248,7 +252,9 @@ class Studio:
         )  # fmt: skip
         self._end = weakref.finalize(self, _ended, process)
         assert process.stdout is not None
+        assert process.stdin is not None
         os.set_blocking(process.stdout.fileno(), False)
+        os.set_blocking(process.stdin.fileno(), False)  # a long text does not fit into the pipe of one that is frozen
         if self._listens is not None:
             self._listens.add_reader(process.stdout.fileno(), self._go_on)
         self._expect(_Asked(None, time.monotonic()))
@@ -259,12 +265,20 @@ class Studio:
         self._write(packed(phrase))
 
     def _write(self, message: bytes) -> None:
-        assert self._process is not None
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(message)
-        except OSError:
-            self._lose("the synthesizer has ended")
+        self._unsent += message
+        self._push()
+
+    def _push(self) -> None:
+        """Let the process have as much of what it is asked as its pipe holds."""
+        if self._process is None or self._process.stdin is None:
+            return
+        pipe = self._process.stdin.fileno()
+        with suppress(BlockingIOError, BrokenPipeError):  # that it is gone is seen where it answers
+            del self._unsent[: os.write(pipe, self._unsent)]
+        if self._listens is not None:
+            self._listens.remove_writer(pipe)
+            if self._unsent:
+                self._listens.add_writer(pipe, self._push)
 
     def _take(self) -> None:
         if self._process is None or self._process.stdout is None:

@@ -23,6 +23,7 @@ class WavFile:
     """An outlet into a file. It takes what it is given at once, so it needs no lead."""
 
     lead: Seconds = 0.0
+    is_live = False
 
     def __init__(self, file: BinaryIO, name: str, rate: int, origin: Seconds, now: Callable[[], Seconds]) -> None:
         """Begin an empty file. file: unbuffered. rate: samples per second. origin: the loop time of its second 0."""
@@ -60,6 +61,17 @@ class WavFile:
 
     def rest(self) -> None:
         """Need nothing: what is not written is silence."""
+
+    def late(self) -> Seconds | None:
+        return None
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        size = max(0, round((at - self._origin) * self._rate)) * 2
+        if self.fault is None and size < self._size:
+            self._size = size
+            self._write(max(_HEADER, _HEADER + size - len(tail)), tail)
+            self._file.truncate(_HEADER + size)
+            self._write(0, _header(size, self._rate, self._origin))
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         self._on_fault.append(on_fault)
