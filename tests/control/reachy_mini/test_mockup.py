@@ -82,6 +82,11 @@ class Witness:
         """The longest time between two measurements, seconds."""
         return max((b - a for a, b in pairwise(self.times)), default=math.inf)
 
+    @property
+    def is_busy(self) -> bool:
+        """True if the machine has had no time for what was to be measured, by the measurements or by its load."""
+        return self.worst > DISTURBED or os.getloadavg()[0] > (os.cpu_count() or 1)
+
 
 class OnTheMockup(BodyContract):
     tolerance = 0.25  # of a machine with other work
@@ -112,7 +117,7 @@ async def test_the_contract_on_the_mockup_where_it_has_time(mockup: Mockup, clai
         try:
             await _claimed(claim, suite, mockup)
         except LawBroken:
-            if suite.witness.worst < DISTURBED:
+            if not suite.witness.is_busy:
                 raise
         else:
             return
@@ -252,16 +257,22 @@ async def test_the_fake_daemon_is_no_better_than_the_real_one(
     for _ in range(ATTEMPTS):
         witness = Witness()
         real = await _followed(lambda: witness(ReachyMiniSettings(url=mockup.url)))  # noqa: B023
-        if witness.worst < DISTURBED:
+        if not (unlike := list(_unlike(real, fake_followed))):
+            return
+        if not witness.is_busy:
             break
     else:
-        pytest.skip(f"no time on this machine: {witness.worst:.2f} s between two measurements")
+        pytest.skip(f"no time on this machine: {witness.worst:.2f} s between two measurements; {'; '.join(unlike)}")
+    assert unlike == []
 
-    fake = fake_followed
-    assert fake[0] >= real[0] - 0.03, "the fake lags less"
-    assert abs(fake[0] - real[0]) < 0.05
-    assert max(real[1], fake[1]) < math.radians(2.0)
-    assert abs(real[2] - fake[2]) < 0.008  # seconds between measurements, and of a busy machine
+
+def _unlike(real: tuple[float, float, float], fake: tuple[float, float, float]) -> Iterator[str]:
+    if fake[0] < real[0] - 0.03 or abs(fake[0] - real[0]) >= 0.05:
+        yield f"the real daemon lags {real[0]:.3f} s, the fake {fake[0]:.3f} s"
+    if max(real[1], fake[1]) >= math.radians(2.0):
+        yield f"that explains all but {real[1]:.3f} of the real one, and {fake[1]:.3f} rad of the fake"
+    if abs(real[2] - fake[2]) >= 0.008:  # and of a busy machine
+        yield f"the real one measures each {real[2]:.3f} s, the fake each {fake[2]:.3f} s"
 
 
 async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]:
