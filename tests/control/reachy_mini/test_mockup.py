@@ -33,12 +33,7 @@ TIMED = (
     BodyContract.test_takes_the_time_that_it_predicted,
     BodyContract.test_a_look_that_comes_over_a_shift_on_its_way_goes_home_to_where_that_leads,
 )
-"""Claims of the contract that need no long waits, and are about how long something takes."""
-SOME = (
-    BodyContract.test_home_is_reached_from_anything,
-    BodyContract.test_refuses_what_it_cannot_do_before_anything_moves,
-)
-"""Claims that hold whatever else the machine does."""
+"""Claims of the contract that need no long waits, and of which the daemon's own time says more than the fake's."""
 FEW = (
     Gaze(id="gaze", target="near-right"), GazeShift(id="gazeShift", target="far-left"), Head(id="head", lexeme="NOD"),
     FaceLexeme(id="faceLexeme", lexeme="SMILE"), Posture(id="posture", lexeme="LEAN_FORWARD"),
@@ -105,13 +100,8 @@ class TestAll(OnTheMockup):
     """All of the contract."""
 
 
-@pytest.mark.parametrize("claim", SOME, ids=lambda claim: claim.__name__)
-async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
-    await _claimed(claim, OnTheMockup(), mockup)
-
-
 @pytest.mark.parametrize("claim", TIMED, ids=lambda claim: claim.__name__)
-async def test_the_contract_on_the_mockup_where_it_has_time(mockup: Mockup, claim) -> None:
+async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
     suite = OnTheMockup()
     for _ in range(ATTEMPTS):
         try:
