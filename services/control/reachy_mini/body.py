@@ -182,17 +182,14 @@ class ReachyMini(Body):
         self._moves.relax(names, self._loop.time())
         watches = {name: Watch(self._settings.patience) for name in names}
         with self._bell() as bell:
-            while going := [name for name in names if not self._is_home(name)]:
-                if taken := sorted({joints.PARTS[name] for name in going if name in self._moves.runs}):
+            while names := [name for name in names if not self._is_home(name, watches[name])]:
+                if taken := sorted({joints.PARTS[name] for name in names if name in self._moves.runs}):
                     raise TakenOver(taken)
                 await bell.wait(inf if self._link is not None else self._loop.time())
                 if self._link is None:
                     return
                 if self._trouble is not None:  # it goes home by itself once it is back
                     watches = {name: Watch(self._settings.patience) for name in names}
-                    continue
-                for name in going:
-                    self._check(watches[name], self._off_home(name), "home", name)
 
     def state(self) -> BodyState:
         pose = self._moves.measured
@@ -274,9 +271,8 @@ class ReachyMini(Body):
                 if not run.motion.path.marks[instant.syncs[0]] and instant is run.course.instants[0]:
                     return now  # it begins: nothing has to be anywhere
                 off = self._moves.off_run(run, instant, now)
-                if off.share <= 1.0:
+                if self._has_come(watch, off, run.behavior.id, instant.syncs[-1]):
                     return max(due, self._last_frame)  # when that was measured
-                self._check(watch, off, run.behavior.id, instant.syncs[-1])
             await run.bell.wait(inf if due is None or is_due else due)
         return self._loop.time()
 
@@ -286,11 +282,10 @@ class ReachyMini(Body):
         while run.authority.revoked is None:
             self._raise_trouble(run)
             run.regulate(now := self._loop.time())
-            if run.may_pass(instant.hold):
-                off = self._moves.off_run(run, instant, now)
-                if off.share <= 1.0:
-                    return
-                self._check(watch, off, run.behavior.id, instant.hold)
+            if run.may_pass(instant.hold) and self._has_come(
+                watch, self._moves.off_run(run, instant, now), run.behavior.id, instant.hold
+            ):
+                return
             await run.bell.wait(inf)
         if not (run.authority.revoked == "taken_over" and run.authority.covers(instant.hold)):
             raise Revoked
@@ -307,8 +302,10 @@ class ReachyMini(Body):
 
     # -- measured joints ----------------------------------------------------------------------------------------
 
-    def _check(self, watch: Watch, off: Off, where: str, sync: str) -> None:
-        """Raise BodyFailed if joints that are not where they should be make no way any more."""
+    def _has_come(self, watch: Watch, off: Off, where: str, sync: str) -> bool:
+        """Tell if joints are where they should be. Raises BodyFailed if they are not, and make no way any more."""
+        if off.share <= 1.0:
+            return True
         if (waited := watch.stuck(abs(off.there - off.here), self._last_frame)) is not None:
             here, there = round(degrees(off.here), 1) + 0.0, degrees(off.there)
             reason = (
@@ -317,14 +314,16 @@ class ReachyMini(Body):
             )
             advice = "is it free, are its motors on, and does no other app move the robot?"
             raise BodyFailed(Fault(reason=reason, where=where, advice=advice, service="control"))
+        return off.is_near_for_standing and watch.stands
 
     def _off_home(self, name: str) -> Off:
         track, now = self._moves.tracks[name], self._loop.time()
         return self._moves.off(name, now, track.going)
 
-    def _is_home(self, name: str) -> bool:
+    def _is_home(self, name: str, watch: Watch) -> bool:
+        """True once a track has come home. Raises BodyFailed if it does not."""
         comes = self._moves.tracks[name].motion.end + self._settings.lag
-        return self._loop.time() >= comes and self._off_home(name).share <= 1.0
+        return self._loop.time() >= comes and self._has_come(watch, self._off_home(name), "home", name)
 
     def _is_moving(self) -> bool:
         """True while a plan moves, or joints have not come along yet."""

@@ -15,9 +15,11 @@ Tracks = dict[str, tuple[float, ...]]
 NEAR = {
     "head_pitch": radians(0.8), "head_yaw": radians(0.8), "body_follow": radians(2.0), "nod_yaw": radians(1.0),
     "nod_pitch": radians(1.0), "nod_roll": radians(1.0), "body_turn": radians(1.0), "body_lean": radians(0.5),
-    "right_antenna": radians(4.0), "left_antenna": radians(4.0),
+    "right_antenna": radians(1.0), "left_antenna": radians(1.0),
 }  # fmt: skip
-"""How far a joint of a track may be from a sync point. An antenna is a long lever on a small motor."""
+"""How far a joint of a track may be from a sync point."""
+STANDING = {"right_antenna": radians(4.0), "left_antenna": radians(4.0)}
+"""How far it may be once it has come to stand: an antenna is a long lever on a small motor."""
 
 
 class Off(Struct, frozen=True):
@@ -27,6 +29,11 @@ class Off(Struct, frozen=True):
     share: float
     here: Radians
     there: Radians
+
+    @property
+    def is_near_for_standing(self) -> bool:
+        """True if it is near enough, should it have come to stand there."""
+        return abs(self.there - self.here) <= STANDING.get(self.joint, 0.0)
 
 
 class Aim(Struct, frozen=True):

@@ -1,8 +1,6 @@
 """Patience with joints that are not where they should be, and with measurements that come too seldom. Pure."""
 
 import math
-from collections import deque
-from itertools import pairwise
 
 from engage_hri.schemas.units import Radians, Seconds
 
@@ -10,8 +8,10 @@ WAY: Radians = math.radians(0.3)
 """What counts as way; noise of the encoders does not."""
 ENOUGH = 8
 """Measurements without way that it takes at least."""
-COUNTED = 17
-"""Measurements by which it is told how often they come."""
+STANDS: Seconds = 0.25
+"""Seconds without way after which a joint has come to stand, if it is short of patience."""
+COUNTED = 16
+"""Measurements whose mean tells how often they come."""
 GAP_THAT_COUNTS: Seconds = 0.5
 """A longer one counts as this: it may be the only one."""
 
@@ -31,12 +31,20 @@ class Watch:
 
     def stuck(self, left: Radians, measured: Seconds) -> Seconds | None:
         """Note what is left, as it was measured at that time. Returns the seconds without way, once too many."""
+        self._note(left, measured)
+        waited = measured - self._since
+        return waited if waited > self._patience and self._seen > ENOUGH else None
+
+    @property
+    def stands(self) -> bool:
+        """True if it has come to stand, by what was noted."""
+        return self._last - self._since > STANDS and self._seen > ENOUGH
+
+    def _note(self, left: Radians, measured: Seconds) -> None:
         if left < self._best - WAY:
             self._best, self._since, self._seen = left, measured, 0
         if measured > self._last:
             self._last, self._seen = measured, self._seen + 1
-        waited = measured - self._since
-        return waited if waited > self._patience and self._seen > ENOUGH else None
 
 
 class Rate:
@@ -44,7 +52,8 @@ class Rate:
 
     def __init__(self, longest: Seconds) -> None:
         self._longest = longest
-        self._times: deque[Seconds] = deque(maxlen=COUNTED)
+        self._mean: Seconds = 0.0
+        self._last: Seconds | None = None
         self._is_slow = False
 
     def fallen(self, now: Seconds) -> float | None:
@@ -52,10 +61,9 @@ class Rate:
 
         It does so again after there were half as many again as it takes. One long gap alone is no slow stream.
         """
-        self._times.append(now)
-        if len(self._times) < COUNTED:
-            return None
-        gaps = [min(b - a, GAP_THAT_COUNTS) for a, b in pairwise(self._times)]
+        gap = now - self._last if self._last is not None else 0.0
+        self._last = now
+        self._mean += (min(gap, GAP_THAT_COUNTS) - self._mean) / COUNTED
         longest = self._longest / (1.5 if self._is_slow else 1.0)
-        was_slow, self._is_slow = self._is_slow, sum(gaps) / len(gaps) > longest
-        return len(gaps) / (now - self._times[0]) if self._is_slow and not was_slow else None
+        was_slow, self._is_slow = self._is_slow, self._mean > longest
+        return 1.0 / self._mean if self._is_slow and not was_slow else None

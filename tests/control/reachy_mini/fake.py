@@ -5,12 +5,13 @@ it is told at once, however far; it tells its joints 43 times a second when 50 a
 """
 
 import asyncio
-import json
 import math
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from itertools import repeat
 from random import Random
+
+import msgspec
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.control.reachy_mini import joints
@@ -27,7 +28,8 @@ class FakeDaemon:
     """Its faults can be set at any time.
 
     noise: of each angle, radians. sag: by how much the head hangs lower than it was told. stuck: angles that do not
-    move. slow: the greatest speed of the head, rad/s. mode: of the motors; unless they are enabled nothing moves.
+    move. slow: the greatest speed of head and antennas, rad/s. bent: by how much the antennas stand off, radians.
+    mode: of the motors; unless they are enabled nothing moves.
     """
 
     def __init__(self) -> None:
@@ -35,6 +37,7 @@ class FakeDaemon:
         self.sag = 0.0
         self.stuck: set[str] = set()
         self.slow = math.inf
+        self.bent = 0.0
         self.mode = "enabled"
         self.is_running = True
         self.garbage = ""
@@ -102,7 +105,7 @@ class FakeDaemon:
             except TimeoutError:
                 raise Lost(Fault(reason="the daemon cannot be reached: no answer", advice="start it")) from None
 
-    async def measurement(self, life: int) -> str:
+    async def measurement(self, life: int) -> str | bytes:
         await asyncio.sleep(next(self.periods))
         await self._thawed.wait()
         if life != self._life:
@@ -123,14 +126,14 @@ class FakeDaemon:
     # -- joints -------------------------------------------------------------------------------------------------
 
     def _take(self, text: str) -> None:
-        told = json.loads(text)
+        told = msgspec.json.decode(text)
         right, left = told["target_antennas"]
         pose = {**told["target_head_pose"], "body_yaw": told["target_body_yaw"], "right": right, "left": left}
         now = asyncio.get_running_loop().time()
         self.commands.append((now, pose))
         self._coming.append(((math.floor(now / TICK) + 2) * TICK, pose))
 
-    def _state(self) -> str:
+    def _state(self) -> bytes:
         self._advance(asyncio.get_running_loop().time())
         pose = {
             name: angle + self._chance.gauss(0.0, self.noise) if self.noise else angle
@@ -141,7 +144,7 @@ class FakeDaemon:
         }
         if self.is_upside_down:
             head |= {"yaw": math.pi - 0.1, "z": -0.056}
-        return json.dumps(
+        return msgspec.json.encode(
             {"control_mode": self.mode, "head_pose": head, "body_yaw": pose["body_yaw"],
              "antennas_position": [pose["right"], pose["left"]], "timestamp": "2026-11-24T09:35:20.051659Z"}
         )  # fmt: skip
@@ -160,13 +163,15 @@ class FakeDaemon:
         if self.mode != "enabled" or self._target is None:
             return
         target = {**self._target, "pitch": self._target["pitch"] + self.sag}
+        target |= {"right": target["right"] + self.bent, "left": target["left"] + self.bent}
         aside = math.remainder(target["yaw"] - target["body_yaw"], math.tau)
         if abs(aside) > math.radians(65.0):  # it takes the body along
             target["body_yaw"] = target["yaw"] - math.copysign(math.radians(65.0), aside)
         for name, angle in target.items():
             if name not in self.stuck:
                 way = angle - self._pose[name]
-                limit = self.slow * since if name in ("yaw", "pitch", "roll") and self.slow < math.inf else math.inf
+                is_slow = self.slow < math.inf and name not in ("body_yaw", "x", "y", "z")
+                limit = self.slow * since if is_slow else math.inf
                 self._pose[name] += max(-limit, min(limit, way))
 
 
@@ -174,7 +179,7 @@ class _Connection:
     def __init__(self, daemon: FakeDaemon, life: int) -> None:
         self._daemon, self._life = daemon, life
 
-    async def measurement(self) -> str:
+    async def measurement(self) -> str | bytes:
         return await self._daemon.measurement(self._life)
 
     async def command(self, text: str) -> None:

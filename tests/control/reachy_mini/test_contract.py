@@ -12,6 +12,7 @@ from tests.control.reachy_mini.fake import FakeDaemon
 
 class TestReachyMini(BodyContract):
     tolerance = 0.06
+    seeds = 6
 
     def make(self) -> Body:
         return ReachyMini(connect=FakeDaemon())
@@ -30,6 +31,7 @@ class TestReachyMini(BodyContract):
 class TestNoisyReachyMini(BodyContract):
     tolerance = 0.06
     noise = math.radians(0.3)
+    seeds = 3
 
     def make(self) -> Body:
         daemon = FakeDaemon()

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Reached
+from engage_hri.services.control.body import BodyFailed, Reached
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
@@ -45,6 +45,10 @@ def place(name: str) -> Vector:
 
 def angle(body: ReachyMini, joint: str) -> float:
     return {each.joint: math.degrees(each.angle) for each in body.state().pose.joints}[joint]
+
+
+def antennas(body: ReachyMini) -> tuple[float, float]:
+    return angle(body, "right_antenna"), angle(body, "left_antenna")
 
 
 def with_person(at: Vector) -> World:
@@ -161,6 +165,47 @@ async def test_antennas_tell_faces_apart(body: ReachyMini):
     assert shown["WINK"][0] > 50.0 > 11.0 > shown["WINK"][1]
     faces = list(shown.values())
     assert all(math.dist(a, b) > 8.0 for n, a in enumerate(faces) for b in faces[:n])
+
+
+FACES = ("SMILE", "SADNESS", "ANGER", "SURPRISE", "WINK")
+
+
+@pytest.mark.parametrize("slow", [math.inf, math.radians(60.0)], ids=["quick", "slow"])
+@pytest.mark.parametrize("lexeme", FACES)
+async def test_a_face_is_told_once_the_antennas_show_it(
+    body: ReachyMini, daemon: FakeDaemon, lexeme: str, slow: float
+):
+    """What counts is where the antennas are as a point is told, against where they are seconds later."""
+    daemon.slow = slow
+    rest = antennas(body)
+    stage = Stage(body, FaceLexeme(id=lexeme, lexeme=lexeme), "stroke_start")
+    await stage.holding()
+    told = antennas(body)
+    await asyncio.sleep(3.0)
+    assert told == pytest.approx(antennas(body), abs=1.0)
+    assert max(abs(a - b) for a, b in zip(told, rest, strict=True)) > 5.0
+    stage.authority.extend("end")
+    await stage.over()
+    assert antennas(body) == pytest.approx(rest, abs=1.0)
+
+
+@pytest.mark.parametrize(("bent", "comes"), [(3.0, True), (5.0, False)])
+async def test_an_antenna_that_stands_off_shows_its_face_once_it_stands(
+    body: ReachyMini, daemon, bent: float, comes: bool
+):
+    daemon.bent = math.radians(bent)
+    stage = Stage(body, FaceLexeme(id="smile", lexeme="SMILE"), "stroke_start")
+    await stage.holding()
+    if comes:
+        told = antennas(body)
+        await asyncio.sleep(3.0)
+        assert told == pytest.approx(antennas(body), abs=0.1)
+        stage.authority.extend("end")
+        await stage.over()
+        await body.home()
+    else:
+        with pytest.raises(BodyFailed, match=r"antenna stands at .*5\.0 from where it should be for its stroke"):
+            await stage.over()
 
 
 async def test_arms_are_left_out_of_a_posture_with_a_word(body: ReachyMini):

@@ -24,21 +24,16 @@ from engage_hri.services.control.reachy_mini.connection import connected
 from engage_hri.services.control.reachy_mini.link import Daemon
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import WORLD, BodyContract, LawBroken, Stage, aside, performed
+from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.control.reachy_mini.daemon import Mockup, running
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
 
 pytestmark = pytest.mark.real_time
 TIMED = (
     BodyContract.test_takes_the_time_that_it_predicted,
-    BodyContract.test_a_shift_on_its_way_is_taken_over_by_another,
     BodyContract.test_a_look_that_comes_over_a_shift_on_its_way_goes_home_to_where_that_leads,
 )
-"""Claims of the contract that need no long waits, and are about how long something takes."""
-SOME = (
-    BodyContract.test_home_is_reached_from_anything,
-    BodyContract.test_refuses_what_it_cannot_do_before_anything_moves,
-)
-"""Claims that hold whatever else the machine does."""
+"""Claims of the contract that need no long waits, and of which the daemon's own time says more than the fake's."""
 FEW = (
     Gaze(id="gaze", target="near-right"), GazeShift(id="gazeShift", target="far-left"), Head(id="head", lexeme="NOD"),
     FaceLexeme(id="faceLexeme", lexeme="SMILE"), Posture(id="posture", lexeme="LEAN_FORWARD"),
@@ -82,6 +77,11 @@ class Witness:
         """The longest time between two measurements, seconds."""
         return max((b - a for a, b in pairwise(self.times)), default=math.inf)
 
+    @property
+    def is_busy(self) -> bool:
+        """True if the machine has had no time for what was to be measured, by the measurements or by its load."""
+        return self.worst > DISTURBED or os.getloadavg()[0] > (os.cpu_count() or 1)
+
 
 class OnTheMockup(BodyContract):
     tolerance = 0.25  # of a machine with other work
@@ -100,19 +100,14 @@ class TestAll(OnTheMockup):
     """All of the contract."""
 
 
-@pytest.mark.parametrize("claim", SOME, ids=lambda claim: claim.__name__)
-async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
-    await _claimed(claim, OnTheMockup(), mockup)
-
-
 @pytest.mark.parametrize("claim", TIMED, ids=lambda claim: claim.__name__)
-async def test_the_contract_on_the_mockup_where_it_has_time(mockup: Mockup, claim) -> None:
+async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
     suite = OnTheMockup()
     for _ in range(ATTEMPTS):
         try:
             await _claimed(claim, suite, mockup)
         except LawBroken:
-            if suite.witness.worst < DISTURBED:
+            if not suite.witness.is_busy:
                 raise
         else:
             return
@@ -156,7 +151,7 @@ def switch_motors_off(mockup: Mockup) -> None:
 
 OUTAGES: dict[Callable[[Mockup], None], tuple[Callable[[Mockup], None], float, str]] = {
     kill: (Mockup.begin, PATIENT, "closed the connection"),
-    freeze: (lambda mockup: mockup.send(signal.SIGCONT), 2.0, "no measurement for 2 s"),
+    freeze: (lambda mockup: mockup.send(signal.SIGCONT), 1.5, "no measurement for 1.5 s"),
     switch_motors_off: (
         lambda mockup: mockup.ask("POST", "/api/motors/set_mode/enabled"), PATIENT, "motors are disabled"
     ),
@@ -222,24 +217,56 @@ async def test_the_gaze_axis_is_what_the_daemon_s_matrix_of_the_head_says(mockup
     assert aside(gaze, target.position) < math.radians(0.8)
 
 
-async def test_the_fake_daemon_is_no_better_than_the_real_one(mockup: Mockup) -> None:
-    fake = await _followed(lambda: FakeDaemon()(ReachyMiniSettings()))
+async def test_a_face_is_told_once_the_daemon_measures_the_antennas_there(mockup: Mockup) -> None:
+    def antennas() -> list[float]:
+        told = json.loads(mockup.ask("GET", "/api/state/full"))
+        return [math.degrees(each) for each in told["antennas_position"]]
+
+    body = ReachyMini(ReachyMiniSettings(url=mockup.url, silence=PATIENT))
+    async with body.connected():
+        rest = antennas()
+        stage = await held(body, FaceLexeme(id="face", lexeme="SMILE"))
+        told = antennas()
+        await performed(body, Wait(id="settle", duration=0.5))
+        there = antennas()
+        stage.authority.extend("end")
+        await stage.over()
+
+    assert told == pytest.approx(there, abs=1.0)
+    assert max(abs(a - b) for a, b in zip(rest, there, strict=True)) > 5.0
+
+
+@pytest.fixture
+def fake_followed() -> tuple[float, float, float]:
+    return run_virtual(_followed(lambda: FakeDaemon()(ReachyMiniSettings())))
+
+
+async def test_the_fake_daemon_is_no_better_than_the_real_one(
+    mockup: Mockup, fake_followed: tuple[float, float, float]
+) -> None:
     for _ in range(ATTEMPTS):
         witness = Witness()
         real = await _followed(lambda: witness(ReachyMiniSettings(url=mockup.url)))  # noqa: B023
-        if witness.worst < DISTURBED:
+        if not (unlike := list(_unlike(real, fake_followed))):
+            return
+        if not witness.is_busy:
             break
     else:
-        pytest.skip(f"no time on this machine: {witness.worst:.2f} s between two measurements")
+        pytest.skip(f"no time on this machine: {witness.worst:.2f} s between two measurements; {'; '.join(unlike)}")
+    assert unlike == []
 
-    assert fake[0] >= real[0] - 0.03, "the fake lags less"
-    assert abs(fake[0] - real[0]) < 0.05
-    assert max(real[1], fake[1]) < math.radians(2.0)
-    assert abs(real[2] - fake[2]) < 0.008  # seconds between measurements, and of a busy machine
+
+def _unlike(real: tuple[float, float, float], fake: tuple[float, float, float]) -> Iterator[str]:
+    if fake[0] < real[0] - 0.03 or abs(fake[0] - real[0]) >= 0.05:
+        yield f"the real daemon lags {real[0]:.3f} s, the fake {fake[0]:.3f} s"
+    if max(real[1], fake[1]) >= math.radians(2.0):
+        yield f"that explains all but {real[1]:.3f} of the real one, and {fake[1]:.3f} rad of the fake"
+    if abs(real[2] - fake[2]) >= 0.008:  # and of a busy machine
+        yield f"the real one measures each {real[2]:.3f} s, the fake each {fake[2]:.3f} s"
 
 
 async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]:
-    """Answer each measurement for 1.5 s with a place of a smooth course.
+    """Answer each measurement for 1.2 s with a place of a smooth course.
 
     Returns the lag that explains what is measured best, seconds; how far that leaves it off at most, radians; and the
     median of the seconds between two measurements.
@@ -249,7 +276,7 @@ async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]
         assert hasattr(daemon, "measurement")
         await _go_home(daemon)
         began, seen = loop.time(), []
-        while (now := loop.time()) < began + 1.5:
+        while (now := loop.time()) < began + 1.2:
             yaw = messages.measured(await daemon.measurement()).pose["head_yaw"]
             now = loop.time()
             seen.append((now - began, yaw))

@@ -10,8 +10,9 @@ import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Head, Posture
 from engage_hri.services.control.body import Reached
-from engage_hri.services.control.testing import WORLD, Stage, performed
-from tests.control.reachy_mini.fake import PERIOD
+from engage_hri.services.control.reachy_mini.body import ReachyMini
+from engage_hri.services.control.testing import WORLD, BodyContract, Stage, performed
+from tests.control.reachy_mini.fake import PERIOD, FakeDaemon
 from tests.control.reachy_mini.test_outages import GAZE, failure, robot
 
 BUSY = (0.4, 0.001, 0.001, 0.12, 0.03, 0.2, 0.2, 0.05)
@@ -96,3 +97,24 @@ async def test_a_stuck_motor_is_told_by_seldom_measurements_too() -> None:
         made.daemon.stuck = {"pitch"}
         fault = await failure(Stage(made.body, GAZE, "end"))
         assert fault.reason.startswith("head_pitch stands at 0.0 degrees, ")
+
+
+class Busy(BodyContract):
+    """The laws of truth, by measurements that come by fits and starts. What is told is told late."""
+
+    tolerance = 1.0
+
+    def make(self) -> ReachyMini:
+        daemon = FakeDaemon()
+        daemon.periods = cycle(BUSY)
+        return ReachyMini(connect=daemon)
+
+
+@pytest.mark.parametrize("crowd", [None, "looks", "nods", "all but nods"])
+async def test_no_point_that_the_joints_do_not_bear_out(crowd: str | None) -> None:
+    suite = Busy()
+    async with suite.connected(suite.make) as body:
+        if crowd is None:
+            await suite.test_each_point_is_where_the_joints_are(body)
+        else:
+            await suite.test_no_sync_point_that_the_joints_do_not_bear_out(body, crowd, 1)
