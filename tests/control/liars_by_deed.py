@@ -159,6 +159,17 @@ class Homeless(SimulatedBody):
         await asyncio.sleep(0)
 
 
+class Ticking(SimulatedBody):
+    """Looks at its joints for ever, once it has moved."""
+
+    def perform(self, behavior, authority):
+        self.tick()
+        return super().perform(behavior, authority)
+
+    def tick(self) -> None:
+        self._loop.call_later(0.05, self.tick)
+
+
 class Obliging(SimulatedBody):
     """Does something else where it does not know the target."""
 

@@ -88,16 +88,17 @@ class MujocoBody(SimulatedBody):
     async def connected(self) -> AsyncIterator[None]:
         """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
         async with super().connected():
-            if (film := film_of(self.bench.model, self._settings)) is None:
-                yield
-                return
-            self.pulse.on_step = partial(self._film, film)
-            self.pulse.wake()
+            film = film_of(self.bench.model, self._settings)
+            if film is not None:
+                self.pulse.on_step = partial(self._film, film)
+                self.pulse.wake()
             try:
                 yield
             finally:
                 self.pulse.on_step = lambda at: None
-                finish(film, self._settings)
+                self.pulse.stop()
+                if film is not None:
+                    finish(film, self._settings)
 
     def _film(self, film: Film, at: Seconds) -> None:
         if film.is_due(at):

@@ -62,16 +62,17 @@ class DescribedBody(ComposedBody):
     async def connected(self) -> AsyncIterator[None]:
         """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
         async with super().connected():
-            if (film := film_of(self.stage.physics.model, self._settings)) is None:
-                yield
-                return
-            self.stage.pulse.on_step = partial(self._film, film)
-            self.stage.pulse.wake()
+            film, pulse = film_of(self.stage.physics.model, self._settings), self.stage.pulse
+            if film is not None:
+                pulse.on_step = partial(self._film, film)
+                pulse.wake()
             try:
                 yield
             finally:
-                self.stage.pulse.on_step = lambda at: None
-                finish(film, self._settings)
+                pulse.on_step = lambda at: None
+                pulse.stop()
+                if film is not None:
+                    finish(film, self._settings)
 
     def _film(self, film: Film, at: Seconds) -> None:
         if film.is_due(at):

@@ -192,10 +192,15 @@ class EndingLaws(Suite):
             )
 
     async def test_leaves_no_task_once_it_is_disconnected(self) -> None:
-        """No task of the driver goes on once `connected()` is left.
+        """No task or timer of the driver goes on once `connected()` is left, at rest or in motion.
 
-        Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`.
+        Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`, and a
+        timer that sets itself again is cancelled there.
         """
+        for is_home in (True, False):
+            await self._check_leaving(is_home)
+
+    async def _check_leaving(self, is_home: bool) -> None:
         before = asyncio.all_tasks()
         body = self.make()
         connection = Connection(body)
@@ -205,7 +210,8 @@ class EndingLaws(Suite):
             Stage(body, behavior, "end")
         await asyncio.sleep(0.3)
         await Stage.end_all()
-        await self.go_home(body)
+        if is_home:
+            await self.go_home(body)
         await connection.leave()
         left = await still_running(before)
         for task in left:
@@ -213,6 +219,11 @@ class EndingLaws(Suite):
         if left:
             names = ", ".join(task.get_name() for task in left)
             broken(expected="no task of the driver once it is disconnected", measured=f"these go on: {names}")
+        timers = _timers()
+        await asyncio.sleep(0.1)
+        if later := _timers() - timers:
+            names = ", ".join(sorted(str(getattr(each._callback, "__qualname__", "a timer")) for each in later))
+            broken(expected="no timer of the driver once it is disconnected", measured=f"this is set anew: {names}")
 
     async def test_an_aborted_speech_stops_at_a_word(self, body: Body) -> None:
         """Aborted, a voice says its word to the end, tells it, and is silent; it tells no word that it has not said.
@@ -238,3 +249,9 @@ class EndingLaws(Suite):
             )
         if saying := body.state().speaking:
             broken(speech, expected="silence once it has ended", measured=f"`speaking` is {saying!r}")
+
+
+def _timers() -> set[asyncio.TimerHandle]:
+    """Timers of this loop that are to come; none where a loop does not tell."""
+    scheduled: list[asyncio.TimerHandle] = getattr(asyncio.get_running_loop(), "_scheduled", [])
+    return {timer for timer in scheduled if not timer.cancelled()}
