@@ -5,8 +5,13 @@ from inspect import signature
 from itertools import product
 
 import pytest
+from msgspec.structs import replace
 
-from engage_hri.services.control.body import Body
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import BodyPose, Estimate
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import Body, MovementAuthority
+from engage_hri.services.control.ordinary import OrdinaryBody
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.testing.laws import Finding, LawBroken
 from engage_hri.services.control.testing.witness import CROWDS
@@ -49,7 +54,7 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars_by_deed.Eager, "predicts_without_moving", "where it was before it was asked"),
     (liars_by_deed.Staying, "is_on_target_where_it_said", "neck_"),
     (liars_by_deed.Remaining, "ends_where_it_said", "neck_"),
-    (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at human"),
+    (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at near-right"),
     (liars_by_deed.Noisy, "measures_all_its_joints_within_their_noise", "noise = math.radians(0.3"),
     (liars_by_deed.Jointless, "measures_all_its_joints_within_their_noise", "none of neck_yaw"),
     (liars_by_deed.Unmoved, "says_that_it_moves_as_long_as_it_moves", "meanwhile"),
@@ -122,3 +127,57 @@ def test_each_law_says_what_it_is_and_what_it_usually_is_if_it_is_broken(law: st
 
     assert words.strip().endswith(".")
     assert usual.strip().startswith("Usually ")
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(2.0, "earlier than it says: the estimate is too long"), (0.5, "later than it says")]
+)
+async def test_a_wrong_time_is_told_in_its_direction(factor: float, words: str) -> None:
+    class Wrong(SimulatedBody):
+        def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+            told = super().estimate(behavior, pose, world)
+            return replace(told, phases=tuple(replace(each, natural=factor * each.natural) for each in told.phases))
+
+    found = await Judge(Wrong).findings("takes_the_time_that_it_predicted")
+
+    assert {words in finding.advice for finding in found if finding.advice} == {True}
+
+
+async def test_what_is_wrong_from_home_is_no_finding_of_the_law_of_other_looks() -> None:
+    class Slow(SimulatedBody):
+        def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+            told = super().estimate(behavior, pose, world)
+            return replace(told, phases=tuple(replace(each, natural=settled(each.natural)) for each in told.phases))
+
+    def settled(seconds: float) -> float:
+        return seconds + 0.2 if seconds else 0.0
+
+    assert await Judge(Slow).findings("takes_the_time_that_it_predicted")
+    assert not await Judge(Slow).findings("predicts_from_where_another_look_leaves_it")
+
+
+async def test_a_behavior_that_never_waits_is_told_in_the_words_of_the_law() -> None:
+    class Alone(liars.Teller):
+        def heard(self, behavior: BlockBehavior, authority: MovementAuthority) -> MovementAuthority:
+            return MovementAuthority(behavior, "end")
+
+    found = await Judge(Alone).findings("a_later_behavior_takes_over_the_part")
+
+    assert [finding.expected for finding in found] == ["that it is under way until it is taken over"]
+
+
+async def test_of_a_face_of_lamps_nothing_can_be_aborted() -> None:
+    class Lamps(OrdinaryBody):
+        name, part, types, joints = "lamps", "face", ("face", "faceLexeme"), ()
+
+        def aim(self, behavior: BlockBehavior, world: World) -> Mapping[str, float]:
+            return {}
+
+        def angles(self) -> Mapping[str, float]:
+            return {}
+
+        def go(self, goal: Mapping[str, float], seconds: float) -> None:
+            pass
+
+    with pytest.raises(pytest.skip.Exception, match="nothing that takes time"):
+        await Judge(Lamps).findings("an_aborted_behavior_ends_at_once_and_safe")

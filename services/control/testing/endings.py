@@ -18,6 +18,9 @@ from engage_hri.services.control.testing.suite import Suite, does_not_apply, tri
 
 AT_ONCE: Seconds = 3.0
 """Time within which a behavior ends that is aborted: it may brake, and freeze for a moment."""
+SHORTEST: Seconds = 0.005
+"""Half of the time of a behavior that is over before anybody can abort it: the points of a face of lamps are one
+instant."""
 WORD: Seconds = 1.0
 """Time that a voice has for saying its word to the end."""
 HOWS: tuple[AbortMode, ...] = ("relax", "freeze")
@@ -40,7 +43,8 @@ class EndingLaws(Suite):
         home once the behavior has ended: do it in a `finally`.
         """
         home = await self.pose(body)
-        for case in self.cases(body, is_overlay, "nothing that goes back to rest by itself"):
+        lacks = "nothing that takes time and goes back to rest by itself"
+        for case in self.cases(body, lambda each: is_overlay(each) and self.half(body, each) > SHORTEST, lacks):
             async with case as behavior:
                 for how in HOWS:
                     after = min(0.35, self.half(body, behavior))
