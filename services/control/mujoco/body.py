@@ -278,7 +278,15 @@ class MujocoBody(SimulatedBody):
         return along.farthest(joints, here, there, limits) if joints else None
 
     def _off_point(self, run: Run, point: CoursePoint, now: Seconds) -> Off:
-        """Measure how far the joints of a run are off a sync point, or off the nearest place behind it."""
+        """Measure how far the joints of a run are off a sync point, or off the nearest place behind it.
+
+        A look that has waited and followed its target is to be where that has led it.
+        """
+        has_followed = run.holding and any(
+            self._torso.tracks[part].motion is not run.motion for part in run.course.parts
+        )
+        if has_followed and (off := self._off(run.course.parts, now)) is not None:
+            return off
         path, s = run.motion.path, run.motion.s(now)
         mark = path.marks.get(point.sync, s)
         later = [path.marks[each.sync] for each in run.pending if path.marks.get(each.sync, 0.0) > mark + 1e-9]

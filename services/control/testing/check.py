@@ -55,7 +55,8 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     if not seen.is_there:
         return replace(report, seconds=time.monotonic() - since)
     collected = _Collected(law.lower().replace("`", ""), progress)
-    with _judging(_suite(make, stated, seen)) as arguments:
+    suite = _suite(make, stated, seen)
+    with _judging(suite) as arguments:
         code = pytest.main(arguments, plugins=[collected])
     if code == pytest.ExitCode.NO_TESTS_COLLECTED:
         raise InputRefused(Fault(reason=f"no law has {law!r} in its name", advice="without it all names are printed"))
@@ -64,7 +65,7 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     laws, causes = told_once(collected.laws(), seen.causes)
     return replace(
         report, laws=laws, causes=causes, not_tried=tuple(collected.not_tried()), seconds=time.monotonic() - since,
-        is_stopped=code == pytest.ExitCode.INTERRUPTED,
+        is_stopped=code == pytest.ExitCode.INTERRUPTED, notes=tuple(suite.notes or ()), fastest=suite.fastest or {},
     )  # fmt: skip
 
 
@@ -84,6 +85,8 @@ def _suite(make: Make, stated: Stated, seen: FirstLook) -> type[BodyContract]:
         "world": stated.world or WORLD,
         "behaviors": _behaviors(stated),
         "unable": seen.unable,
+        "notes": {},
+        "fastest": {},
     }
     suite = type("TestBody", (BodyContract,), settings)
     return pytest.mark.real_time(suite) if stated.real_time else suite

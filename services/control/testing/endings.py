@@ -126,13 +126,14 @@ class EndingLaws(Suite):
         await asyncio.sleep(self.dwell)
         self.check_pose(await self.pose(body), home, joints, stages[0].behavior, what="the safe pose some time later")
 
-    async def go_home(self, body: Body) -> None:
-        """Call the body home. Raises LawBroken if it does not get there."""
+    async def go_home(self, body: Body, parts: tuple[str, ...] = ()) -> None:
+        """Call parts of the body home; empty: all. Raises LawBroken if they do not get there."""
         try:
             async with asyncio.timeout(PATIENCE):
-                await body.home()
+                await body.home(parts)
         except TimeoutError:
-            broken(expected=f"that `home` returns within {ms(PATIENCE)}", measured="it does not")
+            what = f"that `home` returns within {ms(PATIENCE)}"
+            broken(expected=what, measured="it does not", cause="`home` never returns")
 
     @trials(3)
     async def test_brakes_within_the_limits_of_its_joints(self, body: Body, seed: int) -> None:
@@ -180,12 +181,61 @@ class EndingLaws(Suite):
                     await self.go_home(body)
                 self.check_limits(body, recording, behavior)
 
+    async def test_home_takes_the_parts_that_it_is_asked_for_and_no_others(self, body: Body) -> None:
+        """`home(parts)` brings these to the safe pose and ends what they do; behaviors of other parts go on.
+
+        Usually `parts` is not looked at, so that all goes home, or nothing.
+        """
+        home, together = await self.pose(body), self._together(body)
+        joints = {behavior.id: self.joints(body, behavior) for behavior, _ in together}
+        for number, (first, parts) in enumerate(together):
+            stages = [Stage(body, replace(each, id=f"{each.id} {number}")) for each, _ in together]
+            for stage in stages:
+                await stage.holding()
+            await standing(body)
+            before = await self.pose(body)
+            await self.go_home(body, parts)
+            after, mine = await self.pose(body), stages[number]
+            self.check_pose(after, home, joints[first.id], first, what=f"the safe pose of {listed(parts)}")
+            await asyncio.wait([mine.task], timeout=AT_ONCE)
+            if not mine.task.done() or "end" in mine.passed:
+                broken(first, expected="that it ends as its parts go home", measured=f"passed {listed(mine.passed)}")
+            for stage, (other, _) in zip(stages, together, strict=True):
+                if stage is mine:
+                    continue
+                if stage.task.done() or stage.authority.revoked is not None:
+                    expected = f"that it goes on while {listed(parts)} goes home"
+                    broken(stage.behavior, expected=expected, measured=f"revoked: {stage.authority.revoked}")
+                if "torso" not in parts:  # that takes all others with it
+                    what = f"where it was before {listed(parts)} went home"
+                    self.check_pose(after, before, joints[other.id], other, what=what)
+                stage.authority.extend("end")
+            for stage in stages:
+                await stage.over()
+            await self.go_home(body)
+
+    def _together(self, body: Body) -> list[tuple[BlockBehavior, tuple[str, ...]]]:
+        """Behaviors that can wait and share no parts, with their parts."""
+        found: list[tuple[BlockBehavior, tuple[str, ...]]] = []
+        taken: set[str] = set()
+        for behavior in self.able(body):
+            parts = body.estimate(behavior, None, self.world).parts
+            if is_movement(behavior) and self.joints(body, behavior) and taken.isdisjoint(parts):
+                found.append((behavior, parts))
+                taken |= set(parts)
+        if not found:
+            self.lacks(body, f"it has {NOTHING}", *self.unable)
+        return found
+
     def _needs_limits(self, body: Body) -> None:
         if not body.capabilities.joints:
             does_not_apply("its capabilities name no joints")
 
     def check_limits(self, body: Body, recording: Recording, behavior: BlockBehavior) -> None:
         """Judge what was recorded. Raises LawBroken with the first limit that was left."""
+        if self.fastest is not None:
+            for joint, speed in recording.fastest(self.noise).items():
+                self.fastest[joint] = max(speed, self.fastest.get(joint, 0.0))
         for each in violations(recording, body.capabilities.joints, self.noise, self.age):
             unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]

@@ -83,6 +83,15 @@ class Recording:
             return np.zeros(len(self.joints))
         return np.asarray(np.diff(samples[fresh], axis=0).std(axis=0) / math.sqrt(2.0))
 
+    def fastest(self, noise: Radians) -> dict[str, float]:
+        """The fastest that each joint was over 20 ms, radians per second. Noise of that size counts for nothing."""
+        span = 5
+        if len(self.times) <= span:
+            return {}
+        between = np.array(self.times)[span:] - np.array(self.times)[:-span]
+        turned = np.abs(self.angles[span:] - self.angles[:-span]) - DEVIATIONS * math.sqrt(2.0) * noise
+        return dict(zip(self.joints, np.maximum(turned / between[:, None], 0.0).max(axis=0).tolist(), strict=True))
+
     def at(self, time: Seconds) -> dict[str, Radians]:
         """Angle of each joint at an instant, between the two samples about it."""
         columns = self.angles.T if self.samples else np.empty((0, 0))

@@ -37,6 +37,8 @@ SHIFTS = GazeShift | HeadDirectionShift
 AWAY: Meters = 0.02
 """Distance of a hand at least from where it rests, at the stroke of a gesture."""
 NODDED: Radians = math.radians(1.0)
+WIDEST: Meters = 0.1
+"""Most that a pointing may be beside its target, whatever radius a body states."""
 LEVER: Meters = 0.7
 """Distance at which an error of the joints of an arm counts at the hand."""
 Untrue = tuple[str, str]
@@ -157,7 +159,7 @@ class Witness:
 
     def _points_at(self, rays: Sequence[Ray | None], target: str) -> Untrue | None:
         off = [beside(ray, self.suite.position(target)) for ray in rays if ray is not None]
-        near = self.body.capabilities.pointing_radius + LEVER * self.suite.gaze_slack
+        near = min(self.body.capabilities.pointing_radius, WIDEST) + LEVER * self.suite.gaze_slack
         if not off or min(off) <= near:
             return None
         way = f"{min(off) * 100:.1f} cm beside it" if min(off) < math.inf else "away from it"
