@@ -14,9 +14,10 @@ from engage_hri.services.control.body import Body, MovementAuthority
 from engage_hri.services.control.ordinary import OrdinaryBody
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.testing.laws import Finding, LawBroken
+from engage_hri.services.control.testing.motions import unused
 from engage_hri.services.control.testing.witness import CROWDS
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control import liars, liars_by_deed
+from tests.control import liars, liars_by_claim, liars_by_deed
 
 LAWS = sorted(name.removeprefix("test_") for name in dir(BodyContract) if name.startswith("test_"))
 LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
@@ -55,6 +56,38 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars_by_deed.Staying, "is_on_target_where_it_said", "neck_"),
     (liars_by_deed.Remaining, "ends_where_it_said", "neck_"),
     (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at near-right"),
+    (
+        liars_by_claim.Backward,
+        "is_along_the_ray_that_it_said",
+        "gaze at near-right, stroke: expected what the estimate",
+    ),
+    (liars_by_claim.Backward, "is_along_the_ray_that_it_said", "pointing at far-left, stroke"),
+    (liars_by_claim.Rayless, "is_along_the_ray_that_it_said", "None"),
+    (liars_by_claim.Wide, "states_what_people_can_tell_apart", "900 cm"),
+    (liars_by_claim.Squinting, "states_what_people_can_tell_apart", "172 degrees"),
+    (liars_by_claim.Effortless, "counts_the_degrees_that_its_joints_turn", "gaze at near-right, stroke"),
+    (liars_by_claim.Effortless, "counts_the_degrees_that_its_joints_turn", "pointing at far-left, stroke"),
+    (liars_by_claim.Laborious, "counts_the_degrees_that_its_joints_turn", "gazeShift to far-left, end"),
+    (
+        liars_by_deed.Present,
+        "counts_the_degrees_that_its_joints_turn",
+        "0 degrees of its joints from where gaze leaves it",
+    ),
+    (liars_by_claim.Rehearsing, "rehearses_what_it_estimates", "in the rehearsal"),
+    (liars_by_claim.Boasting, "is_as_fast_and_as_slow_as_it_said", "since `shortest` 11 ms allows it"),
+    (liars_by_claim.Endless, "is_as_fast_and_as_slow_as_it_said", "since `longest` None allows it"),
+    (
+        liars_by_claim.Whole,
+        "home_takes_the_parts_that_it_is_asked_for_and_no_others",
+        "that it goes on while head goes home",
+    ),
+    (liars_by_claim.Rooted, "home_takes_the_parts_that_it_is_asked_for_and_no_others", "the safe pose of head"),
+    (liars_by_claim.Gaping, "closes_its_mouth_with_the_voice", "a mouth that is closed by then"),
+    (liars_by_claim.Oblivious, "looks_at_where_its_target_is_now", "where its target is now"),
+    (liars_by_claim.Halfway, "looks_at_where_its_target_is_now", "eyes on where its target is now"),
+    (liars_by_claim.Hasty, "says_what_it_looks_at", "beside it"),
+    (liars_by_claim.Absent, "says_what_it_looks_at", "`looking_at` 'near-right'; measured ''"),
+    (liars_by_claim.Aside, "each_point_is_where_the_joints_are", "a forearm that points at far-left, within 10.0 cm"),
     (liars_by_deed.Noisy, "measures_all_its_joints_within_their_noise", "noise = math.radians(0.3"),
     (liars_by_deed.Jointless, "measures_all_its_joints_within_their_noise", "none of neck_yaw"),
     (liars_by_deed.Unmoved, "says_that_it_moves_as_long_as_it_moves", "meanwhile"),
@@ -181,3 +214,16 @@ async def test_of_a_face_of_lamps_nothing_can_be_aborted() -> None:
 
     with pytest.raises(pytest.skip.Exception, match="nothing that takes time"):
         await Judge(Lamps).findings("an_aborted_behavior_ends_at_once_and_safe")
+
+
+async def test_who_states_far_more_speed_than_it_ever_has_is_told_so() -> None:
+    judges = {each: Judge(each) for each in (SimulatedBody, liars_by_claim.Sprinting)}
+    told = {}
+    for liar, judge in judges.items():
+        judge.fastest = {}
+        await judge.findings("keeps_its_limits_whatever_comes")
+        async with judge.connected(liar) as body:
+            told[liar] = unused(body.capabilities.joints, judge.fastest)
+
+    assert not told[SimulatedBody]
+    assert "no joint was ever near the speed that it states" in told[liars_by_claim.Sprinting][0]

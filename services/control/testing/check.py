@@ -26,6 +26,7 @@ from engage_hri.services.control.testing.causes import told_once
 from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.first import FirstLook, look
 from engage_hri.services.control.testing.laws import Finding, named
+from engage_hri.services.control.testing.motions import unused
 from engage_hri.services.control.testing.played import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
@@ -65,7 +66,8 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     laws, causes = told_once(collected.laws(), seen.causes)
     return replace(
         report, laws=laws, causes=causes, not_tried=tuple(collected.not_tried()), seconds=time.monotonic() - since,
-        is_stopped=code == pytest.ExitCode.INTERRUPTED, notes=tuple(suite.notes or ()), fastest=suite.fastest or {},
+        is_stopped=code == pytest.ExitCode.INTERRUPTED, fastest=suite.fastest or {},
+        notes=(*(suite.notes or ()), *unused(seen.capabilities.joints, suite.fastest or {})),
     )  # fmt: skip
 
 
