@@ -135,7 +135,7 @@ class EndingLaws(Suite):
             what = f"that `home` returns within {ms(PATIENCE)}"
             broken(expected=what, measured="it does not", cause="`home` never returns")
 
-    @trials(3)
+    @trials(2)
     async def test_brakes_within_the_limits_of_its_joints(self, body: Body, seed: int) -> None:
         """Held and aborted at any instant on its way, no joint exceeds its speed or acceleration.
 
