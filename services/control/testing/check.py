@@ -27,7 +27,7 @@ from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.first import FirstLook, look
 from engage_hri.services.control.testing.laws import Finding, named
 from engage_hri.services.control.testing.motions import unused
-from engage_hri.services.control.testing.played import playable, played
+from engage_hri.services.control.testing.playing import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
 from engage_hri.services.control.testing.suite import PLUGIN, Suite, unchecked

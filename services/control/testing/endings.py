@@ -151,7 +151,7 @@ class EndingLaws(Suite):
                     for _ in range(4):
                         await asyncio.sleep(chance.uniform(0.0, 0.4))
                         stage.authority.hold()
-                        await asyncio.sleep(chance.choice((0.02, 0.1, 1.0)))
+                        await asyncio.sleep(chance.choice((0.02, 0.1, 0.5)))
                         stage.authority.go_on()
                     await stage.over()
                     stage = Stage(body, behavior, "end")
