@@ -9,7 +9,7 @@ from random import Random
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, GazeShift, Head, Pose
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Head, Pose
 from engage_hri.schemas.body import BodyPose, Estimate, JointAngle
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
@@ -279,7 +279,7 @@ class Raw(Teller):
     """Lets an error of its SDK out."""
 
     def tell(self, behavior, authority, progress):
-        if isinstance(behavior, FaceLexeme):
+        if isinstance(behavior, Head):
             raise ConnectionResetError("peer is gone")
         return (progress,)
 

@@ -193,9 +193,9 @@ class ClaimLaws(Suite):
                     await self._paced(body, behavior, phases, is_fast=is_fast)
 
     async def _paced(self, body: Body, behavior: BlockBehavior, phases: Sequence[Phase], *, is_fast: bool) -> None:
-        """Let it go from one place where it stands to the next, at a pace."""
+        """Let it go at a pace: in a hurry all the way, slowly from one place where it stands to the next."""
         loop, stage = asyncio.get_running_loop(), Stage(body, behavior)
-        stations = ["start", *self.holds(body, behavior)]
+        stations = ["start"] if is_fast else ["start", *self.holds(body, behavior)]
         for number, (station, until) in enumerate(zip(stations, [*stations[1:], "end"], strict=True), 1):
             leg = _between(phases, station, until)
             asked = [
