@@ -101,8 +101,9 @@ class OrdinaryBody(DrivenBody):
         target = way[-2 if len(way) > 1 else -1][1]
         for sync in row.points[1:]:
             goal = goals.get(sync, at)
-            seconds = self._seconds(at, goal)  # it has one pace
-            phases.append(Phase(since=since, to=sync, shortest=seconds, natural=seconds, hold=sync in row.holds))
+            seconds, hold = self._seconds(at, goal), sync in row.holds
+            longest = None if hold or not seconds else seconds  # it has one pace
+            phases.append(Phase(since=since, to=sync, shortest=seconds, natural=seconds, longest=longest, hold=hold))
             since, at = sync, goal
         is_head = self.gaze(here) is not None
         turned = math.degrees(sum(abs(target[joint] - here[joint]) for joint in here))

@@ -9,7 +9,7 @@ from random import Random
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, GazeShift, Head, Pose
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Head, Pose
 from engage_hri.schemas.body import BodyPose, Estimate, JointAngle
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
@@ -159,6 +159,17 @@ class Homeless(SimulatedBody):
         await asyncio.sleep(0)
 
 
+class Ticking(SimulatedBody):
+    """Looks at its joints for ever, once it has moved."""
+
+    def perform(self, behavior, authority):
+        self.tick()
+        return super().perform(behavior, authority)
+
+    def tick(self) -> None:
+        self._loop.call_later(0.05, self.tick)
+
+
 class Obliging(SimulatedBody):
     """Does something else where it does not know the target."""
 
@@ -268,7 +279,7 @@ class Raw(Teller):
     """Lets an error of its SDK out."""
 
     def tell(self, behavior, authority, progress):
-        if isinstance(behavior, FaceLexeme):
+        if isinstance(behavior, Head):
             raise ConnectionResetError("peer is gone")
         return (progress,)
 

@@ -5,13 +5,19 @@ from inspect import signature
 from itertools import product
 
 import pytest
+from msgspec.structs import replace
 
-from engage_hri.services.control.body import Body
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import BodyPose, Estimate
+from engage_hri.schemas.world import World
+from engage_hri.services.control.body import Body, MovementAuthority
+from engage_hri.services.control.ordinary import OrdinaryBody
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.testing.laws import Finding, LawBroken
+from engage_hri.services.control.testing.motions import unused
 from engage_hri.services.control.testing.witness import CROWDS
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.control import liars, liars_by_deed
+from tests.control import liars, liars_by_claim, liars_by_deed
 
 LAWS = sorted(name.removeprefix("test_") for name in dir(BodyContract) if name.startswith("test_"))
 LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
@@ -38,6 +44,7 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars_by_deed.Clinging, "a_dropped_stream_ends_safe", "after its task was cancelled"),
     (liars_by_deed.Homeless, "home_is_reached_from_anything", "the safe pose as `home` returns"),
     (liars_by_deed.Homeless, "leaves_no_task_once_it_is_disconnected", "these go on: way home"),
+    (liars_by_deed.Ticking, "leaves_no_task_once_it_is_disconnected", "this is set anew: Ticking.tick"),
     (liars_by_deed.Abrupt, "brakes_within_the_limits_of_its_joints", "degrees/s^2"),
     (liars_by_deed.Understating, "keeps_its_limits_whatever_comes", "speed of torso_turn"),
     (liars.Boaster, "a_later_behavior_takes_over_the_part", "taken_over"),
@@ -48,7 +55,39 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars_by_deed.Eager, "predicts_without_moving", "where it was before it was asked"),
     (liars_by_deed.Staying, "is_on_target_where_it_said", "neck_"),
     (liars_by_deed.Remaining, "ends_where_it_said", "neck_"),
-    (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at human"),
+    (liars_by_deed.Present, "predicts_from_where_another_look_leaves_it", "after gaze at near-right"),
+    (
+        liars_by_claim.Backward,
+        "is_along_the_ray_that_it_said",
+        "gaze at near-right, stroke: expected what the estimate",
+    ),
+    (liars_by_claim.Backward, "is_along_the_ray_that_it_said", "pointing at far-left, stroke"),
+    (liars_by_claim.Rayless, "is_along_the_ray_that_it_said", "None"),
+    (liars_by_claim.Wide, "states_what_people_can_tell_apart", "900 cm"),
+    (liars_by_claim.Squinting, "states_what_people_can_tell_apart", "172 degrees"),
+    (liars_by_claim.Effortless, "counts_the_degrees_that_its_joints_turn", "gaze at near-right, stroke"),
+    (liars_by_claim.Effortless, "counts_the_degrees_that_its_joints_turn", "pointing at far-left, stroke"),
+    (liars_by_claim.Laborious, "counts_the_degrees_that_its_joints_turn", "gazeShift to far-left, end"),
+    (
+        liars_by_deed.Present,
+        "counts_the_degrees_that_its_joints_turn",
+        "0 degrees of its joints from where gaze leaves it",
+    ),
+    (liars_by_claim.Rehearsing, "rehearses_what_it_estimates", "in the rehearsal"),
+    (liars_by_claim.Boasting, "is_as_fast_and_as_slow_as_it_said", "since `shortest` 11 ms allows it"),
+    (liars_by_claim.Endless, "is_as_fast_and_as_slow_as_it_said", "since `longest` None allows it"),
+    (
+        liars_by_claim.Whole,
+        "home_takes_the_parts_that_it_is_asked_for_and_no_others",
+        "that it goes on while head goes home",
+    ),
+    (liars_by_claim.Rooted, "home_takes_the_parts_that_it_is_asked_for_and_no_others", "the safe pose of head"),
+    (liars_by_claim.Gaping, "closes_its_mouth_with_the_voice", "a mouth that is closed by then"),
+    (liars_by_claim.Oblivious, "looks_at_where_its_target_is_now", "where its target is now"),
+    (liars_by_claim.Halfway, "looks_at_where_its_target_is_now", "eyes on where its target is now"),
+    (liars_by_claim.Hasty, "says_what_it_looks_at", "beside it"),
+    (liars_by_claim.Absent, "says_what_it_looks_at", "`looking_at` 'near-right'; measured ''"),
+    (liars_by_claim.Aside, "each_point_is_where_the_joints_are", "a forearm that points at far-left, within 10.0 cm"),
     (liars_by_deed.Noisy, "measures_all_its_joints_within_their_noise", "noise = math.radians(0.3"),
     (liars_by_deed.Jointless, "measures_all_its_joints_within_their_noise", "none of neck_yaw"),
     (liars_by_deed.Unmoved, "says_that_it_moves_as_long_as_it_moves", "meanwhile"),
@@ -121,3 +160,70 @@ def test_each_law_says_what_it_is_and_what_it_usually_is_if_it_is_broken(law: st
 
     assert words.strip().endswith(".")
     assert usual.strip().startswith("Usually ")
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(2.0, "earlier than it says: the estimate is too long"), (0.5, "later than it says")]
+)
+async def test_a_wrong_time_is_told_in_its_direction(factor: float, words: str) -> None:
+    class Wrong(SimulatedBody):
+        def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+            told = super().estimate(behavior, pose, world)
+            return replace(told, phases=tuple(replace(each, natural=factor * each.natural) for each in told.phases))
+
+    found = await Judge(Wrong).findings("takes_the_time_that_it_predicted")
+
+    assert {words in finding.advice for finding in found if finding.advice} == {True}
+
+
+async def test_what_is_wrong_from_home_is_no_finding_of_the_law_of_other_looks() -> None:
+    class Slow(SimulatedBody):
+        def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+            told = super().estimate(behavior, pose, world)
+            return replace(told, phases=tuple(replace(each, natural=settled(each.natural)) for each in told.phases))
+
+    def settled(seconds: float) -> float:
+        return seconds + 0.2 if seconds else 0.0
+
+    assert await Judge(Slow).findings("takes_the_time_that_it_predicted")
+    assert not await Judge(Slow).findings("predicts_from_where_another_look_leaves_it")
+
+
+async def test_a_behavior_that_never_waits_is_told_in_the_words_of_the_law() -> None:
+    class Alone(liars.Teller):
+        def heard(self, behavior: BlockBehavior, authority: MovementAuthority) -> MovementAuthority:
+            return MovementAuthority(behavior, "end")
+
+    found = await Judge(Alone).findings("a_later_behavior_takes_over_the_part")
+
+    assert [finding.expected for finding in found] == ["that it is under way until it is taken over"]
+
+
+async def test_of_a_face_of_lamps_nothing_can_be_aborted() -> None:
+    class Lamps(OrdinaryBody):
+        name, part, types, joints = "lamps", "face", ("face", "faceLexeme"), ()
+
+        def aim(self, behavior: BlockBehavior, world: World) -> Mapping[str, float]:
+            return {}
+
+        def angles(self) -> Mapping[str, float]:
+            return {}
+
+        def go(self, goal: Mapping[str, float], seconds: float) -> None:
+            pass
+
+    with pytest.raises(pytest.skip.Exception, match="nothing that takes time"):
+        await Judge(Lamps).findings("an_aborted_behavior_ends_at_once_and_safe")
+
+
+async def test_who_states_far_more_speed_than_it_ever_has_is_told_so() -> None:
+    judges = {each: Judge(each) for each in (SimulatedBody, liars_by_claim.Sprinting)}
+    told = {}
+    for liar, judge in judges.items():
+        judge.fastest = {}
+        await judge.findings("keeps_its_limits_whatever_comes")
+        async with judge.connected(liar) as body:
+            told[liar] = unused(body.capabilities.joints, judge.fastest)
+
+    assert not told[SimulatedBody]
+    assert "no joint was ever near the speed that it states" in told[liars_by_claim.Sprinting][0]

@@ -31,11 +31,11 @@ class Scattering(driver().PanTilt):  # type: ignore[misc]
 
 
 class Table(driver().PanTilt):  # type: ignore[misc]
-    """It has its angles in a table, and gives the very same ones for the same target."""
+    """It has its angles in a table, and gives the very same ones for the same target in the same place."""
 
     def aim(self, behavior: object, world: World) -> dict[str, float]:
-        known: dict[str, dict[str, float]] = self.__dict__.setdefault("known", {})
-        target = getattr(behavior, "target", "")
+        known: dict[object, dict[str, float]] = self.__dict__.setdefault("known", {})
+        target = world.entity(getattr(behavior, "target", ""))
         return known.setdefault(target, super().aim(behavior, world))
 
 

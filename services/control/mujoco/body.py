@@ -89,16 +89,17 @@ class MujocoBody(SimulatedBody):
     async def connected(self) -> AsyncIterator[None]:
         """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
         async with super().connected():
-            if (film := film_of(self.bench.model, self._settings)) is None:
-                yield
-                return
-            self.pulse.on_step = partial(self._film, film)
-            self.pulse.wake()
+            film = film_of(self.bench.model, self._settings)
+            if film is not None:
+                self.pulse.on_step = partial(self._film, film)
+                self.pulse.wake()
             try:
                 yield
             finally:
                 self.pulse.on_step = lambda at: None
-                finish(film, self._settings)
+                self.pulse.stop()
+                if film is not None:
+                    finish(film, self._settings)
 
     def _film(self, film: Film, at: Seconds) -> None:
         if film.is_due(at):
@@ -291,7 +292,15 @@ class MujocoBody(SimulatedBody):
         return along.farthest(joints, here, there, limits) if joints else None
 
     def _off_point(self, run: Run, point: CoursePoint, now: Seconds) -> Off:
-        """Measure how far the joints of a run are off a sync point, or off the nearest place behind it."""
+        """Measure how far the joints of a run are off a sync point, or off the nearest place behind it.
+
+        A look that has waited and followed its target is to be where that has led it.
+        """
+        has_followed = run.holding and any(
+            self._torso.tracks[part].motion is not run.motion for part in run.course.parts
+        )
+        if has_followed and (off := self._off(run.course.parts, now)) is not None:
+            return off
         path, s = run.motion.path, run.motion.s(now)
         mark = path.marks.get(point.sync, s)
         later = [path.marks[each.sync] for each in run.pending if path.marks.get(each.sync, 0.0) > mark + 1e-9]

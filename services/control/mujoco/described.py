@@ -12,7 +12,7 @@ import mujoco
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Phase
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Phase
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -30,6 +30,7 @@ from engage_hri.services.control.mujoco.robot import PREFIX, assembled
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.stage import Stage, limits_of
 from engage_hri.services.control.voice import speaking
+from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.tangram.table import tangram_table
 
 HEAD_TYPES = ("gaze", "gazeShift", "headDirectionShift", "head")
@@ -63,16 +64,17 @@ class DescribedBody(ComposedBody):
     async def connected(self) -> AsyncIterator[None]:
         """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
         async with super().connected():
-            if (film := film_of(self.stage.physics.model, self._settings)) is None:
-                yield
-                return
-            self.stage.pulse.on_step = partial(self._film, film)
-            self.stage.pulse.wake()
+            film, pulse = film_of(self.stage.physics.model, self._settings), self.stage.pulse
+            if film is not None:
+                pulse.on_step = partial(self._film, film)
+                pulse.wake()
             try:
                 yield
             finally:
-                self.stage.pulse.on_step = lambda at: None
-                finish(film, self._settings)
+                pulse.on_step = lambda at: None
+                pulse.stop()
+                if film is not None:
+                    finish(film, self._settings)
 
     def _film(self, film: Film, at: Seconds) -> None:
         if film.is_due(at):
@@ -90,6 +92,16 @@ class DescribedBody(ComposedBody):
             here = pose or self.state().pose
             return Estimate(behavior=behavior.id, feasible=True, phases=(phase,), pose_after=here, pose_end=here)
         return super().estimate(behavior, pose, world)
+
+    def rehearse_in_steps(
+        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
+    ) -> Steps[Sequence[Estimate]]:
+        moving = [item for item in items if not isinstance(item.behavior, Wait)]
+        told = iter((yield from super().rehearse_in_steps(moving, world, others)))
+        return [
+            self.estimate(item.behavior, item.pose, world) if isinstance(item.behavior, Wait) else next(told)
+            for item in items
+        ]
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         performed = (

@@ -22,6 +22,7 @@ class Pulse:
         self._loop = asyncio.get_running_loop()
         self._compute, self._rise, self._after = step, rise, after
         self._is_awake = False
+        self._next: asyncio.TimerHandle | None = None
         self.on_step: Callable[[Seconds], None] = lambda at: None
         """Called after each step, for a film."""
 
@@ -34,7 +35,13 @@ class Pulse:
         if not self._is_awake:
             self._is_awake = True
             self._rise(self.now())
-            self._loop.call_at(self.now() + TICK, self._tick)
+            self._next = self._loop.call_at(self.now() + TICK, self._tick)
+
+    def stop(self) -> None:
+        """Take no more steps until it is woken, whatever moves: nobody looks any more."""
+        self._is_awake = False
+        if self._next is not None:
+            self._next.cancel()
 
     def step(self) -> bool:
         """Compute up to now, between two ticks. False: there is more to compute."""
@@ -46,4 +53,4 @@ class Pulse:
         self._is_awake = not self._after(now) or not is_done
         self.on_step(now)
         if self._is_awake:
-            self._loop.call_at(now + TICK if is_done else now, self._tick)
+            self._next = self._loop.call_at(now + TICK if is_done else now, self._tick)

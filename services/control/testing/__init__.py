@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from engage_hri.services.control.testing.motions import recorded as recorded
     from engage_hri.services.control.testing.motions import stops as stops
     from engage_hri.services.control.testing.motions import violations as violations
-    from engage_hri.services.control.testing.played import played as played
+    from engage_hri.services.control.testing.playing import played as played
     from engage_hri.services.control.testing.rays import aside as aside
     from engage_hri.services.control.testing.rays import beside as beside
     from engage_hri.services.control.testing.stage import Stage as Stage
@@ -46,7 +46,7 @@ _PLACES = {
     "contract": ("BodyContract",),
     "laws": ("LawBroken", "broken", "poses_agree"),
     "motions": ("STEP", "Recording", "recorded", "stops", "violations"),
-    "played": ("played",),
+    "playing": ("played",),
     "rays": ("aside", "beside"),
     "stage": ("Stage", "default", "performed", "times"),
     "suite": ("ON_AXIS",),

@@ -26,7 +26,8 @@ from engage_hri.services.control.testing.causes import told_once
 from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.first import FirstLook, look
 from engage_hri.services.control.testing.laws import Finding, named
-from engage_hri.services.control.testing.played import playable, played
+from engage_hri.services.control.testing.motions import unused
+from engage_hri.services.control.testing.playing import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
 from engage_hri.services.control.testing.suite import PLUGIN, Suite, unchecked
@@ -55,7 +56,8 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     if not seen.is_there:
         return replace(report, seconds=time.monotonic() - since)
     collected = _Collected(law.lower().replace("`", ""), progress)
-    with _judging(_suite(make, stated, seen)) as arguments:
+    suite = _suite(make, stated, seen)
+    with _judging(suite) as arguments:
         code = pytest.main(arguments, plugins=[collected])
     if code == pytest.ExitCode.NO_TESTS_COLLECTED:
         raise InputRefused(Fault(reason=f"no law has {law!r} in its name", advice="without it all names are printed"))
@@ -64,7 +66,8 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     laws, causes = told_once(collected.laws(), seen.causes)
     return replace(
         report, laws=laws, causes=causes, not_tried=tuple(collected.not_tried()), seconds=time.monotonic() - since,
-        is_stopped=code == pytest.ExitCode.INTERRUPTED,
+        is_stopped=code == pytest.ExitCode.INTERRUPTED, fastest=suite.fastest or {},
+        notes=(*(suite.notes or ()), *unused(seen.capabilities.joints, suite.fastest or {})),
     )  # fmt: skip
 
 
@@ -84,6 +87,8 @@ def _suite(make: Make, stated: Stated, seen: FirstLook) -> type[BodyContract]:
         "world": stated.world or WORLD,
         "behaviors": _behaviors(stated),
         "unable": seen.unable,
+        "notes": {},
+        "fastest": {},
     }
     suite = type("TestBody", (BodyContract,), settings)
     return pytest.mark.real_time(suite) if stated.real_time else suite

@@ -18,6 +18,9 @@ from engage_hri.services.control.testing.suite import Suite, does_not_apply, tri
 
 AT_ONCE: Seconds = 3.0
 """Time within which a behavior ends that is aborted: it may brake, and freeze for a moment."""
+SHORTEST: Seconds = 0.005
+"""Half of the time of a behavior that is over before anybody can abort it: the points of a face of lamps are one
+instant."""
 WORD: Seconds = 1.0
 """Time that a voice has for saying its word to the end."""
 HOWS: tuple[AbortMode, ...] = ("relax", "freeze")
@@ -40,7 +43,8 @@ class EndingLaws(Suite):
         home once the behavior has ended: do it in a `finally`.
         """
         home = await self.pose(body)
-        for case in self.cases(body, is_overlay, "nothing that goes back to rest by itself"):
+        lacks = "nothing that takes time and goes back to rest by itself"
+        for case in self.cases(body, lambda each: is_overlay(each) and self.half(body, each) > SHORTEST, lacks):
             async with case as behavior:
                 for how in HOWS:
                     after = min(0.35, self.half(body, behavior))
@@ -122,15 +126,16 @@ class EndingLaws(Suite):
         await asyncio.sleep(self.dwell)
         self.check_pose(await self.pose(body), home, joints, stages[0].behavior, what="the safe pose some time later")
 
-    async def go_home(self, body: Body) -> None:
-        """Call the body home. Raises LawBroken if it does not get there."""
+    async def go_home(self, body: Body, parts: tuple[str, ...] = ()) -> None:
+        """Call parts of the body home; empty: all. Raises LawBroken if they do not get there."""
         try:
             async with asyncio.timeout(PATIENCE):
-                await body.home()
+                await body.home(parts)
         except TimeoutError:
-            broken(expected=f"that `home` returns within {ms(PATIENCE)}", measured="it does not")
+            what = f"that `home` returns within {ms(PATIENCE)}"
+            broken(expected=what, measured="it does not", cause="`home` never returns")
 
-    @trials(3)
+    @trials(2)
     async def test_brakes_within_the_limits_of_its_joints(self, body: Body, seed: int) -> None:
         """Held and aborted at any instant on its way, no joint exceeds its speed or acceleration.
 
@@ -146,7 +151,7 @@ class EndingLaws(Suite):
                     for _ in range(4):
                         await asyncio.sleep(chance.uniform(0.0, 0.4))
                         stage.authority.hold()
-                        await asyncio.sleep(chance.choice((0.02, 0.1, 1.0)))
+                        await asyncio.sleep(chance.choice((0.02, 0.1, 0.5)))
                         stage.authority.go_on()
                     await stage.over()
                     stage = Stage(body, behavior, "end")
@@ -176,12 +181,61 @@ class EndingLaws(Suite):
                     await self.go_home(body)
                 self.check_limits(body, recording, behavior)
 
+    async def test_home_takes_the_parts_that_it_is_asked_for_and_no_others(self, body: Body) -> None:
+        """`home(parts)` brings these to the safe pose and ends what they do; behaviors of other parts go on.
+
+        Usually `parts` is not looked at, so that all goes home, or nothing.
+        """
+        home, together = await self.pose(body), self._together(body)
+        joints = {behavior.id: self.joints(body, behavior) for behavior, _ in together}
+        for number, (first, parts) in enumerate(together):
+            stages = [Stage(body, replace(each, id=f"{each.id} {number}")) for each, _ in together]
+            for stage in stages:
+                await stage.holding()
+            await standing(body)
+            before = await self.pose(body)
+            await self.go_home(body, parts)
+            after, mine = await self.pose(body), stages[number]
+            self.check_pose(after, home, joints[first.id], first, what=f"the safe pose of {listed(parts)}")
+            await asyncio.wait([mine.task], timeout=AT_ONCE)
+            if not mine.task.done() or "end" in mine.passed:
+                broken(first, expected="that it ends as its parts go home", measured=f"passed {listed(mine.passed)}")
+            for stage, (other, _) in zip(stages, together, strict=True):
+                if stage is mine:
+                    continue
+                if stage.task.done() or stage.authority.revoked is not None:
+                    expected = f"that it goes on while {listed(parts)} goes home"
+                    broken(stage.behavior, expected=expected, measured=f"revoked: {stage.authority.revoked}")
+                if "torso" not in parts:  # that takes all others with it
+                    what = f"where it was before {listed(parts)} went home"
+                    self.check_pose(after, before, joints[other.id], other, what=what)
+                stage.authority.extend("end")
+            for stage in stages:
+                await stage.over()
+            await self.go_home(body)
+
+    def _together(self, body: Body) -> list[tuple[BlockBehavior, tuple[str, ...]]]:
+        """Behaviors that can wait and share no parts, with their parts."""
+        found: list[tuple[BlockBehavior, tuple[str, ...]]] = []
+        taken: set[str] = set()
+        for behavior in self.able(body):
+            parts = body.estimate(behavior, None, self.world).parts
+            if is_movement(behavior) and self.joints(body, behavior) and taken.isdisjoint(parts):
+                found.append((behavior, parts))
+                taken |= set(parts)
+        if not found:
+            self.lacks(body, f"it has {NOTHING}", *self.unable)
+        return found
+
     def _needs_limits(self, body: Body) -> None:
         if not body.capabilities.joints:
             does_not_apply("its capabilities name no joints")
 
     def check_limits(self, body: Body, recording: Recording, behavior: BlockBehavior) -> None:
         """Judge what was recorded. Raises LawBroken with the first limit that was left."""
+        if self.fastest is not None:
+            for joint, speed in recording.fastest(self.noise).items():
+                self.fastest[joint] = max(speed, self.fastest.get(joint, 0.0))
         for each in violations(recording, body.capabilities.joints, self.noise, self.age):
             unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]
@@ -192,10 +246,15 @@ class EndingLaws(Suite):
             )
 
     async def test_leaves_no_task_once_it_is_disconnected(self) -> None:
-        """No task of the driver goes on once `connected()` is left.
+        """No task or timer of the driver goes on once `connected()` is left, at rest or in motion.
 
-        Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`.
+        Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`, and a
+        timer that sets itself again is cancelled there.
         """
+        for is_home in (True, False):
+            await self._check_leaving(is_home)
+
+    async def _check_leaving(self, is_home: bool) -> None:
         before = asyncio.all_tasks()
         body = self.make()
         connection = Connection(body)
@@ -205,7 +264,8 @@ class EndingLaws(Suite):
             Stage(body, behavior, "end")
         await asyncio.sleep(0.3)
         await Stage.end_all()
-        await self.go_home(body)
+        if is_home:
+            await self.go_home(body)
         await connection.leave()
         left = await still_running(before)
         for task in left:
@@ -213,6 +273,11 @@ class EndingLaws(Suite):
         if left:
             names = ", ".join(task.get_name() for task in left)
             broken(expected="no task of the driver once it is disconnected", measured=f"these go on: {names}")
+        timers = _timers()
+        await asyncio.sleep(0.1)
+        if later := _timers() - timers:
+            names = ", ".join(sorted(str(getattr(each._callback, "__qualname__", "a timer")) for each in later))
+            broken(expected="no timer of the driver once it is disconnected", measured=f"this is set anew: {names}")
 
     async def test_an_aborted_speech_stops_at_a_word(self, body: Body) -> None:
         """Aborted, a voice says its word to the end, tells it, and is silent; it tells no word that it has not said.
@@ -238,3 +303,9 @@ class EndingLaws(Suite):
             )
         if saying := body.state().speaking:
             broken(speech, expected="silence once it has ended", measured=f"`speaking` is {saying!r}")
+
+
+def _timers() -> set[asyncio.TimerHandle]:
+    """Timers of this loop that are to come; none where a loop does not tell."""
+    scheduled: list[asyncio.TimerHandle] = getattr(asyncio.get_running_loop(), "_scheduled", [])
+    return {timer for timer in scheduled if not timer.cancelled()}

@@ -199,7 +199,7 @@ class HoldingLaws(Suite):
                 stage.authority.go_on()
                 await stage.over()
 
-    @trials(6)
+    @trials(4)
     async def test_whenever_it_is_held_it_waits_or_ends_by_itself(self, body: Body, seed: int) -> None:
         """Held at any instant, a behavior waits at one hold point, or is on its way home and ends.
 

@@ -6,7 +6,7 @@ and the longer the span, the less the noise of an encoder counts in it.
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -21,6 +21,8 @@ from engage_hri.services.control.testing.laws import angles
 STEP: Seconds = 0.004
 """Time between two samples."""
 LONGEST_SPAN: Seconds = 0.3
+USED = 0.2
+"""Share of its greatest speed that some joint is expected to come to, in all that it does."""
 DEVIATIONS = 6.0
 """Standard deviations of noise that no difference is ever blamed for."""
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -82,6 +84,15 @@ class Recording:
         if len(fresh) < 3:
             return np.zeros(len(self.joints))
         return np.asarray(np.diff(samples[fresh], axis=0).std(axis=0) / math.sqrt(2.0))
+
+    def fastest(self, noise: Radians) -> dict[str, float]:
+        """The fastest that each joint was over 20 ms, radians per second. Noise of that size counts for nothing."""
+        span = 5
+        if len(self.times) <= span:
+            return {}
+        between = np.array(self.times)[span:] - np.array(self.times)[:-span]
+        turned = np.abs(self.angles[span:] - self.angles[:-span]) - DEVIATIONS * math.sqrt(2.0) * noise
+        return dict(zip(self.joints, np.maximum(turned / between[:, None], 0.0).max(axis=0).tolist(), strict=True))
 
     def at(self, time: Seconds) -> dict[str, Radians]:
         """Angle of each joint at an instant, between the two samples about it."""
@@ -199,3 +210,16 @@ def stops(recording: Recording, start: Seconds, end: Seconds) -> int:
     # The last samples before the end are the end of the motion, not a stop in it.
     first, last = int(np.argmax(moving)), len(moving) - int(np.argmax(moving[::-1]))
     return int(np.sum(np.diff(moving[first:last].astype(int)) == -1))
+
+
+def unused(limits: Iterable[JointLimit], fastest: Mapping[str, float]) -> tuple[str, ...]:
+    """Say so if no joint ever comes near the speed that it states.
+
+    fastest: that joints were seen to be, radians per second.
+    """
+    shares = {each.joint: fastest[each.joint] / each.speed for each in limits if fastest.get(each.joint)}
+    if not shares or (most := max(shares.values())) >= USED:
+        return ()
+    joint = max(shares, key=lambda each: shares[each])
+    seen = f"{joint}, with {math.degrees(fastest[joint]):.0f} degrees/s, came nearest, to {100 * most:.0f} %"
+    return (f"no joint was ever near the speed that it states ({seen}): are these the limits of its motors?",)

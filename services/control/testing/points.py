@@ -1,6 +1,7 @@
 """Laws of sync points: each once, in order, as it is passed; and of what a body refuses."""
 
 import asyncio
+from collections.abc import Sequence
 from itertools import pairwise
 
 from msgspec.structs import replace
@@ -8,7 +9,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import Locomotion, Speech
 from engage_hri.schemas.references import type_name
-from engage_hri.services.control.body import Arrived, BehaviorRefused, Body, Reached, Spoke
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.body import Arrived, BehaviorRefused, Body, MouthShape, Reached, Spoke
 from engage_hri.services.control.testing.asked import ONE_INSTANT
 from engage_hri.services.control.testing.laws import broken, listed, ms, named
 from engage_hri.services.control.testing.stage import Stage, default, done, standing, times
@@ -189,6 +191,45 @@ class PointsLaws(Suite):
             does_not_apply("it can say nothing of what it is asked to")
         for speech in speeches:
             await self._check_words(body, speech)
+
+    async def test_closes_its_mouth_with_the_voice(self, body: Body) -> None:
+        """Shapes of the lips are in time order, open the mouth while it speaks, and close it as it ends or is cut.
+
+        Usually the last shape is missing, or `on_lips` is not called with nothing when the voice falls silent early.
+        """
+        if "speech" not in self.types(body):
+            self.lacks(body, "it has no voice", "speech")
+        moved, told = body.on_lips, list[tuple[Seconds, Sequence[MouthShape]]]()
+        now = asyncio.get_running_loop().time
+
+        def listen(shapes: Sequence[MouthShape]) -> None:
+            told.append((now(), tuple(shapes)))
+            moved(shapes)
+
+        body.on_lips = listen
+        for is_cut in (False, True):
+            speech = Speech(id="lips", text="one two three four five six seven")
+            stage = Stage(body, speech, "end")
+            if is_cut:
+                await asyncio.sleep(0.8)
+                stage.authority.revoke()
+            await stage.over()
+            self._check_lips(speech, told, ended=now())
+            told.clear()
+
+    def _check_lips(
+        self, speech: Speech, told: Sequence[tuple[Seconds, Sequence[MouthShape]]], ended: Seconds
+    ) -> None:
+        for at, shapes in told:
+            if any(later.at < earlier.at for earlier, later in pairwise(shapes)):
+                broken(speech, expected="shapes of the lips in time order", measured="one is earlier than one before")
+            if shapes and shapes[-1].opening > 0.0:
+                broken(
+                    speech, expected="a last shape that closes the mouth", measured=f"{shapes[-1].opening:.2f} open"
+                )
+            is_last = (at, shapes) == told[-1]
+            if shapes and is_last and (late := shapes[-1].at - ended) > PROMPT + self.tolerance:
+                broken(speech, "end", expected="a mouth that is closed by then", measured=f"{ms(late)} later")
 
     async def _check_words(self, body: Body, speech: Speech) -> None:
         progress = await done(body, speech)

@@ -69,11 +69,12 @@ def _joints(report: BodyReport) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("joint", header_style="dim")
     table.add_column("part", header_style="dim")
-    for unit in ("from", "to degrees", "degrees/s", "degrees/s²"):
+    for unit in ("from", "to degrees", "degrees/s", "degrees/s²", *["seen degrees/s"] * bool(report.fastest)):
         table.add_column(unit, header_style="dim", justify="right")
     for joint in report.capabilities.joints:
         numbers = (joint.low, joint.high, joint.speed, joint.acceleration)
-        table.add_row(joint.joint, joint.part, *(f"{math.degrees(number):.0f}" for number in numbers))
+        seen = [report.fastest.get(joint.joint, 0.0)] if report.fastest else []
+        table.add_row(joint.joint, joint.part, *(f"{math.degrees(number):.0f}" for number in (*numbers, *seen)))
     return table
 
 
@@ -159,6 +160,8 @@ def _end(report: BodyReport) -> Iterator[Text]:
         yield Text(f"{_laws_that(holds, 'holds', 'hold')}, none is broken, {rest}", style="bold green")
     if any("faults" in reason for law in report.of("does not apply") for reason in law.reasons):
         yield Text("No fault was played: a test of your own can name some (`faults`, docs/contract.md).", style="dim")
+    for note in report.notes:
+        yield Text(f"Note: {note}.", style="yellow")
     if _looks_like_another_clock(report):
         yield Text(
             "Much of it never came. A body with a clock of its own (hardware, a daemon, a thread) is checked with "

@@ -1,6 +1,6 @@
 """Report of a body that was checked: what it is, and law by law whether it holds. Pure."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 import msgspec
@@ -66,7 +66,9 @@ class BodyReport(Struct, frozen=True, kw_only=True):
     driver: the name that it was asked for by. asked: behaviors that it was asked for, in words. not_asked: those that
     it cannot do, with the reason. unknown: types that it has, and the suite has no behavior of. estimate: median time
     that one estimate took. causes: what broke many laws, or the first look already. not_tried: laws that it did not
-    come to. is_stopped: true if somebody has stopped it. seconds: time of the whole check on the wall clock.
+    come to. is_stopped: true if somebody has stopped it. notes: what is worth knowing, and breaks no law. fastest:
+    that each joint was seen to be while its limits were judged, radians per second. seconds: time of the whole check
+    on the wall clock.
     """
 
     driver: str
@@ -80,6 +82,8 @@ class BodyReport(Struct, frozen=True, kw_only=True):
     causes: tuple[Cause, ...] = ()
     not_tried: tuple[str, ...] = ()
     is_stopped: bool = False
+    notes: tuple[str, ...] = ()
+    fastest: Mapping[str, float] = {}
     seconds: Seconds = 0.0
 
     @property

@@ -53,6 +53,10 @@ class Suite:
     world = WORLD
     seeds: int | None = None
     unable: Mapping[str, str] = {}
+    notes: dict[str, None] | None = None
+    """What laws have to say of a body that breaks none of them; None: nobody asks."""
+    fastest: dict[str, float] | None = None
+    """The fastest that each joint was seen to be, radians per second; None: nobody asks."""
 
     def make(self) -> Body:
         """Make the body, in the running event loop, not connected."""
@@ -180,6 +184,11 @@ class Suite:
         found = self.world.entity(entity)
         assert found is not None
         return found.position
+
+    def note(self, words: str) -> None:
+        """Say something of the body that is no breach of the contract."""
+        if self.notes is not None:
+            self.notes[words] = None
 
     # -- measuring -----------------------------------------------------------------------------------------------
 

@@ -43,7 +43,13 @@ class TakeoverLaws(Suite):
                     await asyncio.sleep(self.dwell)
                 else:
                     await asyncio.sleep(0.1)
-                may = tuple(one.passed) if is_waiting else ()
+                may = tuple(one.passed)
+                if "end" in may:
+                    broken(
+                        first,
+                        expected="that it is under way until it is taken over",
+                        measured=f"passed {listed(may)}",
+                    )
                 other = Stage(body, later, "end")
                 await other.over()
                 await one.over(1.0)

@@ -8,22 +8,29 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import sync_points
+from engage_hri.schemas.behavior_types import TYPES, sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
 from engage_hri.services.control.testing.motions import Recording, recorded
+from engage_hri.services.control.testing.playing import Played
 from engage_hri.services.control.testing.predictions import has_joints
-from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, done, times
+from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, done, standing, times
 from engage_hri.services.control.testing.suite import STILL, Suite, does_not_apply, trials
 from engage_hri.services.control.testing.witness import CROWDS, Witness, crowded
 
 TRIMMED = 6
 """Samples at both ends of a stand that are not judged: a measurement of motion comes late."""
-PATIENCE_WITH_FAULTS: Seconds = 60.0
-"""Time after which a behavior that a fault keeps from its next point is aborted."""
+SETTLED: Seconds = 1.0
+"""Time within which a body that is at home stands."""
+PATIENCE_WITH_FAULTS: Seconds = 15.0
+"""Time after which a behavior that a fault keeps from its next point is aborted. Those who tell points by the clock
+have told them by then."""
+CROWDS_WITH_FAULTS = ("all but nods", "nods")
+"""They have all behaviors of the others, too."""
+ACTS_WITH_FAULTS = 8
 
 
 class TruthLaws(Suite):
@@ -115,7 +122,7 @@ class TruthLaws(Suite):
                         measured=degrees(moved),
                     )
 
-    @trials(12)
+    @trials(6)
     @pytest.mark.parametrize("crowd", CROWDS)
     async def test_no_sync_point_that_the_joints_do_not_bear_out(self, body: Body, crowd: str, seed: int) -> None:
         """Begun, extended, held, released and aborted at random, no behavior tells a point that is not so.
@@ -141,21 +148,40 @@ class TruthLaws(Suite):
         make, lies = self.faults()[fault], list[Finding]()
         async with self.connected(make) as body:
             able = [each for each in self.behaviors if type_name(each) in self.types(body)]
-        for behavior in able:
+        asked = list({_kind(each): each for each in able}.values())
+        while asked:
             async with self.connected(make) as body:
-                lies += await self._with_fault(body, behavior)
-        for name, makers in CROWDS.items():
+                lies += await self._with_fault(body, asked.pop(0))
+                while asked and isinstance(make, Played) and await self._is_as_before(body):
+                    lies += await self._with_fault(body, asked.pop(0))
+        for name in CROWDS_WITH_FAULTS:
             async with self.connected(make) as body:
-                witness = await crowded(self, body, makers, Random(f"{fault} {name}"))
+                witness = await crowded(self, body, CROWDS[name], Random(f"{fault} {name}"), ACTS_WITH_FAULTS)
                 if witness is not None:
                     lies += await witness.close(may_fail=True, patience=PATIENCE_WITH_FAULTS)
         if lies:
             raise LawBroken([replace(each, behavior=f"{each.behavior or 'the body'} with {fault}") for each in lies])
 
+    async def _is_as_before(self, body: Body) -> bool:
+        """Take a body home; false if it does not get there, so that another one is needed."""
+        await Stage.end_all()
+        try:
+            async with asyncio.timeout(PATIENCE_WITH_FAULTS):
+                await body.home()
+        except Exception:
+            return False
+        return await standing(body, SETTLED)
+
     async def _with_fault(self, body: Body, behavior: BlockBehavior) -> Sequence[Finding]:
         witness = Witness(self, body)
         witness.begin(behavior, "end")
         return await witness.close(may_fail=True, patience=PATIENCE_WITH_FAULTS)
+
+
+def _kind(behavior: BlockBehavior) -> tuple[str, tuple[str, ...]]:
+    """What behaviors have in common that use the same parts in the same way: of a face, some are one."""
+    row = TYPES[type_name(behavior)]
+    return row.family or row.name, row.points
 
 
 def _runs(flags: Sequence[bool]) -> Iterator[tuple[int, int]]:

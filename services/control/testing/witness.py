@@ -37,6 +37,8 @@ SHIFTS = GazeShift | HeadDirectionShift
 AWAY: Meters = 0.02
 """Distance of a hand at least from where it rests, at the stroke of a gesture."""
 NODDED: Radians = math.radians(1.0)
+WIDEST: Meters = 0.1
+"""Most that a pointing may be beside its target, whatever radius a body states."""
 LEVER: Meters = 0.7
 """Distance at which an error of the joints of an arm counts at the hand."""
 Untrue = tuple[str, str]
@@ -157,7 +159,7 @@ class Witness:
 
     def _points_at(self, rays: Sequence[Ray | None], target: str) -> Untrue | None:
         off = [beside(ray, self.suite.position(target)) for ray in rays if ray is not None]
-        near = self.body.capabilities.pointing_radius + LEVER * self.suite.gaze_slack
+        near = min(self.body.capabilities.pointing_radius, WIDEST) + LEVER * self.suite.gaze_slack
         if not off or min(off) <= near:
             return None
         way = f"{min(off) * 100:.1f} cm beside it" if min(off) < math.inf else "away from it"
@@ -184,14 +186,17 @@ class Witness:
         """Let everything come to its end, and return what cannot be true.
 
         may_fail: a behavior may fail by a name, or never come to a point; then it is aborted, and has to end.
+        patience: seconds after which they are.
         """
         for stage in self.stages:
             stage.authority.go_on()
             stage.authority.extend("end")
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + patience
         for stage in self.stages:
             try:
                 if may_fail:
-                    await stage.until(lambda: False, patience)
+                    await stage.until(lambda: False, max(0.0, deadline - loop.time()))
                     if not stage.task.done():
                         stage.authority.revoke("relax")
                 await stage.over()
@@ -256,14 +261,16 @@ def arms(state: BodyState, mode: str | None) -> tuple[Ray | None, ...]:
     return both.get(mode or "", (state.left_arm, state.right_arm))
 
 
-async def crowded(suite: Suite, body: Body, makers: Sequence[Maker], chance: Random) -> Witness | None:
+async def crowded(
+    suite: Suite, body: Body, makers: Sequence[Maker], chance: Random, acts: int = 25
+) -> Witness | None:
     """Begin, extend, hold, release and abort at random; None if the body has none of these behaviors."""
     targets = [entity.id for entity in suite.world.entities]
     able = [make for make in makers if type_name(make("any", chance, targets)) in suite.types(body)]
     if not able:
         return None
     witness = Witness(suite, body)
-    for number in range(25):
+    for number in range(acts):
         await asyncio.sleep(chance.choice((0.0, chance.uniform(0.0, 0.5), chance.uniform(0.0, 2.0))))
         live = [each for each in witness.stages if not each.task.done()]
         act = chance.choice(("begin", "begin", "extend", "hold", "go on", "abort")) if live else "begin"

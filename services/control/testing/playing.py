@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
 
 from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.body_faults import KINDS, BodyFault, parts_of, words
@@ -35,7 +34,19 @@ def played(make: Make, faults: Iterable[BodyFault] | None = None) -> Mapping[str
     make: makes the body without faults. faults: None: one of each kind that it says it can play; to know these, a
     body is made, in a loop of its own.
     """
-    return {words(fault): partial(_with, make, fault) for fault in (faults if faults is not None else _all(make))}
+    return {words(fault): Played(make, fault) for fault in (faults if faults is not None else _all(make))}
+
+
+class Played:
+    """Maker of a body that has a fault from its start to its end: one of it is as good as the next."""
+
+    def __init__(self, make: Make, fault: BodyFault) -> None:
+        self._make, self._fault = make, fault
+
+    def __call__(self) -> Body:
+        body = self._make()
+        body.switch_faults((self._fault,))
+        return body
 
 
 def _all(make: Make) -> tuple[BodyFault, ...]:
@@ -49,9 +60,3 @@ def _all(make: Make) -> tuple[BodyFault, ...]:
 
 async def _able(make: Make) -> Capabilities:
     return make().capabilities
-
-
-def _with(make: Make, fault: BodyFault) -> Body:
-    body = make()
-    body.switch_faults((fault,))
-    return body

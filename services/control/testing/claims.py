@@ -1,0 +1,299 @@
+"""Laws of what estimates say besides times: rays, degrees, rehearsals, and how fast and slow a body can be."""
+
+import asyncio
+import math
+from collections.abc import Sequence
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.behavior_types import sync_points
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Pointing
+from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase, PlannedTime, Ray
+from engage_hri.schemas.units import Degrees, Radians, Seconds
+from engage_hri.services.control.body import Arrived, Body, BodyState, Progress, Reached
+from engage_hri.services.control.testing.laws import angles, broken, degrees, listed, ms
+from engage_hri.services.control.testing.motions import recorded
+from engage_hri.services.control.testing.predictions import has_joints
+from engage_hri.services.control.testing.rays import angle
+from engage_hri.services.control.testing.stage import PATIENCE, Stage, done, times
+from engage_hri.services.control.testing.suite import Suite, does_not_apply, pose_angles
+from engage_hri.services.control.testing.witness import arms
+from engage_hri.services.runtime.steps import finished
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+
+AIMED = Gaze | GazeShift | HeadDirectionShift | Pointing
+ORIGIN = 0.05
+"""Metres by which eyes or an elbow may be elsewhere than the ray of an estimate begins."""
+WIDEST_CYLINDER, WIDEST_CONE = 0.2, math.radians(20.0)
+"""A pointing or a look that is wider tells nobody one thing on a table from the next."""
+SAME: Degrees = 2.0
+"""Degrees by which a way may be counted otherwise, for each behavior; for each joint its accuracy is added."""
+LONGER, SHORTER = 1.4, 0.75
+"""A way may be counted along its curve, or between its ends."""
+REACTION: Seconds = 0.03
+"""Seconds in addition to the tolerance that a body may take to follow a pace."""
+FAR: Seconds = 120.0
+"""Seconds that are asked for where a phase is said to have no longest time."""
+SLOWER: Seconds = 0.5
+"""Most seconds that are asked for in addition to the natural time."""
+
+
+class ClaimLaws(Suite):
+    """Part of `BodyContract`."""
+
+    topic = "predictions"
+
+    async def test_is_along_the_ray_that_it_said(self, body: Body) -> None:
+        """On target the eyes or the forearm are along the `ray` of the estimate, within `accuracy`.
+
+        Usually the ray is the one of the pose at the start, or its axis points the other way, from the target to the
+        eyes. Generation counts by it what else a look or pointing may be taken for.
+        """
+        for case in self.cases(body, lambda each: isinstance(each, AIMED), "nothing with a target"):
+            async with case as behavior:
+                said, stage = body.estimate(behavior, None, self.world).ray, _OnTarget(self, body, behavior)
+                await stage.over()
+                assert stage.state is not None
+                self._check_ray(behavior, said, [ray for ray in _rays(stage.state, behavior) if ray is not None])
+
+    def _check_ray(self, behavior: BlockBehavior, said: Ray | None, seen: Sequence[Ray]) -> None:
+        sync = _target_point(behavior)
+        if not seen:
+            return
+        if said is None:
+            broken(behavior, sync, expected="the `ray` on target in its estimate", measured="None")
+        near = (3.0 if isinstance(behavior, Pointing) else 1.0) * self.accuracy + self.gaze_slack + said.error
+        off, away = min((angle(said.axis, ray.axis), math.dist(said.origin, ray.origin)) for ray in seen)
+        if off > near or away > ORIGIN + self.gaze_slack:
+            broken(
+                behavior,
+                sync,
+                expected=f"what the estimate says, within {degrees(near)} and {ORIGIN * 100:.0f} cm",
+                measured=f"{degrees(off)} and {away * 100:.1f} cm beside it",
+            )
+
+    async def test_states_what_people_can_tell_apart(self, body: Body) -> None:
+        """`pointing_radius` and `gaze_half_angle` are such that people can tell things on a table apart.
+
+        Usually they are in other units: metres, and radians. Generation says in words what they do not tell apart.
+        """
+        able, types = body.capabilities, set(self.types(body))
+        if not types & {"gaze", "gazeShift", "headDirectionShift", "pointing"}:
+            does_not_apply("it neither looks nor points")
+        if "pointing" in types and not 0.0 < able.pointing_radius <= WIDEST_CYLINDER:
+            limit = f"a `pointing_radius` up to {WIDEST_CYLINDER * 100:.0f} cm"
+            broken(expected=limit, measured=f"{able.pointing_radius * 100:.0f} cm")
+        if not 0.0 < able.gaze_half_angle <= WIDEST_CONE:
+            broken(
+                expected=f"a `gaze_half_angle` up to {degrees(WIDEST_CONE)}", measured=degrees(able.gaze_half_angle)
+            )
+
+    async def test_counts_the_degrees_that_its_joints_turn(self, body: Body) -> None:
+        """`head_degrees` and `arm_degrees` are the way of the joints to the target, from home and from another pose.
+
+        Usually they are radians, or the angle of the target, or they are counted from the present pose whatever
+        `pose` says. Generation chooses by them what is looked at and what is pointed at.
+        """
+        for case in self.cases(body, lambda each: isinstance(each, AIMED), "nothing with a target"):
+            async with case as behavior:
+                joints = sorted(self.joints(body, behavior))
+                if not joints:
+                    continue
+                estimate, sync = body.estimate(behavior, None, self.world), _target_point(behavior)
+                async with recorded(body, joints) as recording:
+                    at = times(await done(body, behavior))
+                    await asyncio.sleep(0.02)
+                start, there = recording.at(at["start"]), recording.at(at[sync])
+                way = sum(math.degrees(abs(there[joint] - start[joint])) for joint in joints)
+                self._check_degrees(behavior, estimate, way, len(joints), "from home")
+                here = estimate.pose_after
+                if here is None:
+                    continue
+                for other in self._aims(body, behavior):
+                    from_there = body.estimate(other, here, self.world)
+                    way = _way(here, from_there.pose_after, joints)
+                    what = f"from where {behavior.id} leaves it"
+                    self._check_degrees(other, from_there, way, len(joints), what)
+
+    def _aims(self, body: Body, behavior: BlockBehavior) -> list[BlockBehavior]:
+        """The same behavior, and one at something else."""
+        assert isinstance(behavior, AIMED)
+        others = [replace(behavior, target=each.id) for each in self.world.entities if each.id != behavior.target]
+        return [behavior, *[each for each in others if body.estimate(each, None, self.world).feasible][:1]]
+
+    def _check_degrees(self, behavior: BlockBehavior, said: Estimate, way: Degrees, joints: int, what: str) -> None:
+        counted = said.head_degrees + said.arm_degrees
+        slack = SAME + joints * math.degrees(self.accuracy + self.slack)
+        is_by_a_way = isinstance(behavior, Pointing) and what != "from home"  # an arm may have to go round
+        if not SHORTER * way - slack <= counted <= (math.inf if is_by_a_way else LONGER * way + slack):
+            broken(
+                behavior,
+                _target_point(behavior),
+                expected=f"about {way:.0f} degrees of its joints {what}",
+                measured=f"`head_degrees` {said.head_degrees:.0f}, `arm_degrees` {said.arm_degrees:.0f}",
+            )
+
+    async def test_rehearses_what_it_estimates(self, body: Body) -> None:
+        """A rehearsal of one behavior, now and undisturbed, says what its estimate says.
+
+        Usually `rehearse` has a model of its own. Plans are made of what it says, and in one of a single behavior
+        nothing else moves.
+        """
+        for case in self.cases(body):
+            async with case as behavior:
+                said = body.estimate(behavior, None, self.world)
+                planned = (PlannedTime(sync="start", at=0.0),)
+                for begins in ((), planned) if has_joints(behavior) else ((),):
+                    items = [EstimateItem(behavior=behavior, times=begins)]
+                    self._check_rehearsed(behavior, said, body.rehearse(items, self.world)[0])
+                    in_steps = finished(body.rehearse_in_steps(items, self.world))
+                    self._check_rehearsed(behavior, said, in_steps[0])
+                if isinstance(behavior, AIMED):
+                    items = [EstimateItem(behavior=behavior, only="degrees")]
+                    (told_degrees,) = body.rehearse(items, self.world)
+                    self._check_same_degrees(behavior, said, told_degrees)
+
+    def _check_rehearsed(self, behavior: BlockBehavior, said: Estimate, told: Estimate) -> None:
+        if told.feasible != said.feasible or [each.to for each in told.phases] != [each.to for each in said.phases]:
+            broken(
+                behavior,
+                expected=f"the points of its estimate, {listed(each.to for each in said.phases)}",
+                measured=listed(each.to for each in told.phases),
+            )
+        for one, other in zip(said.phases, told.phases, strict=True):
+            for name in ("natural", "shortest"):
+                took, again = getattr(one, name), getattr(other, name)
+                if abs(took - again) > self.tolerance + 1e-6:
+                    broken(
+                        behavior,
+                        one.to,
+                        expected=f"`{name}` of its estimate, {ms(took)}",
+                        measured=f"{ms(again)} in the rehearsal",
+                    )
+        self._check_same_degrees(behavior, said, told)
+
+    def _check_same_degrees(self, behavior: BlockBehavior, said: Estimate, told: Estimate) -> None:
+        one, other = said.head_degrees + said.arm_degrees, told.head_degrees + told.arm_degrees
+        if abs(one - other) > SAME + math.degrees(self.slack):
+            broken(
+                behavior, expected=f"the {one:.0f} degrees of its estimate", measured=f"{other:.0f} in the rehearsal"
+            )
+
+    async def test_is_as_fast_and_as_slow_as_it_said(self, body: Body) -> None:
+        """Asked for its `shortest` time a body keeps it, and asked to be slow it takes up to its `longest`.
+
+        Usually a driver with one pace leaves `shortest` at 0, or `longest` at None, which is "no limit". With one
+        pace all three are the natural time; only at a hold point can it be any longer.
+        """
+        for case in self.cases(body, has_joints, "no joints"):
+            async with case as behavior:
+                for is_fast in (True, False):
+                    await body.home()
+                    phases = body.estimate(behavior, None, self.world).phases
+                    await self._paced(body, behavior, phases, is_fast=is_fast)
+
+    async def _paced(self, body: Body, behavior: BlockBehavior, phases: Sequence[Phase], *, is_fast: bool) -> None:
+        """Let it go at a pace: in a hurry all the way, slowly from one place where it stands to the next."""
+        loop, stage = asyncio.get_running_loop(), Stage(body, behavior)
+        stations = ["start"] if is_fast else ["start", *self.holds(body, behavior)]
+        for number, (station, until) in enumerate(zip(stations, [*stations[1:], "end"], strict=True), 1):
+            leg = _between(phases, station, until)
+            asked = [
+                each.shortest if is_fast else self._slow(each, _leads_to_hold(leg[place:]))
+                for place, each in enumerate(leg)
+            ]
+            left = loop.time()
+            pace = {each.to: left + sum(asked[: place + 1]) for place, each in enumerate(leg)}
+            stage.authority.set_pace(pace)
+            stage.authority.extend(station if until != "end" else "end")
+            waits = number if until != "end" else math.inf
+            await stage.until(lambda waits=waits: len(stage.waits_at) >= waits, sum(asked) + PATIENCE)  # type: ignore[misc]
+            self._check_leg(stage, leg, asked, left, is_fast)
+        stage.authority.set_pace({})
+        await stage.over()
+
+    def _slow(self, phase: Phase, is_hold: bool) -> Seconds:
+        """Time that is asked for of a phase that is to be slow. is_hold: it can wait at its end."""
+        if is_hold or phase.natural < REACTION:
+            return phase.natural
+        most = SLOWER if isinstance(asyncio.get_running_loop(), VirtualTimeLoop) else SLOWER / 4
+        if phase.longest is not None:
+            return min(phase.longest, phase.natural + most)
+        return phase.natural + (FAR if isinstance(asyncio.get_running_loop(), VirtualTimeLoop) else most)
+
+    def _check_leg(
+        self, stage: Stage, leg: Sequence[Phase], asked: Sequence[Seconds], left: Seconds, is_fast: bool
+    ) -> None:
+        came = _came(stage.progress)
+        due, allowed = 0.0, REACTION
+        for place, (phase, takes) in enumerate(zip(leg, asked, strict=True)):
+            due, allowed = due + takes, allowed + self.tolerance
+            if phase.to not in came or (not is_fast and _leads_to_hold(leg[place:])):
+                continue
+            took = came[phase.to] - left
+            if (took - due if is_fast else due - took) > allowed:
+                claim = f"`shortest` {ms(phase.shortest)}"
+                if not is_fast:
+                    claim = f"`longest` {'None' if phase.longest is None else ms(phase.longest)}"
+                broken(
+                    stage.behavior,
+                    phase.to,
+                    expected=f"{ms(due)} as it was asked to, since {claim} allows it",
+                    measured=ms(took),
+                )
+
+
+class _OnTarget(Stage):
+    """A behavior that is looked at as it tells that it is on target."""
+
+    def __init__(self, suite: Suite, body: Body, behavior: BlockBehavior) -> None:
+        self.state: BodyState | None = None
+        self._suite = suite
+        super().__init__(body, behavior, "end")
+
+    def hear(self, progress: Progress) -> None:
+        if isinstance(progress, Reached) and progress.sync == _target_point(self.behavior):
+            self.state = self._suite.observed(self._body)
+
+
+def _target_point(behavior: BlockBehavior) -> str:
+    """The sync point at which a behavior is on target."""
+    return "stroke" if "stroke" in sync_points(behavior) else "end"
+
+
+def _leads_to_hold(leg: Sequence[Phase]) -> bool:
+    """True if the first of these phases ends at a hold point, or at an instant with one."""
+    for number, phase in enumerate(leg):
+        if number and phase.natural > 0.0:
+            return False
+        if phase.hold:
+            return True
+    return False
+
+
+def _rays(state: BodyState, behavior: BlockBehavior) -> tuple[Ray | None, ...]:
+    return arms(state, behavior.mode) if isinstance(behavior, Pointing) else (state.gaze,)
+
+
+def _way(here: BodyPose, there: BodyPose | None, joints: Sequence[str]) -> Degrees:
+    """Degrees that joints turn from one pose to another."""
+    one, other = angles(here), pose_angles(there)
+    turned: list[Radians] = [abs(other[joint] - one[joint]) for joint in joints if joint in one and joint in other]
+    return math.degrees(sum(turned))
+
+
+def _between(phases: Sequence[Phase], since: str, to: str) -> Sequence[Phase]:
+    """The phases from one sync point to another."""
+    names = [phases[0].since, *(each.to for each in phases)]
+    return phases[names.index(since) : names.index(to)]
+
+
+def _came(progress: Sequence[Progress]) -> dict[str, Seconds]:
+    """Loop time at which a body came to each sync point."""
+    came: dict[str, Seconds] = {}
+    for each in progress:
+        if isinstance(each, Arrived):
+            came.setdefault(each.sync, each.at)
+        elif isinstance(each, Reached):
+            came.setdefault(each.sync, each.arrived)
+    return came
