@@ -104,9 +104,10 @@ class ComposedBody(Body):
     """Several bodies as one. Capabilities add up."""
 
     def __init__(self, members: Sequence[Member]) -> None:
-        """Join `members`. Raises InputRefused: two of them have the same part or the same joint."""
+        """Join `members`. Raises InputRefused: one part or joint is of two, or one carries the other's."""
         self._members = tuple(members)
         _refuse_conflicts(self._members)
+        _refuse_carried(self._members)
         self.capabilities = _joined(self._members)
         self._world = World(entities=())
         for member in self._members:
@@ -339,10 +340,16 @@ async def _all(awaited: Sequence[Awaitable[None]]) -> None:
 
 
 def _within(member: Member, estimate: Estimate) -> Estimate:
-    """The estimate of a driver, refused if it would use a part that the driver does not have here."""
+    """The estimate of a driver for what it has here: refused if it would use another part."""
     beyond = [part for part in estimate.parts if part not in member.parts]
-    if not estimate.feasible or member.is_whole or not beyond:
+    if not estimate.feasible or member.is_whole:
         return estimate
+    if not beyond:
+        after, end = (
+            pose and BodyPose(joints=tuple(each for each in pose.joints if each.joint in member.joints))
+            for pose in (estimate.pose_after, estimate.pose_end)
+        )
+        return replace(estimate, pose_after=after, pose_end=end)
     reason = f"{member.name} is to have only {', '.join(member.parts)} here, and this takes {', '.join(beyond)}"
     fault = Fault(reason=reason, where=estimate.behavior, service="control")
     return infeasible(estimate.behavior, "BEHAVIOR_TYPE_NOT_SUPPORTED", fault)
@@ -374,3 +381,17 @@ def _refuse_conflicts(members: Sequence[Member]) -> None:
                     reason = f"{other.name} and {member.name} both have the {kind} {name!r}"
                     advice = f"say whose it is, by the parts that each is to have: {name}={other.name}"
                     raise InputRefused(Fault(reason=reason, where="control.body", advice=advice, service="control"))
+
+
+def _refuse_carried(members: Sequence[Member]) -> None:
+    """Raise InputRefused if a part that stands on another one, as a driver says, is not of the driver of that."""
+    owner = {part: member for member in members for part in member.parts}
+    stands = {
+        (part, carrier): None for member in members for carrier, own in member.body.carries.items() for part in own
+    }
+    for part, carrier in stands:
+        if part in owner and carrier in owner and owner[part] is not owner[carrier]:
+            on, away = owner[carrier].name, owner[part].name
+            reason = f"{part} of {away} stands on {carrier} of {on}, and {away} would not know where that is"
+            advice = f"take {part} and {carrier} from one driver, or leave {carrier} out: then it stands still"
+            raise InputRefused(Fault(reason=reason, where="control.body", advice=advice, service="control"))

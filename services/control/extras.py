@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from math import inf
+from typing import ClassVar
 
 from msgspec import Struct
 
@@ -31,9 +32,14 @@ class Idle(Struct, frozen=True, kw_only=True):
 
 
 class Extras:
-    """The part of `Body` that no body needs to have."""
+    """The part of `Body` that no body needs to have.
+
+    carries: the parts that stand on another one and move with it, by that part. All of them are of one driver, or the
+    carrier is of none: nobody tells a driver how parts of another move.
+    """
 
     capabilities: Capabilities
+    carries: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     @property
     def faults(self) -> tuple[BodyFault, ...]:

@@ -44,6 +44,7 @@ class GuardedBody(Body):
         self.name = name
         self.body = body
         self.capabilities = body.capabilities
+        self.carries = body.carries  # type: ignore[misc]
         self._last = BodyState(pose=BodyPose(), moving=False)
         self._broken: set[str] = set()
         """Calls that broke when they were made last: each is told once until it works again."""
