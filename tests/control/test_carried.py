@@ -1,4 +1,4 @@
-"""What a trunk carries is of the driver of that trunk: of every other way to compose a body points would be untrue."""
+"""What a trunk carries is of the driver of that trunk: composed in another way, points would be untrue."""
 
 import asyncio
 import math

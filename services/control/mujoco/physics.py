@@ -107,7 +107,7 @@ class Physics:
 
     @property
     def beside(self) -> dict[str, Radians]:
-        """By how much the true angles are more than the measured ones, of joints of which they are not the same."""
+        """Radians by which true angles are more than measured ones, of joints of which they are not the same."""
         by = zip(self.joints, (self.angles - self.measured).tolist(), strict=True)
         return {joint: angle for joint, angle in by if abs(angle) > 1e-9}
 
