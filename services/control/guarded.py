@@ -50,6 +50,7 @@ class GuardedBody(Body):
         """Calls that broke when they were made last: each is told once until it works again."""
         body.on_fault = lambda fault: self.on_fault(fault)
         body.on_lips = lambda shapes: self.on_lips(shapes)
+        body.others_say = lambda: self.others_say()
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
