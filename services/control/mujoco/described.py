@@ -95,6 +95,8 @@ class DescribedBody(ComposedBody):
         return super().estimate(behavior, pose, world)
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        if (preparing := self.prepare([behavior])) is not None:
+            await preparing
         performed = (
             speaking.wait(behavior, authority) if isinstance(behavior, Wait) else super().perform(behavior, authority)
         )
