@@ -130,6 +130,31 @@ async def inverse(body: DescribedBody) -> Iterator[float]:
     return iter([span for span in spans if span > 0.05])
 
 
+async def turns(body: DescribedBody) -> list[float]:
+    """Milliseconds of the thread that each turn of the loop takes while the iCub prepares aims and estimates them."""
+    spans: list[float] = []
+    run = asyncio.Handle._run
+
+    def timed(self: asyncio.Handle) -> None:
+        since = time.thread_time()
+        run(self)
+        spans.append(1000 * (time.thread_time() - since))
+
+    body.see(WORLD)
+    asyncio.Handle._run = timed  # type: ignore[method-assign]
+    try:
+        for entity in WORLD.entities:
+            asked = [Gaze(id="g", target=entity.id), Pointing(id="p", target=entity.id)]
+            if (preparing := body.prepare(asked)) is not None:
+                await preparing
+            for behavior in asked:
+                body.estimate(behavior, None, WORLD)
+            await asyncio.sleep(0)
+    finally:
+        asyncio.Handle._run = run  # type: ignore[method-assign]
+    return spans
+
+
 CASES: Mapping[str, Sequence[BodyFault]] = {
     "healthy": (), "noisy 0.3": (BodyFault(kind="noisy"),), "slow 2x": (BodyFault(kind="slow"),),
     "slow 4x": (BodyFault(kind="slow", amount=4.0),), "sticky": (BodyFault(kind="sticky"),),
@@ -148,6 +173,14 @@ def measure() -> list[dict[str, Any]]:
 
         spans = sorted(run_virtual(solved()))
         rows.append({"what": "iCub, an aim", "ms_p50": round(median(spans), 1), "ms_max": round(spans[-1], 1)})
+
+        async def taken() -> list[float]:
+            return await turns(DescribedBody(ICUB))
+
+        spans = sorted(run_virtual(taken()))
+        rows.append(
+            {"what": "iCub, a turn of aims", "ms_p50": round(median(spans), 1), "ms_max": round(spans[-1], 1)}
+        )
     rows += [{"what": name, **run_virtual(errors(faults))} for name, faults in CASES.items()]
     return rows
 

@@ -49,7 +49,7 @@ LAYERS = {
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
-    " > composed guarded ordinary voice > driven > performing questions shown"
+    " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions estimates refusals switching told unheard waiting > live > body"
     " > calibration > extras fitting > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"

@@ -7,14 +7,12 @@ knows only its own joints; what one says of poses is completed with where the ot
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
-from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, JointLimit, Ray
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, Ray
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
@@ -29,66 +27,16 @@ from engage_hri.services.control.body import (
     Progress,
 )
 from engage_hri.services.control.extras import Idle, Seen
+from engage_hri.services.control.members import (
+    GAZE_PART,
+    LIPS_PART,
+    VOICE_PART,
+    Member,
+    refuse_carried,
+    refuse_conflicts,
+)
 from engage_hri.services.control.refusals import infeasible, unsupported
 from engage_hri.services.runtime.steps import Steps, finished
-
-GAZE_PART, LIPS_PART, VOICE_PART = "head", "face", "voice"
-"""Parts whose owner tells the gaze axis, has the lips, and says what is being said."""
-ARMS = ("left_arm", "right_arm")
-PARTS_OF_TYPES = {
-    **dict.fromkeys(("gaze", "gazeShift", "headDirectionShift", "head"), (GAZE_PART,)),
-    **dict.fromkeys(("face", "faceLexeme", "faceFacs", "faceShift"), (LIPS_PART,)),
-    **dict.fromkeys(("pointing", "gesture"), ARMS),
-    **dict.fromkeys(("posture", "postureShift", "pose"), ("torso", *ARMS)),
-    "speech": (VOICE_PART,),
-}
-"""Parts of which a type of behavior needs one, where a driver has such parts."""
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """A driver in a composed body. name: as it was asked for. parts: those of its parts that it has here."""
-
-    name: str
-    body: Body
-    parts: tuple[str, ...]
-
-    @cached_property  # these are asked for each behavior, and many times a second
-    def is_whole(self) -> bool:
-        return set(self.parts) == set(self.body.capabilities.parts)
-
-    @cached_property
-    def types(self) -> tuple[str, ...]:
-        """Types of behaviors that it can perform with the parts that it has here."""
-        return tuple(name for name in self.body.capabilities.types if self._can(name))
-
-    @cached_property
-    def limits(self) -> tuple[JointLimit, ...]:
-        """Limits of the joints that it has here."""
-        every = self.body.capabilities.joints
-        return every if self.is_whole else tuple(limit for limit in every if limit.part in self.parts)
-
-    @cached_property
-    def joints(self) -> frozenset[str]:
-        """Names of the joints in `limits`."""
-        return frozenset(limit.joint for limit in self.limits)
-
-    def tells_of(self, joint: str) -> bool:
-        """True if what it says of this joint counts; of a driver with all its parts that is everything."""
-        return self.is_whole or joint in self.joints
-
-    def _can(self, name: str) -> bool:
-        needed = [part for part in PARTS_OF_TYPES.get(name, ()) if part in self.body.capabilities.parts]
-        return not needed or any(part in self.parts for part in needed)
-
-    def plays(self, fault: BodyFault) -> bool:
-        """True if it can play this fault, at a part or a joint that it has here."""
-        is_here = not fault.part or fault.part in self.parts or fault.part in self.joints
-        return is_here and fault.kind in self.body.capabilities.faults
-
-    def has(self, part: str) -> bool:
-        """True if it has this part here. A driver with all its parts may have given the part another name."""
-        return part in self.parts or (self.is_whole and part not in self.body.capabilities.parts)
 
 
 def composed(members: Sequence[Member]) -> Body:
@@ -104,17 +52,24 @@ class ComposedBody(Body):
     """Several bodies as one. Capabilities add up."""
 
     def __init__(self, members: Sequence[Member]) -> None:
-        """Join `members`. Raises InputRefused: two of them have the same part or the same joint."""
+        """Join `members`. Raises InputRefused: one part or joint is of two, or one carries the other's."""
         self._members = tuple(members)
-        _refuse_conflicts(self._members)
+        refuse_conflicts(self._members)
+        refuse_carried(self._members)
         self.capabilities = _joined(self._members)
         self._world = World(entities=())
         for member in self._members:
             member.body.on_fault = self._tell_fault
             member.body.on_lips = self.move_lips
+            member.body.others_say = self._saying
 
     def _tell_fault(self, fault: Fault) -> None:
         self.on_fault(fault)
+
+    def _saying(self) -> str:
+        """Words that are said now, by a voice of this body or by one beside it."""
+        said = (member.body.state().speaking for member in self._members if member.has(VOICE_PART))
+        return next(filter(None, said), "") or self.others_say()
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
@@ -308,9 +263,7 @@ class ComposedBody(Body):
             left_arm=_first(state.left_arm for member, state in states if member.has("left_arm")),
             right_arm=_first(state.right_arm for member, state in states if member.has("right_arm")),
             looking_at=seeing.looking_at if seeing else "",
-            speaking=next(
-                (state.speaking for member, state in states if member.has(VOICE_PART) and state.speaking), ""
-            ),
+            speaking=next(filter(None, (state.speaking for member, state in states if member.has(VOICE_PART))), ""),
         )
 
     def see(self, world: World) -> None:
@@ -339,10 +292,16 @@ async def _all(awaited: Sequence[Awaitable[None]]) -> None:
 
 
 def _within(member: Member, estimate: Estimate) -> Estimate:
-    """The estimate of a driver, refused if it would use a part that the driver does not have here."""
+    """The estimate of a driver for what it has here: refused if it would use another part."""
     beyond = [part for part in estimate.parts if part not in member.parts]
-    if not estimate.feasible or member.is_whole or not beyond:
+    if not estimate.feasible or member.is_whole:
         return estimate
+    if not beyond:
+        after, end = (
+            pose and BodyPose(joints=tuple(each for each in pose.joints if each.joint in member.joints))
+            for pose in (estimate.pose_after, estimate.pose_end)
+        )
+        return replace(estimate, pose_after=after, pose_end=end)
     reason = f"{member.name} is to have only {', '.join(member.parts)} here, and this takes {', '.join(beyond)}"
     fault = Fault(reason=reason, where=estimate.behavior, service="control")
     return infeasible(estimate.behavior, "BEHAVIOR_TYPE_NOT_SUPPORTED", fault)
@@ -362,18 +321,3 @@ def _joined(members: Sequence[Member]) -> Capabilities:
         pointing_radius=max((one.pointing_radius for one in each), default=none.pointing_radius),
         faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
     )
-
-
-def _refuse_conflicts(members: Sequence[Member]) -> None:
-    owner: dict[tuple[str, str], Member] = {}
-    for member in members:
-        for kind, names in (("part", member.parts), ("joint", sorted(member.joints))):
-            for name in names:
-                other = owner.setdefault((kind, name), member)
-                if other is not member:
-                    reason = f"{other.name} and {member.name} both have the {kind} {name!r}"
-                    rest = ",".join(part for part in member.parts if part not in other.parts)
-                    spec = member.name.rpartition("=")[2]
-                    advice = "say whose it is, by the parts that the other is to have"
-                    advice += f": {rest}={spec}" if rest else ""
-                    raise InputRefused(Fault(reason=reason, where="control.body", advice=advice, service="control"))

@@ -23,9 +23,10 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.body import Body
-from engage_hri.services.control.composed import Member, composed
+from engage_hri.services.control.composed import composed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
+from engage_hri.services.control.members import Member
 
 GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""

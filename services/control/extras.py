@@ -1,7 +1,8 @@
 """Parts of a body besides its contract: faults that it plays, where it really points, and a correction of that."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
+from typing import ClassVar
 
 from msgspec import Struct
 
@@ -31,9 +32,16 @@ class Idle(Struct, frozen=True, kw_only=True):
 
 
 class Extras:
-    """The part of `Body` that no body needs to have."""
+    """The part of `Body` that no body needs to have.
+
+    carries: the parts that stand on another one and move with it, by that part. All of them are of one driver, or the
+    carrier is of none: nobody tells a driver how parts of another move.
+    others_say: tells what the voices of other drivers say now; empty: nothing. Who composes the body replaces it.
+    """
 
     capabilities: Capabilities
+    carries: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    others_say: Callable[[], str] = staticmethod(lambda: "")
 
     @property
     def faults(self) -> tuple[BodyFault, ...]:

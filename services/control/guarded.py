@@ -46,11 +46,13 @@ class GuardedBody(Body):
         self.name = name
         self.body = body
         self.capabilities = body.capabilities
+        self.carries = body.carries  # type: ignore[misc]
         self._last = BodyState(pose=BodyPose(), moving=False)
         self._broken: set[str] = set()
         """Calls that broke when they were made last: each is told once until it works again."""
         body.on_fault = lambda fault: self.on_fault(fault)
         body.on_lips = lambda shapes: self.on_lips(shapes)
+        body.others_say = lambda: self.others_say()
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:

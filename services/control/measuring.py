@@ -1,10 +1,9 @@
 """Measurements of where a body really looks and points: it does so at marks, and somebody says what it hit."""
 
-import asyncio
-from collections.abc import AsyncGenerator, Awaitable, Callable, Collection, Sequence
+from collections.abc import AsyncGenerator, Callable, Collection, Sequence
 from contextlib import aclosing
 from math import degrees
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 
@@ -23,8 +22,7 @@ from engage_hri.services.control.body import (
     Progress,
 )
 from engage_hri.services.control.fitting import Measurement
-
-T = TypeVar("T")
+from engage_hri.services.control.waiting import within
 
 ON_TARGET = "stroke"
 """The last point that a look or a point may pass: it stands on its target from then on."""
@@ -106,7 +104,7 @@ async def measured(
 
 async def _home(body: Body) -> None:
     try:
-        await _within(HOME, body.home())
+        await within(HOME, body.home())
     except TimeoutError as late:
         reason = f"it is not in its safe pose {HOME:g} s after it was told to go there"
         raise BodyFailed(Fault(reason=reason, where="home", service="control")) from late
@@ -142,12 +140,6 @@ async def _next(stream: AsyncGenerator[Progress, None], planned: Seconds, what: 
     """The next progress of a behavior; None: it is over. planned: seconds that it takes. Raises Stuck."""
     limit = PATIENCE + SLOWEST * planned
     try:
-        return await _within(limit, anext(stream, None))
+        return await within(limit, anext(stream, None))
     except TimeoutError as late:
         raise Stuck(f"{what}: nothing has come of it for {limit:.0f} s; {planned:.1f} s were planned") from late
-
-
-async def _within(seconds: Seconds, awaited: Awaitable[T]) -> T:
-    """Await something for some seconds at most. Raises TimeoutError."""
-    async with asyncio.timeout(seconds):
-        return await awaited

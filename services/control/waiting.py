@@ -1,9 +1,13 @@
 """Waiting for an instant or for news, whichever comes first."""
 
 import asyncio
+from collections.abc import Awaitable
 from math import inf
+from typing import TypeVar
 
 from engage_hri.schemas.units import Seconds
+
+T = TypeVar("T")
 
 EARLY: Seconds = 1e-9
 """A loop may run a timer this much too early: a task that then still found its instant ahead would wait for ever."""
@@ -37,3 +41,9 @@ class Bell:
         finally:
             if timer is not None:
                 timer.cancel()
+
+
+async def within(seconds: Seconds, awaited: Awaitable[T]) -> T:
+    """Await something for some seconds at most. Raises TimeoutError."""
+    async with asyncio.timeout(seconds):
+        return await awaited

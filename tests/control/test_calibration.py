@@ -30,7 +30,6 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.control.body import BodyFailed
 from engage_hri.services.control.calibration import Calibration, calibrated, read, written
 from engage_hri.services.control.config import ControlConfig, Miscalibrated, Variability
 from engage_hri.services.control.fitting import Fit, fit
@@ -382,27 +381,3 @@ def test_capabilities_of_a_body_say_which_marks_it_has() -> None:
     assert len({entity.id for entity in marks().entities}) == len(marks().entities) == 24
     assert Capabilities(body="b", types=(), parts=()).faults == ()
     assert all(isinstance(entity, Entity) for entity in marks(OTHER_ROWS).entities)
-
-
-# -- what goes wrong ----------------------------------------------------------------------------------------------
-
-
-async def test_a_part_that_is_stuck_for_good_is_measured_no_further_and_says_so() -> None:
-    told: list[str] = []
-    body = SimulatedBody()
-    body.switch_faults([BodyFault(kind="stall", part="right_arm", before="stroke")])
-    found = await measured(body, marks((0.5,), ()), ("right_arm", "head"), SimulatedEyes(body, 0.0), told.append)
-
-    assert {each.part for each in found} == {"head"}
-    (line,) = told
-    assert line.startswith("right_arm at mark-1: nothing has come of it for ")
-    assert line.endswith("; the right_arm is measured no further")
-
-
-async def test_a_body_that_never_comes_home_fails_by_that() -> None:
-    class Away(SimulatedBody):
-        async def home(self, parts: tuple[str, ...] = ()) -> None:
-            await asyncio.Event().wait()
-
-    with pytest.raises(BodyFailed, match="not in its safe pose 60 s after"):
-        await measured(body := Away(), marks(), ("head",), SimulatedEyes(body, 0.0), pytest.fail)

@@ -6,15 +6,26 @@ from random import Random
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Pointing, Speech
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    FaceLexeme,
+    Gaze,
+    Gesture,
+    Pointing,
+    Pose,
+    Posture,
+    PostureShift,
+    Speech,
+)
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, PlannedTime
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.control.body import BehaviorRefused, Body, MouthShape, MovementAuthority, Reached
-from engage_hri.services.control.composed import ComposedBody, Member, composed
+from engage_hri.services.control.composed import ComposedBody, composed
+from engage_hri.services.control.members import Member
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract
-from engage_hri.services.control.testing.stage import performed
+from engage_hri.services.control.testing.stage import Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")
@@ -27,7 +38,12 @@ def of(*parts: str, name: str = "") -> Member:
 
 def split() -> Body:
     """The torso in three drivers, each of which has all the rest as well and may not use it."""
-    return composed([of("head", "face", "torso"), of("left_arm", "right_arm"), of("voice")])
+    return composed([of("head", "torso", "left_arm", "right_arm"), of("face"), of("voice")])
+
+
+def apart() -> Body:
+    """The torso in three drivers, of which none may move the trunk."""
+    return composed([of("head", "face"), of("left_arm", "right_arm"), of("voice")])
 
 
 class TestComposedBody(BodyContract):
@@ -35,11 +51,11 @@ class TestComposedBody(BodyContract):
         return split()
 
 
-class TestHeadAndVoice(BodyContract):
-    behaviors = tuple(each for each in BEHAVIORS if not isinstance(each, Pointing | Gesture))
+class TestApart(BodyContract):
+    behaviors = tuple(each for each in BEHAVIORS if not isinstance(each, Posture | PostureShift | Pose))
 
     def make(self) -> Body:
-        return composed([of("voice"), of("head", "face", "torso")])
+        return apart()
 
 
 async def test_a_single_driver_with_all_its_parts_stays_as_it_is():
@@ -62,7 +78,7 @@ async def test_each_part_does_what_it_does_alone(seed: int):
 
 
 async def test_behaviors_of_several_drivers_go_on_at_once_and_only_their_own_parts_move():
-    body = split()
+    body = apart()
     body.see(WORLD)
     before = {each.joint: each.angle for each in body.state().pose.joints}
     point, look = Pointing(id="p", target="near-right"), Gaze(id="g", target="far-left")
@@ -82,7 +98,7 @@ async def test_behaviors_of_several_drivers_go_on_at_once_and_only_their_own_par
 
 
 async def test_what_one_driver_says_of_poses_is_completed_with_where_the_others_are():
-    body = split()
+    body = apart()
     here = {each.joint: each.angle for each in body.state().pose.joints}
     estimate = body.estimate(Gaze(id="g", target="far-left"), None, WORLD)
     assert estimate.pose_after is not None
@@ -96,8 +112,26 @@ async def test_what_one_driver_says_of_poses_is_completed_with_where_the_others_
     assert len(after) == len(estimate.pose_after.joints)
 
 
+async def test_an_estimate_leaves_the_parts_of_other_drivers_where_they_are():
+    """Each driver has arms and a head of its own, of which the other knows nothing."""
+    body = apart()
+    body.see(WORLD)
+    stage = Stage(body, Pointing(id="p", target="near-right"), "stroke")
+    await asyncio.sleep(3.0)
+    here = {each.joint: each.angle for each in body.state().pose.joints}
+    (rehearsed,) = body.rehearse([EstimateItem(behavior=(look := Gaze(id="g", target="far-left")))], WORLD)
+    for estimate in (body.estimate(look, None, WORLD), rehearsed):
+        assert estimate.pose_after is not None
+        after = {each.joint: each.angle for each in estimate.pose_after.joints}
+        assert {joint: angle for joint, angle in after.items() if "right" in joint} == {
+            joint: angle for joint, angle in here.items() if "right" in joint
+        }
+    stage.authority.revoke()
+    await stage.over()
+
+
 async def test_a_plan_is_rehearsed_by_each_driver_with_what_is_its_own():
-    body, whole = split(), SimulatedBody()
+    body, whole = apart(), SimulatedBody()
     for each in (body, whole):
         each.see(WORLD)
     items = [
@@ -173,7 +207,7 @@ async def test_a_joint_that_two_have_is_refused_by_name():
 
 
 async def test_home_takes_every_driver_home_or_only_whose_parts_are_named():
-    body = split()
+    body = apart()
     body.see(WORLD)
     home = body.state().pose
     for behavior in (Gaze(id="g", target="far-left"), Pointing(id="p", target="near-right")):
@@ -237,7 +271,7 @@ async def test_a_smile_goes_to_the_driver_with_the_face():
 
 
 async def test_a_fault_goes_to_the_driver_whose_part_it_is() -> None:
-    head, arms = of("head", "face", "torso"), of("left_arm", "right_arm")
+    head, arms = of("head", "face"), of("left_arm", "right_arm")
     body = composed([head, arms])
     body.switch_faults((BodyFault(kind="slow", part="right_arm", amount=2.0), BodyFault(kind="stall", part="head")))
 
@@ -279,7 +313,7 @@ async def test_each_driver_moves_by_itself_what_it_has_here_and_no_more() -> Non
 @pytest.mark.parametrize("names", [("A", "B"), ("simulated", "simulated")], ids=["two names", "one name"])
 async def test_a_fault_without_a_part_is_played_once_by_each_driver_that_can(names: tuple[str, str]) -> None:
     """What counts is the driver, not how it was asked for: a body may be made of one kind of driver twice."""
-    head, arms = of("head", "face", "torso", name=names[0]), of("left_arm", "right_arm", name=names[1])
+    head, arms = of("head", "face", name=names[0]), of("left_arm", "right_arm", name=names[1])
     body, beside = composed([head, arms]), BodyFault(kind="miscalibrated", amount=4.0)
     body.switch_faults((beside, BodyFault(kind="slow", part="right_arm", amount=2.0)))
 

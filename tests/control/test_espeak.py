@@ -14,7 +14,8 @@ from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
-from engage_hri.services.control.composed import Member, composed
+from engage_hri.services.control.composed import composed
+from engage_hri.services.control.members import Member
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.clauses import clause

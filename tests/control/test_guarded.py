@@ -21,9 +21,10 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
 )
-from engage_hri.services.control.composed import Member, composed
+from engage_hri.services.control.composed import composed
 from engage_hri.services.control.extras import Idle
 from engage_hri.services.control.guarded import GuardedBody
+from engage_hri.services.control.members import Member
 from engage_hri.services.runtime.steps import finished
 from tests.control.test_drivers import Bare
 

@@ -114,7 +114,7 @@ class MujocoBody(SimulatedBody):
             if isinstance(run.behavior, Pointing) and run.awaits("stroke_end") and not run.awaits("stroke_start")
         }
         now, data = self._loop.time(), self.bench.physics.data
-        return framed(now, data, self.state(), self._torso.world, pointing, self._plan())
+        return framed(now, data, self.state(), self.others_say(), self._torso.world, pointing, self._plan())
 
     # -- the contract -------------------------------------------------------------------------------------------
 

@@ -17,7 +17,8 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Body, MovementAuthority, Progress
-from engage_hri.services.control.composed import ComposedBody, Member
+from engage_hri.services.control.composed import ComposedBody
+from engage_hri.services.control.members import Member
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, refuse
 from engage_hri.services.control.mujoco.film import Film, Frame
@@ -83,7 +84,9 @@ class DescribedBody(ComposedBody):
     def frame(self) -> Frame:
         """The robot as a film shows it now."""
         pointing = {limb.part: limb.points_at for limb in self._limbs if isinstance(limb, ArmLimb) and limb.points_at}
-        return framed(self.stage.pulse.now(), self.stage.physics.data, self.state(), self._world, pointing)
+        return framed(
+            self.stage.pulse.now(), self.stage.physics.data, self.state(), self.others_say(), self._world, pointing
+        )
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if isinstance(behavior, Wait):
@@ -104,6 +107,8 @@ class DescribedBody(ComposedBody):
         ]
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        if (preparing := self.prepare([behavior])) is not None:
+            await preparing
         performed = (
             speaking.wait(behavior, authority) if isinstance(behavior, Wait) else super().perform(behavior, authority)
         )

@@ -6,6 +6,7 @@ Drawing a picture takes some tenths of a second without a GPU, so nothing is dra
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from math import ceil
 from pathlib import Path
@@ -15,7 +16,7 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.mujoco import face
 from engage_hri.services.control.mujoco.pictures import FROM_THE_SIDE, Beam, Camera, Cone, Picture, View
@@ -55,7 +56,7 @@ class Film:
         self.frames.append(frame)
 
     def write(self, path: Path, *, view: View = FROM_THE_SIDE, size: tuple[int, int] = (720, 540)) -> None:
-        """Draw the film into a file: `.mp4` (needs the program ffmpeg), `.webp` or `.gif`, which most browsers play,
+        """Draw the film into a file: `.mp4` (needs ffmpeg), `.webp` or `.gif`, which most browsers play,
         or `.png`, a sheet of pictures.
 
         Raises InputRefused: an unknown ending, or no ffmpeg. RunFailed: this machine cannot draw.
@@ -98,11 +99,25 @@ def check(path: Path) -> None:
         raise InputRefused(
             Fault(reason=f"a film {path.name!r}", advice=f"name it {', '.join(FORMATS)}", service="control")
         )
-    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
-        advice = "install ffmpeg, or name the film .webp or .gif"
+    if path.suffix == ".mp4" and _ffmpeg() is None:
+        advice = "install ffmpeg, or `pip install imageio-ffmpeg`, or name the film .webp or .gif"
         raise InputRefused(
             Fault(reason="no program ffmpeg for an .mp4", where=str(path), advice=advice, service="control")
         )
+
+
+def _ffmpeg() -> str | None:
+    """The program ffmpeg of this machine, or else that of the package imageio-ffmpeg; None: neither is there."""
+    if (program := shutil.which("ffmpeg")) is not None:
+        return program
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        return None
+    try:
+        return str(get_ffmpeg_exe())
+    except RuntimeError:  # the package was built without it
+        return None
 
 
 def show_face(model: mujoco.MjModel, pose: Mapping[str, float]) -> None:
@@ -172,7 +187,7 @@ def _write_mp4(path: Path, frames: Sequence[Frame], pictures: Iterator[Picture],
         if program is None:
             height, width, _ = picture.shape
             program = subprocess.Popen(
-                ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+                [_ffmpeg() or "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
                  "-s", f"{width}x{height}", "-r", f"{1 / interval:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)],
                 stdin=subprocess.PIPE,
             )  # fmt: skip
@@ -180,6 +195,9 @@ def _write_mp4(path: Path, frames: Sequence[Frame], pictures: Iterator[Picture],
         times = round((until - frames[0].at) / interval) - shown
         shown += max(0, times)
         assert program.stdin is not None
-        program.stdin.write(picture.tobytes() * max(0, times))
+        with suppress(BrokenPipeError):  # what it has ended with is told below
+            program.stdin.write(picture.tobytes() * max(0, times))
     if program is not None:
         program.communicate()
+        if program.returncode:
+            raise RunFailed(Fault(reason="ffmpeg could not write the film", where=str(path), service="control"))

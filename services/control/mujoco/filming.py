@@ -34,10 +34,10 @@ def finish(film: Film, settings: MujocoSettings) -> None:
 
 
 def framed(
-    at: Seconds, data: mujoco.MjData, state: BodyState, world: World, targets: Mapping[str, str],
+    at: Seconds, data: mujoco.MjData, state: BodyState, said: str, world: World, targets: Mapping[str, str],
     pose: Mapping[str, float] | None = None,
 ) -> Frame:  # fmt: skip
-    """A frame of a body. targets: what an arm points at now, by the part. pose: of its face."""
+    """A frame of a body. said: by others. targets: what an arm points at now, by the part. pose: of its face."""
     drawn: list[Cone | Beam] = []
     if state.gaze is not None:
         drawn.append(Cone(state.gaze, _length(state.gaze, _place(world, state.looking_at))))
@@ -47,7 +47,7 @@ def framed(
             drawn.append(Beam(tip, _length(tip, _place(world, targets[part]))))
     return Frame(
         at=at, qpos=data.qpos.copy(), mocap=data.mocap_pos.copy(), pose=pose or {}, drawn=tuple(drawn),
-        caption=state.speaking,
+        caption=state.speaking or said,
     )  # fmt: skip
 
 

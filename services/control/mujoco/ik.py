@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.services.control.mujoco.description import Place
+from engage_hri.services.runtime.steps import Steps, finished
 
 Array = NDArray[np.float64]
 
 ROUNDS = 30
+ELEMENTS = 128
+"""Elements that a round counts for (see `steps`)."""
 DAMPING = 1e-4
 LONGEST_STEP: Radians = 0.5
 NO_STEP: Radians = 2e-4
@@ -78,11 +81,18 @@ class Chain:
         qpos: of all other joints. floor: height under which elbow and hand may not come. distance: from the hand to
         the target, at least.
         """
+        return finished(self.aiming(qpos, target, preferred, floor=floor, distance=distance))
+
+    def aiming(
+        self, qpos: Array, target: Vector, preferred: Mapping[str, Radians], *, floor: Meters = -math.inf,
+        distance: Meters = 0.0,
+    ) -> Steps[Solution]:  # fmt: skip
+        """Aim in steps, each a round. Between them the chain may be asked for other things."""
         wanted, like = np.asarray(target), np.array([preferred[joint] for joint in self.joints])
         middle = (self._low + self._high) / 2
         best: Solution | None = None
         for start in (like, middle, 0.5 * (like + middle)):
-            found = self._solve(qpos, wanted, like, start, floor, distance)
+            found = yield from self._solve(qpos, wanted, like, start, floor, distance)
             if best is None or (found.low, found.off) < (best.low, best.off):
                 best = found
             if best.off < ON_AXIS and best.low <= 1e-3:
@@ -92,10 +102,11 @@ class Chain:
 
     def _solve(
         self, qpos: Array, target: Array, like: Array, start: Array, floor: Meters, distance: Meters
-    ) -> Solution:
-        self._data.qpos[:] = qpos
+    ) -> Steps[Solution]:
         q = np.clip(start, self._low, self._high)
         for _ in range(ROUNDS):
+            yield ELEMENTS
+            self._data.qpos[:] = qpos
             self._place_at(q)
             residual, jacobian = self._errors(target, floor, distance)
             step = self._step(q, residual, jacobian, like)

@@ -1,14 +1,16 @@
 """Parts of a described robot, each an ordinary body of one part: where it looks or points, by inverse kinematics."""
 
 import math
-from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
 from contextlib import aclosing, suppress
+from functools import partial
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Head, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, Ray
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
@@ -25,6 +27,8 @@ from engage_hri.services.control.mujoco.stage import Angles, Stage
 from engage_hri.services.control.ordinary import OrdinaryBody, Way
 from engage_hri.services.control.torso.kinematics import HAND_TO_TARGET, TABLE_TOP
 from engage_hri.services.control.waiting import Bell
+from engage_hri.services.runtime.steps import Steps, finished
+from engage_hri.services.runtime.unhurried import unhurried
 
 NODS: Mapping[str, tuple[Radians, Radians]] = {
     "NOD": (0.0, -math.radians(10.0)), "SHAKE": (math.radians(10.0), 0.0), "TILT": (0.0, math.radians(5.0)),
@@ -36,6 +40,16 @@ OVER_THE_TABLE: Meters = 0.05
 """Height over the table that elbow and hand keep: a forearm is that thick."""
 ABOVE: Meters = 0.15
 """Height over the target at which an arm that is ready points."""
+KEPT = 2000
+"""Solutions that a part keeps, the last ones."""
+
+
+class _Unsolved(Exception):
+    """An aim that nobody has solved yet. steps: begins to solve it."""
+
+    def __init__(self, key: tuple[object, ...], steps: Callable[[], Steps[Solution]]) -> None:
+        super().__init__()
+        self.key, self.steps = key, steps
 
 
 class Limb(OrdinaryBody):
@@ -56,6 +70,8 @@ class Limb(OrdinaryBody):
         self.stage, self.chain = stage, chain
         self._is_open = True
         self._solved: dict[tuple[object, ...], Solution] = {}
+        self._is_ahead = False
+        """True while it looks for what is not solved yet."""
 
     def angles(self) -> Angles:
         return self.stage.angles(self.part)
@@ -101,14 +117,52 @@ class Limb(OrdinaryBody):
         """The axis of eyes or forearm at these angles, all other joints as they are."""
         return self.chain.ray(self.stage.qpos, angles)
 
-    def solve(self, behavior: BlockBehavior, target: Vector, **how: Meters) -> Angles:
+    def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
+        """Solve what estimates and motions of these behaviors will ask for, a slice at a time."""
+        steps = self._ahead([each for each in behaviors if type_name(each) in self.types])
+        return None if next(steps, None) is None else unhurried(steps)
+
+    def _ahead(self, behaviors: Sequence[BlockBehavior]) -> Steps[None]:
+        for behavior in behaviors:
+            while (aim := self._unsolved(behavior)) is not None:
+                self._keep(aim, (yield from aim.steps()))
+
+    def _unsolved(self, behavior: BlockBehavior) -> "_Unsolved | None":
+        """The next aim of a behavior that is not solved; None: all are, or it cannot be done."""
+        self._is_ahead = True
+        try:
+            self.way(behavior, self.world)
+        except _Unsolved as aim:
+            return aim
+        except BehaviorRefused:
+            return None
+        finally:
+            self._is_ahead = False
+        return None
+
+    def solved(
+        self, target: Vector, preferred: Angles, floor: Meters = -math.inf, distance: Meters = 0.0
+    ) -> Solution:
+        """Angles on a target, as near to the preferred ones as they can be. floor, distance: as for `Chain.aim`."""
+        key = (target, *preferred.values(), floor, distance)
+        if (found := self._solved.get(key)) is None:
+            qpos = self.stage.safe_qpos
+            aim = _Unsolved(key, partial(self.chain.aiming, qpos, target, preferred, floor=floor, distance=distance))
+            if self._is_ahead:
+                raise aim
+            self._keep(aim, found := finished(aim.steps()))
+        return found
+
+    def _keep(self, aim: "_Unsolved", found: Solution) -> None:
+        while len(self._solved) >= KEPT:
+            del self._solved[next(iter(self._solved))]
+        self._solved[aim.key] = found
+
+    def solve(
+        self, behavior: BlockBehavior, target: Vector, floor: Meters = -math.inf, distance: Meters = 0.0
+    ) -> Angles:
         """Angles on a target, each time a mapping of their own. Raises BehaviorRefused: it finds none."""
-        key = (target, *how.items())
-        if key not in self._solved:
-            if len(self._solved) > 200:
-                self._solved.clear()
-            self._solved[key] = self.chain.aim(self.stage.safe_qpos, target, self._home, **how)
-        found = self._solved[key]
+        found = self.solved(target, self._home, floor, distance)
         if found.low > 2e-3:
             raise self.refused(
                 behavior, f"the {self.part} finds no way to it: the table is in the way, or it is too near"
@@ -203,7 +257,7 @@ class ArmLimb(Limb):
         aim = self.aim(behavior, world)
         x, y, z = self.position(behavior, world)
         floor = TABLE_TOP + OVER_THE_TABLE + 0.03
-        above = self.chain.aim(self.stage.safe_qpos, (x, y, z + ABOVE), aim, floor=floor)
+        above = self.solved((x, y, z + ABOVE), aim, floor=floor)
         return [("ready", above.angles), ("stroke", aim), ("stroke_end", aim)]
 
     def forearm(self, angles: Angles) -> Ray:

@@ -1,8 +1,14 @@
 """Motors, gears, and the conditions that they can be in: the physics of faults. Pure."""
 
+import math
+
+import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
 from engage_hri.schemas.units import Radians, Seconds
+
+Array = NDArray[np.float64]
 
 COLD = 25.0
 """Degrees Celsius of the room, and of a motor that has rested."""
@@ -45,11 +51,16 @@ class Condition(Struct, frozen=True, kw_only=True):
     warm: float = COLD
     offset: Radians = 0.0
 
-    def warmed(self, temperature: float, motor: Motor, square: float, seconds: Seconds) -> float:
-        """Temperature after some time. square: mean of the torque squared, (N m)^2."""
-        heat = HEATING * 100.0 * self.heating * square / motor.limit**2
-        return temperature + seconds * (heat - COOLING * (temperature - COLD))
 
-    def derating(self, temperature: float) -> float:
-        """Share of the torque that a motor of this temperature can give."""
-        return min(1.0, max(0.0, (HOT - temperature) / (HOT - WARM)))
+def warmed(temperatures: Array, heating: Array, loads: Array, seconds: Seconds) -> Array:
+    """Temperatures of motors after some time under a load.
+
+    heating: how many times as fast each heats. loads: square of its torque, as a share of that of its limit.
+    """
+    ends = COLD + HEATING * 100.0 * heating * loads / COOLING
+    return np.asarray(ends + (temperatures - ends) * math.exp(-COOLING * seconds))
+
+
+def derating(temperatures: Array) -> Array:
+    """Shares of the torque that motors of these temperatures can give."""
+    return np.clip((HOT - temperatures) / (HOT - WARM), 0.0, 1.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Radians, Seconds, Vector
 from engage_hri.services.control.mujoco.commands import Commands
-from engage_hri.services.control.mujoco.motors import COLD, WARM, Condition, Motor
+from engage_hri.services.control.mujoco.motors import COLD, WARM, Condition, Motor, derating, warmed
 
 Array = NDArray[np.float64]
 
@@ -75,11 +75,14 @@ class Physics:
         self._u = np.array(servos, dtype=int)
         self._lead = np.array([motor.damping / motor.stiffness for motor in motors.values()])
         self._drag = np.array([motor.drag for motor in motors.values()])
-        self._limit = np.array([motor.limit for motor in motors.values()])
+        self._most = np.array([motor.limit for motor in motors.values()])
+        self._limit = self._most.copy()
+        self._strength, self._heating = np.ones(len(motors)), np.ones(len(motors))
         self._stick, self._bent = np.zeros(len(motors)), np.zeros(len(motors))
         self._friction = np.array([motor.friction for motor in motors.values()])
         self._stiffness = np.array([motor.stiffness for motor in motors.values()])
         own = [limits[joint] for joint in motors]
+        self._commanded = self.data.ctrl
         self.commands = Commands(
             np.array([each.speed for each in own]), np.array([each.acceleration for each in own])
         )
@@ -107,7 +110,7 @@ class Physics:
 
     @property
     def beside(self) -> dict[str, Radians]:
-        """By how much the true angles are more than the measured ones, of joints of which they are not the same."""
+        """Radians by which true angles are more than measured ones, of joints of which they are not the same."""
         by = zip(self.joints, (self.angles - self.measured).tolist(), strict=True)
         return {joint: angle for joint, angle in by if abs(angle) > 1e-9}
 
@@ -176,18 +179,18 @@ class Physics:
             return True
         steps = min(count, STEPS_AT_ONCE)
         reach = REACH * self._limit / self._stiffness + SPARE
-        angles, squares = self.angles + self._offset, np.zeros(len(self.joints))  # a servo believes its encoder
+        angles = self.angles + self._offset  # a servo believes its encoder
         if steps < count:  # the rest in further calls
             reference = self.commands.plan + (reference - self.commands.plan) * (steps / count)
         start, slope = self.commands.advance(reference, steps * step, angles, self.speeds, reach)
-        servo = start - self._offset
-        for number in range(1, steps + 1):
-            self.data.ctrl[self._u] = servo + slope * (number * step) + self._lead * slope
+        servo, further = start - self._offset + self._lead * slope, slope * step
+        for _ in range(steps):
+            servo += further
+            self._commanded[self._u] = servo
             self._stick_or_slip(step)
             mujoco.mj_step(self.model, self.data)
-            squares += self.torques**2
         self.time += steps * step
-        self._heat(squares / steps, steps * step)
+        self._heat((self.torques / self._most) ** 2, steps * step)
         if self._noise.any():
             self._error = self._noise * self._chance.standard_normal(len(self.joints))
         return steps == count
@@ -206,16 +209,13 @@ class Physics:
         torque = stiffness * self._bent + 0.003 * stiffness * change
         self.data.qfrc_applied[self._v] = -np.clip(torque, -self._stick, self._stick)
 
-    def _heat(self, squares: Array, seconds: Seconds) -> None:
-        """Warm the motors by the squares of their torques, and let a hot one give less."""
-        for number, (joint, motor) in enumerate(self.motors.items()):
-            condition = self.conditions[joint]
-            warmer = condition.warmed(float(self.temperatures[number]), motor, float(squares[number]), seconds)
-            self.temperatures[number] = warmer
-            limit = motor.limit * condition.strength * condition.derating(warmer)
-            if abs(limit - self._limit[number]) > 1e-9:
-                self._limit[number] = limit
-                self.model.actuator_forcerange[self._u[number]] = (-limit, limit)
+    def _heat(self, loads: Array, seconds: Seconds) -> None:
+        """Warm the motors by the squares of the shares of their torques, and let a hot one give less."""
+        self.temperatures = warmed(self.temperatures, self._heating, loads, seconds)
+        limit = self._most * self._strength * derating(self.temperatures)
+        if (np.abs(limit - self._limit) > 1e-9).any():
+            self._limit = limit
+            self.model.actuator_forcerange[self._u] = np.stack((-limit, limit), axis=1)
 
     # -- faults -------------------------------------------------------------------------------------------------
 
@@ -231,6 +231,7 @@ class Physics:
             self._drag[number] = motor.drag + condition.drag
             self._friction[number] = motor.friction + condition.friction
             self._stick[number] = condition.stiction
+            self._strength[number], self._heating[number] = condition.strength, condition.heating
             if not condition.stiction:
                 self._bent[number] = self.data.qfrc_applied[self._v[number]] = 0.0
             self._offset[number] = condition.offset + self._corrected[number]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from engage_hri.schemas.units import Seconds
 
-TICK: Seconds = 0.005
+TICK: Seconds = 0.01
 """Seconds from one command to the servos to the next."""
 
 

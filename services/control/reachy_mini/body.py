@@ -5,7 +5,7 @@ plan has come there *and* the daemon measures the joints there: never because a 
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager
 from math import degrees, inf
 from typing import ClassVar
@@ -58,6 +58,7 @@ class ReachyMini(Body):
     """Reachy Mini through its daemon. Without `connected()` it answers for a robot at rest: `engage plan` asks so."""
 
     Settings: ClassVar[type[Struct]] = ReachyMiniSettings
+    carries: ClassVar[Mapping[str, tuple[str, ...]]] = {"torso": ("head",)}
 
     def __init__(self, settings: ReachyMiniSettings | None = None, connect: Connect | None = None) -> None:
         """Make the body; `connected()` then finds the robot.

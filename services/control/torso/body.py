@@ -64,6 +64,8 @@ FREEZE: Seconds = 0.5
 class SimulatedBody(Body):
     """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for its faults."""
 
+    carries = kinematics.CARRIES
+
     def __init__(
         self,
         zones: tuple[NoPointZone, ...] = (),

@@ -96,6 +96,8 @@ JOINTS: tuple[JointLimit, ...] = tuple(limit for limit, _ in _TABLE)
 HOME: Mapping[str, float] = {limit.joint: home for limit, home in _TABLE}
 LIMIT: Mapping[str, JointLimit] = {limit.joint: limit for limit in JOINTS}
 PARTS: tuple[str, ...] = ("head", "torso", "left_arm", "right_arm", "face")
+CARRIES: Mapping[str, tuple[str, ...]] = {"torso": ("head", "left_arm", "right_arm")}
+"""Parts that a part moves with it."""
 
 
 class Unreachable(ValueError):

@@ -6,17 +6,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 image = pytest.importorskip("PIL.Image", reason="needs the extra `mujoco`")
 
-from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Pointing
+from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Pointing, Speech
 from engage_hri.schemas.faults import InputRefused, RunFailed
+from engage_hri.services.control.composed import composed
+from engage_hri.services.control.guarded import GuardedBody
+from engage_hri.services.control.members import Member
 from engage_hri.services.control.mujoco.body import MujocoBody
-from engage_hri.services.control.mujoco.film import check, show_face
+from engage_hri.services.control.mujoco.film import Film, check, show_face
 from engage_hri.services.control.mujoco.pictures import Beam, Camera, Cone, Picture
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.testing import WORLD, Stage, performed
+from engage_hri.services.control.torso.body import SimulatedBody
 
 
 @pytest.fixture
@@ -96,6 +101,42 @@ async def test_a_film_is_as_long_as_what_it_shows(camera: Camera, tmp_path: Path
             film.load()
             seconds += film.info["duration"] / 1000
     assert seconds == pytest.approx(lasted, abs=0.6)
+
+
+async def test_a_film_as_mp4_is_as_long_as_what_it_shows(body: MujocoBody, camera: Camera, tmp_path: Path):
+    """Its own reader counts the pictures: ffmpeg's answer, and no file name."""
+    camera.close()
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the package imageio-ffmpeg, to read it again")
+    film = Film(body.bench.model, rate=4.0)
+    for number in (0, 1, 2, 6):
+        film.take(replace(body.frame(), at=number / 4))
+    film.write(file := tmp_path / "film.mp4", size=(160, 120))
+    frames, seconds = ffmpeg.count_frames_and_secs(str(file))
+
+    assert frames == 7
+    assert seconds == pytest.approx(7 / 4, abs=0.05)
+
+
+async def test_a_film_that_ffmpeg_cannot_write_is_told(body: MujocoBody, camera: Camera, tmp_path: Path):
+    camera.close()
+    pytest.importorskip("imageio_ffmpeg", reason="needs the package imageio-ffmpeg")
+    film = Film(body.bench.model)
+    film.take(body.frame())
+    with pytest.raises(RunFailed, match="ffmpeg could not write"):
+        film.write(tmp_path / "nowhere" / "film.mp4", size=(160, 120))
+
+
+async def test_the_words_of_another_drivers_voice_are_in_the_film():
+    body, other = MujocoBody(), SimulatedBody()
+    parts = tuple(part for part in body.capabilities.parts if part != "voice")
+    whole = composed([Member("mujoco", GuardedBody("mujoco", body), parts), Member("silent", other, ("voice",))])
+    assert body.frame().caption == ""
+    stage = Stage(whole, Speech(id="s", text="this piece"), "end")
+    await asyncio.sleep(0.2)
+    assert body.state().speaking == ""
+    assert body.frame().caption == "this piece"
+    await stage.over()
+    assert body.frame().caption == ""
 
 
 def test_a_film_of_an_unknown_kind_is_refused():
