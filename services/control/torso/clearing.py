@@ -86,8 +86,7 @@ def check(torso: "Torso", course: Course, path: Path, pose: Mapping[str, float] 
         run = None if pose is not None else torso.runs.get(part)
         if pose is not None:
             joints = torso.tracks[part].joints
-            at_rest = np.array([[pose[joint] for joint in joints]])
-            is_clear = all(tracks.above_table(at_rest, joints, trunk) >= 0.0 for trunk in around)
+            is_clear = _are_clear([pose[joint] for joint in joints], joints, around)
         else:
             is_clear = _stays_clear(torso, part, course, Motion(path, torso.clock.time()), around)
         if not is_clear:
@@ -104,10 +103,9 @@ def _stays_clear(torso: "Torso", part: str, course: Course, leaning: Motion, aro
     columns = [course.joints.index(joint) for joint in TRUNK]
     if (run := torso.runs.get(part)) is not None:
         return _given_way(torso, run, course.on_target, around, leaning, columns) is not None
-    rests = np.array([track.motion.at(inf).q[track.columns]])
     return (
         track.aim is None
-        and all(tracks.above_table(rests, track.joints, trunk) >= 0.0 for trunk in around)
+        and _are_clear(track.motion.at(inf).q[track.columns].tolist(), track.joints, around)
         and _clears(track.motion, track.columns, track.joints, None, leaning, columns, now)
     )
 
@@ -158,7 +156,8 @@ def _given_way(
             course = replanned(run, replace(situation, pose=pose, trunks=around))
         except Impossible:
             return None
-        if (path := relaid(torso, run, course, now)) is None:
+        path = relaid(torso, run, course, now)
+        if path is None or not _are_clear(path.legs[-1].goal, course.joints, around):
             return None
         motion, every = Motion(path, now, cruise=run.motion.cruise), range(len(course.joints))
         is_clear = _clears(motion, every, course.joints, course.aim, trunk, columns, now)
@@ -203,6 +202,11 @@ def _clears(
         if tracks.above_table(angles[None, :], joints, leaning) < 0.0:
             return False
     return True
+
+
+def _are_clear(pose: Sequence[float], joints: tuple[str, ...], around: tuple[Trunk, ...]) -> bool:
+    """True if arms that rest in a pose are clear of the table wherever the trunk is."""
+    return all(tracks.above_table(np.array([pose]), joints, trunk) >= 0.0 for trunk in around)
 
 
 def _is_clear(track: Track, around: tuple[Trunk, ...], now: Seconds) -> bool:

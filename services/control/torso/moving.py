@@ -345,7 +345,8 @@ class Torso:
 
     def relax(self, parts: tuple[str, ...]) -> None:
         now = self.clock.time()
-        for part in parts:
+        # The trunk first: arms are not down before it is up.
+        for part in sorted(parts, key=lambda part: part != "torso"):
             track = self.tracks[part]
             if part == "head":
                 track.return_to(self.attention.angles, now, self.attention.aim)

@@ -23,6 +23,8 @@ ALONG = np.linspace(0.0, 1.0, 17)
 UP = (0.2, 0.4, 0.6, 0.8)
 """Radians by which an arm is raised on its way home, in the order in which they are tried."""
 RAISING: Seconds = 0.4
+MOMENTS = 25
+"""Instants at which an arm that goes home is held against the table while the trunk moves."""
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
@@ -136,14 +138,26 @@ class Track:
         if not meets_table(direct, self.joints, trunks):
             self.play(Motion(direct, now), aim=aim)
             return
-        # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
-        limits = LIMITS[self.part]
-        for above in raised(self.angles(now), self.joints):
-            legs = (Leg(goal=above, seconds=RAISING), Leg(goal=goal, seconds=max(seconds, RAISING)))
-            path = Path(start, legs, limits)
-            if not meets_table(path, self.joints, trunks, since=RAISING):
-                break
-        self.play(Motion(path, now))
+        # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table. Where the
+        # trunk leans over it the arm is not down before the trunk is up.
+        rising = self.trunk.motion.end - now
+        stay = Leg(goal=tuple(start.q.tolist()), seconds=rising)
+        ways: list[tuple[Leg, ...]] = [(stay, Leg(goal=goal, seconds=seconds))] if rising > RAISING else []
+        seconds = max(seconds, RAISING, rising)
+        ways = [(Leg(goal=goal, seconds=seconds),), *ways]
+        ways += [
+            (Leg(goal=above, seconds=RAISING), Leg(goal=goal, seconds=seconds))
+            for above in raised(self.angles(now), self.joints)
+        ]
+        motions = [Motion(Path(start, legs, LIMITS[self.part]), now) for legs in ways]
+        clear = (motion for motion in motions if self._clears(motion, now))
+        self.play(next(clear, motions[-1]))
+
+    def _clears(self, motion: Motion, now: Seconds) -> bool:
+        """True if an arm that moves so is clear of the table as the trunk moves."""
+        at = np.linspace(now, max(motion.end, self.trunk.motion.end), MOMENTS).tolist()
+        angles = np.array([motion.at(t).q for t in at])
+        return above_table(angles, self.joints, np.array([self.trunk.angles(t) for t in at])) >= 0.0
 
 
 def raised(arm: tuple[float, ...], joints: Sequence[str]) -> Iterator[tuple[float, ...]]:
