@@ -101,7 +101,11 @@ def _stays_clear(torso: "Torso", part: str, course: Course, leaning: Motion, aro
     if _is_clear(track, around, now):
         return True
     columns = [course.joints.index(joint) for joint in TRUNK]
-    if (run := torso.runs.get(part)) is not None:
+    run = torso.runs.get(part)
+    if run is not None and not set(run.course.parts).isdisjoint(course.parts):  # It is taken over, and goes home.
+        target = tuple(course.on_target[joint] for joint in TRUNK)
+        return _are_clear(track.base, track.joints, (target, *map(tuple, homes(torso, course))))
+    if run is not None:
         return _given_way(torso, run, course.on_target, around, leaning, columns) is not None
     return (
         track.aim is None

@@ -200,6 +200,7 @@ class Torso:
         run.began = self.clock.time()
         for joint in run.course.joints:
             self.misbelieved.pop(joint, None)
+        left: list[str] = []
         for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):
             self.release(earlier)
             if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
@@ -207,7 +208,7 @@ class Torso:
             else:
                 earlier.authority.revoke("taken_over")
             earlier.bell.ring()
-            self.relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
+            left += [part for part in earlier.course.parts if part not in run.course.parts]
         for part in run.course.parts:
             self.runs[part] = run
         for bell in self.homeward:
@@ -217,6 +218,7 @@ class Torso:
         elif isinstance(run.behavior, choreography.SETTLING):
             tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
         self.play(run, path, run.course.aim)
+        self.relax(tuple(left))
         if "torso" in run.course.parts:
             self._wait_for_reach()
             clearing.give_way(self)

@@ -26,7 +26,7 @@ from engage_hri.services.control.torso.path import (
     Array,
     Leg,
 )
-from engage_hri.services.control.torso.tracks import ALONG, limits_of
+from engage_hri.services.control.torso.tracks import ALONG, FINELY, limits_of
 
 Flags = NDArray[np.bool_]
 
@@ -173,12 +173,13 @@ def _is_clear(terms: Array, seconds: Array, asked: Sequence[Asked]) -> Flags:
     terms: 6 x paths x legs x joints. seconds: paths x legs. asked: of each path.
     """
     ends = seconds.cumsum(axis=1)
-    at = ALONG * ends[:, -1:]
+    is_upright = all(each.trunk == UPRIGHT for each in asked)
+    at = (ALONG if is_upright else FINELY) * ends[:, -1:]
     leg = np.minimum((at[..., None] >= ends[:, None]).sum(axis=2), seconds.shape[1] - 1)
     path = np.arange(len(seconds))[:, None]
     share = np.clip((at - (ends - seconds)[path, leg]) / seconds[path, leg], 0.0, 1.0)
     angles = np.einsum("psk,kpsj->jps", share[..., None] ** _POWERS, terms[:, path, leg])
-    if all(each.trunk == UPRIGHT for each in asked):
+    if is_upright:
         # To which side the arm is makes no difference, the torso upright.
         return np.asarray((kinematics.above_table("left", angles) > DOUBT).all(axis=1))
     trunks = np.array([each.trunk for each in asked]).T[:, :, None]

@@ -20,6 +20,8 @@ from engage_hri.services.control.torso.path import Array, JointMotion, Leg, Path
 
 ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table."""
+FINELY = np.linspace(0.0, 1.0, 65)
+"""The same where the trunk leans: there is less room."""
 UP = (0.2, 0.4, 0.6, 0.8)
 """Radians by which an arm is raised on its way home, in the order in which they are tried."""
 RAISING: Seconds = 0.4
@@ -212,7 +214,9 @@ def meets_table(
     """
     if not path.length:
         return False
-    shares = ALONG if not since else np.linspace(min(since / path.length, 1.0), 1.0, len(ALONG))
+    shares = ALONG if tuple(trunks) == (UPRIGHT,) else FINELY
+    if since:
+        shares = min(since / path.length, 1.0) + max(0.0, 1.0 - since / path.length) * shares
     angles = path.positions(shares)
     if TRUNK[0] in joints:
         columns = [list(joints).index(joint) for joint in TRUNK]
