@@ -169,7 +169,7 @@ def arbitrary(number: int, chance: Random) -> BlockBehavior:
 async def at_random(seed: int, name: str) -> tuple[float, int, int]:
     """Begin, extend, hold, hurry and abort gestures, pointings and postures: lowest place, done and refused ones."""
     body, chance, stages = new_body(), Random(f"{name} {seed}"), []
-    done = refused = 0
+    done = refused = lost = 0
     async with watched(body) as seen:
         for number in range(25):
             await asyncio.sleep(chance.choice((0.0, chance.uniform(0.0, 0.4), chance.uniform(0.0, 1.5))))
@@ -198,9 +198,10 @@ async def at_random(seed: int, name: str) -> tuple[float, int, int]:
                 done += 1
             except BehaviorRefused:
                 refused += 1
-            except BodyFailed as failed:
-                assert "reach" in str(failed)
+            except BodyFailed:
+                lost += 1
         await asyncio.sleep(2.0)
+    assert lost <= done, "few lose their target"
     return seen.lowest, done, refused
 
 

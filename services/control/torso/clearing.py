@@ -6,19 +6,19 @@ sets out later, what the arms have still to do is laid anew. A trunk that would 
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import inf
+from math import ceil, inf, radians
 from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec.structs import replace
 
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.aiming import SAME, TRUNK, UPRIGHT, Aim, Trunk
 from engage_hri.services.control.torso.course import Course, Impossible
 from engage_hri.services.control.torso.estimates import is_arm
 from engage_hri.services.control.torso.following import relaid, replanned
-from engage_hri.services.control.torso.lifting import LIFTS, lifted
+from engage_hri.services.control.torso.lifting import LIFTS, are_clear, lifted
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
@@ -27,8 +27,12 @@ from engage_hri.services.control.torso.tracks import Track
 if TYPE_CHECKING:
     from engage_hri.services.control.torso.moving import Torso
 
-BETWEEN = (0.25, 0.5, 0.75, 1.0)
-"""Places between two of the trunk, as shares of the way."""
+APART: Radians = radians(4.0)
+"""Greatest angle between two places of the trunk that are looked at."""
+UNDER_WAY = 9
+"""Places of the trunk on its way that are looked at."""
+TELL_APART: Radians = radians(0.25)
+"""Places that are nearer to each other count as one: over the table that makes 2 mm."""
 ARMS = ("left_arm", "right_arm")
 LIFTING: Seconds = 0.35
 """Seconds in which an arm that waits is raised."""
@@ -40,9 +44,10 @@ def places(torso: "Torso", now: Seconds) -> tuple[Trunk, ...]:
     """Where the trunk is now, and where it may be until it rests."""
     track, run = torso.tracks["torso"], torso.runs.get("torso")
     stops = [track.angles(now)]
+    if track.is_moving(now):  # One that is broken off goes on for a while before it turns round.
+        stops = [track.angles(at) for at in np.linspace(now, track.motion.end, UNDER_WAY).tolist()]
     if run is not None and run.is_setting_out:
         stops.append(tuple(run.course.on_target[joint] for joint in TRUNK))
-    stops.append(track.angles(max(now, track.motion.end)))
     if run is not None:
         stops += homes(torso, run.course)
     return way_along([*stops, track.base])
@@ -55,13 +60,18 @@ def homes(torso: "Torso", course: Course) -> list[Trunk]:
 
 def way_along(stops: Sequence[Sequence[float]]) -> tuple[Trunk, ...]:
     """These places of the trunk and some between them, each once."""
-    found = [_snapped(stops[0])]
-    for one, other in pairwise(stops):
-        for share in BETWEEN:
-            place = _snapped([a + share * (b - a) for a, b in zip(one, other, strict=True)])
-            if not any(_is_same(place, each) for each in found):
-                found.append(place)
-    return tuple(found)
+    found = {_cell(stops[0]): _snapped(stops[0])}
+    for (turn, lean), (next_turn, next_lean) in pairwise(stops):
+        steps = max(1, ceil(max(abs(next_turn - turn), abs(next_lean - lean)) / APART))
+        for share in (step / steps for step in range(1, steps + 1)):
+            place = (turn + share * (next_turn - turn), lean + share * (next_lean - lean))
+            found.setdefault(_cell(place), _snapped(place))
+    return tuple(found.values())
+
+
+def _cell(place: Sequence[float]) -> tuple[int, int]:
+    turn, lean = place
+    return round(turn / TELL_APART), round(lean / TELL_APART)
 
 
 def _snapped(place: Sequence[float]) -> Trunk:
@@ -170,6 +180,8 @@ def _given_way(
     here = tuple(start.q.tolist())
     joints, left = run.course.joints, run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
     for lift in LIFTS:
+        if not are_clear(joints, [lifted(joints, leg.goal, lift) for leg in left[:-1]] or [here], around):
+            continue
         legs = tuple(replace(leg, goal=lifted(joints, leg.goal, lift)) for leg in left[:-1]) + left[-1:]
         if run.holding and legs:
             waiting = tuple((sync, 1.0) for sync, at in legs[0].marks if at <= 0.0)
@@ -199,18 +211,16 @@ def _clears(
     until = max(arms.end, trunk.end)
     if aim is not None:  # Its way home is laid when it leaves its target.
         until = arms.crossing(arms.path.marks["stroke_end"]) or until
-    for at in np.linspace(now, until, MOMENTS).tolist():
-        leaning = tuple(trunk.at(at).q[list(columns)].tolist())
-        angles = arms.at(at).q[which]
-        angles = angles if aim is None else aim.within(angles + aim.offset(leaning))
-        if tracks.above_table(angles[None, :], joints, leaning) < 0.0:
-            return False
-    return True
+    at = np.linspace(now, until, MOMENTS).tolist()
+    leaning, angles = trunk.positions(at)[:, list(columns)], arms.positions(at)[:, which]
+    if aim is not None:
+        angles = aim.within(angles + [aim.offset(place) for place in leaning])
+    return tracks.above_table_along(angles, joints, leaning) >= 0.0
 
 
 def _are_clear(pose: Sequence[float], joints: tuple[str, ...], around: tuple[Trunk, ...]) -> bool:
     """True if arms that rest in a pose are clear of the table wherever the trunk is."""
-    return all(tracks.above_table(np.array([pose]), joints, trunk) >= 0.0 for trunk in around)
+    return tracks.above_table(np.array([pose]), joints, np.array(around)) >= 0.0
 
 
 def _is_clear(track: Track, around: tuple[Trunk, ...], now: Seconds) -> bool:
@@ -219,8 +229,9 @@ def _is_clear(track: Track, around: tuple[Trunk, ...], now: Seconds) -> bool:
     until = path.length if track.aim is None else max(s, path.marks.get("stroke_end", 0.0))
     shares = np.linspace(s, until, len(tracks.ALONG)) / (path.length or 1.0)
     angles = path.positions(shares)[:, track.columns]
+    if track.aim is None:
+        return tracks.above_table(angles, track.joints, np.array(around)) >= 0.0
     for trunk in around:
-        there = angles if track.aim is None else track.aim.within(angles + track.aim.offset(trunk))
-        if tracks.above_table(there, track.joints, trunk) < 0.0:
+        if tracks.above_table(track.aim.within(angles + track.aim.offset(trunk)), track.joints, trunk) < 0.0:
             return False
     return True

@@ -41,8 +41,7 @@ def clear_of_table(
 
 def are_clear(joints: tuple[str, ...], poses: Sequence[Pose], trunks: Sequence[Trunk]) -> bool:
     """True if arms are clear of the table in all poses, wherever the trunk is."""
-    angles = np.array(poses)
-    return all(tracks.above_table(angles, joints, trunk) > MARGIN for trunk in trunks)
+    return tracks.above_table(np.array(poses), joints, np.array(trunks)) > MARGIN
 
 
 def lifted(joints: tuple[str, ...], pose: Pose, by: Radians) -> Pose:

@@ -158,8 +158,8 @@ class Track:
     def _clears(self, motion: Motion, now: Seconds) -> bool:
         """True if an arm that moves so is clear of the table as the trunk moves."""
         at = np.linspace(now, max(motion.end, self.trunk.motion.end), MOMENTS).tolist()
-        angles = np.array([motion.at(t).q for t in at])
-        return above_table(angles, self.joints, np.array([self.trunk.angles(t) for t in at])) >= 0.0
+        trunk = self.trunk.motion.positions(at)[:, self.trunk.columns]
+        return above_table_along(motion.positions(at), self.joints, trunk) >= 0.0
 
 
 def raised(arm: tuple[float, ...], joints: Sequence[str]) -> Iterator[tuple[float, ...]]:
@@ -220,22 +220,32 @@ def meets_table(
     angles = path.positions(shares)
     if TRUNK[0] in joints:
         columns = [list(joints).index(joint) for joint in TRUNK]
-        return above_table(angles, joints, angles[:, columns]) < 0.0
-    return any(above_table(angles, joints, trunk) < 0.0 for trunk in trunks)
+        return above_table_along(angles, joints, angles[:, columns]) < 0.0
+    return (
+        above_table(angles, joints, UPRIGHT if len(trunks) == 1 == trunks.count(UPRIGHT) else np.array(trunks)) < 0.0
+    )
 
 
 def above_table(angles: Array, joints: Sequence[str], trunk: Trunk | Array) -> Meters:
     """Least distance by which arms stay out of the table; below 0: they do not; infinite: `joints` has none of them.
 
-    angles: poses x joints. trunk: the place of the trunk, or one for each pose.
+    angles: poses x joints. trunk: a place of the trunk, or places x 2: each pose counts at each of them.
     """
-    is_upright = isinstance(trunk, tuple) and trunk == UPRIGHT
-    places = None if is_upright else np.broadcast_to(np.asarray(trunk), (len(angles), len(TRUNK))).T
-    least, column = math.inf, {joint: number for number, joint in enumerate(joints)}
+    places = None if isinstance(trunk, tuple) and trunk == UPRIGHT else np.reshape(trunk, (-1, 2)).T[:, :, None]
+    return _least(angles[:, None, :].T if places is not None else angles.T, joints, places)
+
+
+def above_table_along(angles: Array, joints: Sequence[str], trunks: Array) -> Meters:
+    """The same for arms and a trunk that move at once: trunks: the place for each pose, poses x 2."""
+    return _least(angles.T, joints, trunks.T)
+
+
+def _least(angles: Array, joints: Sequence[str], trunks: Array | None) -> Meters:
+    least, row = math.inf, {joint: number for number, joint in enumerate(joints)}
     for side in kinematics.SHOULDER:
-        if f"{side}_elbow" in column:
-            arm = angles[:, [column[joint] for joint in kinematics.joints_of(f"{side}_arm")]].T
-            least = min(least, float(np.min(kinematics.above_table(side, arm, places))))
+        if f"{side}_elbow" in row:
+            arm = angles[[row[joint] for joint in kinematics.joints_of(f"{side}_arm")]]
+            least = min(least, float(np.min(kinematics.above_table(side, arm, trunks))))
     return least
 
 
