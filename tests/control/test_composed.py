@@ -14,7 +14,7 @@ from engage_hri.services.control.body import BehaviorRefused, Body, MouthShape, 
 from engage_hri.services.control.composed import ComposedBody, Member, composed
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract
-from engage_hri.services.control.testing.stage import performed
+from engage_hri.services.control.testing.stage import Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")
@@ -274,3 +274,28 @@ async def test_each_driver_moves_by_itself_what_it_has_here_and_no_more() -> Non
     assert idle.added == expected
     assert idle.added["jaw"] > 0.0
     assert idle.quick_at == min(face.body.idle().quick_at, rest.body.idle().quick_at)
+
+
+@pytest.mark.parametrize("kind", ["a pointing that waits", "a speech"])
+async def test_breath_gives_way_to_what_another_driver_does(kind: str) -> None:
+    """The arms of one driver point and wait: the trunk of another is still. Words move no trunk."""
+    trunk = Member("trunk", SimulatedBody(alive=True), ("head", "torso", "face"))
+    arms = Member("arms", SimulatedBody(), ("left_arm", "right_arm", "voice"))
+    body = ComposedBody([trunk, arms])
+    body.see(WORLD)
+    behavior = Pointing(id="it", target="far-left", mode="LEFT_HAND")
+    is_speech = kind == "a speech"
+    stage = Stage(body, Speech(id="it", text="word " * 60), "end") if is_speech else Stage(body, behavior, "stroke")
+    body.idle()
+    await asyncio.sleep(1.0)
+    leaned = 0.0
+    for _ in range(100):
+        leaned = max(leaned, abs(body.idle().added.get("torso_lean", 0.0)))
+        await asyncio.sleep(0.05)
+    assert (leaned > 0.001) == is_speech
+
+    stage.authority.revoke()
+    await stage.over()
+    body.idle()
+    await asyncio.sleep(3.0)
+    assert body.idle().added["torso_lean"] == trunk.body.idle().added["torso_lean"]
