@@ -5,6 +5,7 @@ The witness looks at the forearms that the body tells, every 10 ms, and knows on
 
 import asyncio
 import math
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from random import Random
 
@@ -64,11 +65,13 @@ def lowest(body: Body) -> float:
 
 
 class Watched:
+    """The lowest place so far."""
+
     lowest = math.inf
 
 
 @asynccontextmanager
-async def watched(body: Body):
+async def watched(body: Body) -> AsyncIterator[Watched]:
     seen = Watched()
 
     async def watch() -> None:
@@ -115,9 +118,6 @@ async def test_a_gesture_gives_way_to_a_trunk_that_leans_later(since: float, thr
         await stage.over()
         await asyncio.sleep(1.0)
 
-    assert (
-        stage.passed == list(sync_points(stage.authority.behavior)) if hasattr(stage.authority, "behavior") else True
-    )
     assert stage.passed[-1] == "end"
     assert seen.lowest > 0.005
 
@@ -167,7 +167,7 @@ def arbitrary(number: int, chance: Random) -> BlockBehavior:
 
 
 async def at_random(seed: int, name: str) -> tuple[float, int, int]:
-    """Begin, extend, hold, hurry and abort gestures, pointings and postures: lowest place, done and refused ones."""
+    """Begin, extend, hold and abort gestures, pointings and postures: lowest place, done and refused ones."""
     body, chance, stages = new_body(), Random(f"{name} {seed}"), []
     done = refused = lost = 0
     async with watched(body) as seen:
