@@ -29,9 +29,8 @@ from engage_hri.services.control.body import (
     MovementAuthority,
     Progress,
 )
-from engage_hri.services.control.extras import Idle, Seen
+from engage_hri.services.control.extras import Gate, Idle, Seen
 from engage_hri.services.control.refusals import infeasible, unsupported
-from engage_hri.services.control.torso.alive import Gate
 from engage_hri.services.runtime.steps import Steps, finished
 
 GAZE_PART, LIPS_PART, VOICE_PART = "head", "face", "voice"

@@ -17,7 +17,7 @@ SKEW: Seconds = 0.25
 
 
 class Told:
-    """What a body has told of a behavior."""
+    """Record of what a body has told of a behavior."""
 
     def __init__(self, behavior: BlockBehavior, authority: MovementAuthority, began: Seconds) -> None:
         """authority: as it is extended and revoked. began: loop time at which the behavior was begun."""

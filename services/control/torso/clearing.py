@@ -7,7 +7,6 @@ sets out later, what the arms have still to do is laid anew. A trunk that would 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import ceil, inf, radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec.structs import replace
@@ -20,12 +19,10 @@ from engage_hri.services.control.torso.estimates import is_arm
 from engage_hri.services.control.torso.following import relaid, replanned
 from engage_hri.services.control.torso.lifting import LIFTS, are_clear, lifted
 from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.parts import Parts
 from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
-
-if TYPE_CHECKING:
-    from engage_hri.services.control.torso.moving import Torso
 
 APART: Radians = radians(4.0)
 """Greatest angle between two places of the trunk that are looked at."""
@@ -40,8 +37,8 @@ MOMENTS = 25
 """Instants at which arms and a trunk that move at once are held against the table."""
 
 
-def places(torso: "Torso", now: Seconds) -> tuple[Trunk, ...]:
-    """Where the trunk is now, and where it may be until it rests."""
+def places(torso: Parts, now: Seconds) -> tuple[Trunk, ...]:
+    """Tell where the trunk is now, and where it may be until it rests."""
     track, run = torso.tracks["torso"], torso.runs.get("torso")
     stops = [track.angles(now)]
     if track.is_moving(now):  # One that is broken off goes on for a while before it turns round.
@@ -53,13 +50,13 @@ def places(torso: "Torso", now: Seconds) -> tuple[Trunk, ...]:
     return way_along([*stops, track.base])
 
 
-def homes(torso: "Torso", course: Course) -> list[Trunk]:
-    """Where a trunk goes that is broken off on this course: back, or upright from a shift."""
+def homes(torso: Parts, course: Course) -> list[Trunk]:
+    """Tell where a trunk goes that is broken off on this course: back, or upright from a shift."""
     return [UPRIGHT] if len(course.points) == 2 else [torso.tracks["torso"].base]
 
 
 def way_along(stops: Sequence[Sequence[float]]) -> tuple[Trunk, ...]:
-    """These places of the trunk and some between them, each once."""
+    """List these places of the trunk and some between them, each once."""
     found = {_cell(stops[0]): _snapped(stops[0])}
     for (turn, lean), (next_turn, next_lean) in pairwise(stops):
         steps = max(1, ceil(max(abs(next_turn - turn), abs(next_lean - lean)) / APART))
@@ -82,7 +79,7 @@ def _is_same(one: Sequence[float], other: Sequence[float]) -> bool:
     return all(abs(a - b) < SAME for a, b in zip(one, other, strict=True))
 
 
-def check(torso: "Torso", course: Course, path: Path, pose: Mapping[str, float] | None) -> None:
+def check(torso: Parts, course: Course, path: Path, pose: Mapping[str, float] | None) -> None:
     """Check that arms can be kept clear of the table while the trunk moves along `path`. Raises Impossible.
 
     pose: of arms that rest; None: they are where they are, and do what they do.
@@ -105,7 +102,7 @@ def check(torso: "Torso", course: Course, path: Path, pose: Mapping[str, float] 
             raise Impossible("CANNOT_CREATE_BEHAVIOR", reason)
 
 
-def _stays_clear(torso: "Torso", part: str, course: Course, leaning: Motion, around: tuple[Trunk, ...]) -> bool:
+def _stays_clear(torso: Parts, part: str, course: Course, leaning: Motion, around: tuple[Trunk, ...]) -> bool:
     """True if an arm is clear of a trunk that moves so, or can be kept clear of it."""
     track, now = torso.tracks[part], torso.clock.time()
     if _is_clear(track, around, now):
@@ -124,7 +121,7 @@ def _stays_clear(torso: "Torso", part: str, course: Course, leaning: Motion, aro
     )
 
 
-def check_carried(torso: "Torso", course: Course, path: Path) -> None:
+def check_carried(torso: Parts, course: Course, path: Path) -> None:
     """Check that an arm that sets out to a place is clear of the table as the trunk carries it. Raises Impossible."""
     trunk, now = torso.tracks["torso"], torso.clock.time()
     columns, every = range(trunk.columns.start, trunk.columns.stop), range(len(course.joints))
@@ -134,7 +131,7 @@ def check_carried(torso: "Torso", course: Course, path: Path) -> None:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm, as the torso moves")
 
 
-def give_way(torso: "Torso") -> None:
+def give_way(torso: Parts) -> None:
     """Lay anew what arms have still to do, if the trunk that has just set out would take them into the table."""
     now = torso.clock.time()
     around, trunk = places(torso, now), torso.tracks["torso"]
@@ -151,7 +148,7 @@ def give_way(torso: "Torso") -> None:
 
 
 def _given_way(
-    torso: "Torso",
+    torso: Parts,
     run: Run,
     going: Mapping[str, float],
     around: tuple[Trunk, ...],

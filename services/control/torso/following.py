@@ -2,7 +2,6 @@
 
 import math
 from math import radians
-from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
@@ -11,11 +10,9 @@ from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.services.control.torso import choreography, head, kinematics, tracks
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.pace import arm_time
+from engage_hri.services.control.torso.parts import Parts
 from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
-
-if TYPE_CHECKING:
-    from engage_hri.services.control.torso.moving import Torso
 
 NOTICEABLE: Meters = 0.01
 """A target that moves less does not move an arm."""
@@ -25,7 +22,7 @@ BESIDE: Meters = 0.03
 """Distance by which a forearm may be behind it."""
 
 
-def follow(torso: "Torso") -> None:
+def follow(torso: Parts) -> None:
     """Turn head and arms to follow the entities that they are on, or on their way to."""
     _follow_with_head(torso)
     for part in ("left_arm", "right_arm"):
@@ -34,7 +31,7 @@ def follow(torso: "Torso") -> None:
             _follow_with_arm(torso, run)
 
 
-def _follow_with_head(torso: "Torso") -> None:
+def _follow_with_head(torso: Parts) -> None:
     now, situation, track = torso.clock.time(), torso.situation(torso.world, real=True), torso.tracks["head"]
     torso.attention.update(situation)
     aim = torso.attention.aim
@@ -58,7 +55,7 @@ def _follow_with_head(torso: "Torso") -> None:
         run.bell.ring()
 
 
-def _follow_with_arm(torso: "Torso", run: Run) -> None:
+def _follow_with_arm(torso: Parts, run: Run) -> None:
     assert isinstance(run.behavior, Pointing)
     assert run.course.aim is not None
     entity, now = torso.world.entity(run.behavior.target), torso.clock.time()
@@ -87,7 +84,7 @@ def replanned(run: Run, situation: Situation) -> Course:
     return choreography.plan(replace(run.behavior, mode=hand), situation)
 
 
-def relaid(torso: "Torso", run: Run, course: Course, now: Seconds) -> Path | None:
+def relaid(torso: Parts, run: Run, course: Course, now: Seconds) -> Path | None:
     """Path for the rest of a pointing whose target, or arm, is to be elsewhere; None: it is on its way home.
 
     course: to where it is to be.
@@ -109,7 +106,7 @@ def relaid(torso: "Torso", run: Run, course: Course, now: Seconds) -> Path | Non
     return Path(start, run.with_faults(tuple(legs)), torso.limits(run, course.aim, now))
 
 
-def is_behind(torso: "Torso", run: Run) -> bool:
+def is_behind(torso: Parts, run: Run) -> bool:
     """True if a behavior that waits on its target is still on its way to where that has moved."""
     now, aim = torso.clock.time(), run.course.aim
     if aim is None or now >= run.motion.end or not isinstance(run.behavior, Gaze | Pointing):

@@ -6,7 +6,6 @@ Time is that of a clock: of the event loop for the body, of its own for a rehear
 import math
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Protocol
 
 from msgspec.structs import replace
 
@@ -22,6 +21,7 @@ from engage_hri.services.control.torso.estimates import Added, going_home, infea
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.parts import Clock
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
@@ -31,12 +31,6 @@ from engage_hri.services.control.waiting import Bell
 
 STEP: Seconds = 0.02
 """Seconds between two looks at where the trunk will be."""
-
-
-class Clock(Protocol):
-    """Source of the time."""
-
-    def time(self) -> Seconds: ...
 
 
 class Torso:
