@@ -177,7 +177,8 @@ def _given_way(
     here = tuple(start.q.tolist())
     joints, left = run.course.joints, run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
     for lift in LIFTS:
-        if not are_clear(joints, [lifted(joints, leg.goal, lift) for leg in left[:-1]] or [here], around):
+        poses = [lifted(joints, leg.goal, lift) for leg in left[:-1]] + [lifted(joints, here, lift)] * run.holding
+        if poses and not are_clear(joints, poses, around):
             continue
         legs = tuple(replace(leg, goal=lifted(joints, leg.goal, lift)) for leg in left[:-1]) + left[-1:]
         if run.holding and legs:

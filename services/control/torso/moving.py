@@ -249,16 +249,16 @@ class Torso:
         trunk = torso.at(at)
         start = run.course.aim.added(motion.at(at), trunk)
         start = start if aim is None else aim.removed(start, trunk)
-        return self._path_home(run, start, goal, self.limits(run, aim, at))
+        return self._path_home(run, start, goal, self.limits(run, aim, at), at)
 
     def _path_home(
-        self, run: Run, start: JointMotion, goal: tuple[float, ...], limits: tuple[JointLimit, ...]
+        self, run: Run, start: JointMotion, goal: tuple[float, ...], limits: tuple[JointLimit, ...], at: Seconds
     ) -> Path:
-        """Path from a target to where the part belongs; of an arm by a way that is clear of the table."""
+        """Path from a target to where the part belongs, from then on; of an arm a way that is clear of the table."""
         leg = _leg_home(run, start, goal)
         path = Path(start, run.with_faults((leg,)), limits)
         if run.course.parts != ("head",):
-            trunks = clearing.places(self, self.clock.time())
+            trunks = clearing.places(self, at)
             for above in tracks.raised(tuple(start.q.tolist()), run.course.joints):
                 if not tracks.meets_table(path, run.course.joints, trunks):
                     break
@@ -284,7 +284,7 @@ class Torso:
             start = tracks.joined([self.tracks[part].start_at(now, aim) for part in run.course.parts])
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             limits = self.limits(run, aim, now)
-            path = self._path_home(run, start, goal, limits) if is_homeward else None
+            path = self._path_home(run, start, goal, limits, now) if is_homeward else None
             self.play(run, path or Path(start, run.with_faults(legs), limits), aim)
         return passed
 

@@ -151,15 +151,20 @@ class Track:
             (Leg(goal=above, seconds=RAISING), Leg(goal=goal, seconds=seconds))
             for above in raised(self.angles(now), self.joints)
         ]
-        motions = [Motion(Path(start, legs, LIMITS[self.part]), now) for legs in ways]
-        clear = (motion for motion in motions if self._clears(motion, now))
-        self.play(next(clear, motions[-1]))
+        found, best = Motion(direct, now), -math.inf
+        for legs in ways:
+            motion = Motion(Path(start, legs, LIMITS[self.part]), now)
+            if (above := self._above_table(motion, now)) > best:
+                found, best = motion, above
+            if best >= 0.0:
+                break
+        self.play(found)
 
-    def _clears(self, motion: Motion, now: Seconds) -> bool:
-        """True if an arm that moves so is clear of the table as the trunk moves."""
+    def _above_table(self, motion: Motion, now: Seconds) -> Meters:
+        """Least distance by which an arm that moves so stays out of the table as the trunk moves."""
         at = np.linspace(now, max(motion.end, self.trunk.motion.end), MOMENTS).tolist()
         trunk = self.trunk.motion.positions(at)[:, self.trunk.columns]
-        return above_table_along(motion.positions(at), self.joints, trunk) >= 0.0
+        return above_table_along(motion.positions(at), self.joints, trunk)
 
 
 def raised(arm: tuple[float, ...], joints: Sequence[str]) -> Iterator[tuple[float, ...]]:
