@@ -38,16 +38,23 @@ MOMENTS = 25
 
 
 def places(torso: Parts, now: Seconds) -> tuple[Trunk, ...]:
-    """Tell where the trunk is now, and where it may be until it rests."""
+    """Tell where the trunk is now, or then, and where it may be until it rests."""
     track, run = torso.tracks["torso"], torso.runs.get("torso")
     stops = [track.angles(now)]
     if track.is_moving(now):  # One that is broken off goes on for a while before it turns round.
         stops = [track.angles(at) for at in np.linspace(now, track.motion.end, UNDER_WAY).tolist()]
-    if run is not None and run.is_setting_out:
+    if run is not None and _is_setting_out(run, now):
         stops.append(tuple(run.course.on_target[joint] for joint in TRUNK))
     if run is not None:
         stops += homes(torso, run.course)
     return way_along([*stops, track.base])
+
+
+def _is_setting_out(run: Run, at: Seconds) -> bool:
+    """True if a behavior of the trunk has not left its target by then, as it moves now."""
+    marks = run.motion.path.marks
+    leaves = run.motion.crossing(marks.get("relax", marks["end"]))
+    return run.is_setting_out and (leaves is None or at <= leaves)
 
 
 def homes(torso: Parts, course: Course) -> list[Trunk]:
