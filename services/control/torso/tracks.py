@@ -151,6 +151,15 @@ class Track:
             (Leg(goal=above, seconds=RAISING), Leg(goal=goal, seconds=seconds))
             for above in raised(self.angles(now), self.joints)
         ]
+        # Or with the elbow bent all the way.
+        bent, (yaw, pitch, _) = LIMITS[self.part][2].high, self.angles(now)
+        ways.append(
+            (
+                Leg(goal=(yaw, pitch, bent), seconds=max(RAISING, rising)),
+                Leg(goal=(*goal[:2], bent), seconds=seconds),
+                Leg(goal=goal, seconds=RAISING),
+            )
+        )
         found, best = Motion(direct, now), -math.inf
         for legs in ways:
             motion = Motion(Path(start, legs, LIMITS[self.part]), now)
