@@ -11,6 +11,10 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Radians, Seconds
 
+GIVES_WAY: Seconds = 0.2
+COMES_BACK: Seconds = 1.5
+"""Seconds in which idle motion stops for a behavior, and in which it comes back."""
+
 
 class Seen(Struct, frozen=True, kw_only=True):
     """Rays as in `BodyState`, as people and cameras see them."""
@@ -90,3 +94,28 @@ class Extras:
             reason = f"the body {self.capabilities.body} does not correct the angle of {', '.join(offsets)}"
             advice = "leave [offsets] out of the calibration; its [errors] count all the same"
             raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
+
+
+class Gate:
+    """Share of the idle motion that is let through: it goes to 0 when something begins, and comes back after it."""
+
+    def __init__(self) -> None:
+        self._since: Seconds = -inf
+        self._from = 1.0
+        self._is_open = True
+
+    def share(self, t: Seconds, *, is_open: bool) -> float:
+        """The share at t, of a gate that is open or closed from now on."""
+        if is_open != self._is_open:
+            self._from, self._since, self._is_open = self._at(t), t, is_open
+        return self._at(t)
+
+    def _at(self, t: Seconds) -> float:
+        seconds = COMES_BACK if self._is_open else GIVES_WAY
+        return self._from + (float(self._is_open) - self._from) * smooth((t - self._since) / seconds)
+
+
+def smooth(done: float) -> float:
+    """Way of a movement of least jerk, 0 to 1, when this share of its time is over."""
+    x = min(max(done, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))

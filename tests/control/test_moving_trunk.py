@@ -47,7 +47,7 @@ LEANS = ("LEAN_FORWARD", "LEAN_BACK", "TURN_LEFT", "TURN_RIGHT", "FAR_LEFT", "BO
 WIDE = """
 [pose]
 FAR_LEFT = { torso = { turn = 24, lean = 6 } }
-DEEP = { torso = { lean = 25 } }
+DEEP = { torso = { lean = 25 }, arms = { inward = 0, forward = -10, elbow = 140 } }
 BOW = { torso = { lean = 16, turn = -8 } }
 """
 POINTED = 0.02

@@ -306,6 +306,8 @@ class MujocoBody(SimulatedBody):
         later = [path.marks[each.sync] for each in run.pending if path.marks.get(each.sync, 0.0) > mark + 1e-9]
         until = max(mark, min([s, *later[:1]]))
         places = [mark] if until - mark < 1e-9 else np.linspace(mark, until, SAMPLES).tolist()
+        if run.holding:
+            places = [s]  # Its target may have moved: it is there once the plan is, and the joints are where that is.
         offs = [self._off_at(run, place, now) for place in places]
         return min(offs, key=lambda off: off.share)
 

@@ -17,7 +17,11 @@ from engage_hri.services.tangram.table import Piece, TangramTable
 STEP: Seconds = 0.002
 """Time step of the physics."""
 SLACK = math.radians(1.5)
-"""Radians by which a joint may leave the range in which motions are planned, before it hits its end stop."""
+"""Radians by which a joint may leave the range in which motions are planned, with what its end stop yields."""
+END_STOP = "0.99 0.999 0.001"
+"""Impedance of the end stops of joints; their time constant is two steps, the shortest that MuJoCo takes."""
+YIELDING = math.radians(0.5)
+"""Radians by which an end stop yields to what falls onto it."""
 AWAY: Meters = -5.0
 """Height at which obstacles wait."""
 BOARD: Meters = 0.01
@@ -236,10 +240,12 @@ def _arm(side: kinematics.Side) -> str:
 
 def _joint(name: str, axis: str) -> str:
     limit, motor = kinematics.LIMIT[name], MOTORS[name]
-    low, high = math.degrees(limit.low - SLACK), math.degrees(limit.high + SLACK)
+    slack = SLACK - YIELDING
+    low, high = math.degrees(limit.low - slack), math.degrees(limit.high + slack)
     return (
         f'<joint name="{name}" axis="{axis}" range="{low:.3f} {high:.3f}" damping="{motor.drag}"'
-        f' frictionloss="{motor.friction}" armature="{motor.armature}"/>'
+        f' frictionloss="{motor.friction}" armature="{motor.armature}" solreflimit="{2 * STEP:g} 1"'
+        f' solimplimit="{END_STOP}"/>'
     )
 
 

@@ -23,6 +23,7 @@ NECK = ("neck_yaw", "neck_pitch")
 TRUNK = ("torso_turn", "torso_lean")
 SAME = 1e-9
 """Radians that tell no two places of the trunk apart."""
+UPRIGHT: Trunk = (0.0, 0.0)
 
 
 def _joints(side: Side | None) -> tuple[str, ...]:

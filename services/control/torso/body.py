@@ -38,6 +38,7 @@ from engage_hri.services.control.torso.copied import Clock, beside
 from engage_hri.services.control.torso.course import CoursePoint, Impossible
 from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, wait_estimate
 from engage_hri.services.control.torso.files import repertoire_of
+from engage_hri.services.control.torso.following import follow, is_behind
 from engage_hri.services.control.torso.idling import idling
 from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
@@ -57,6 +58,8 @@ FAULTS = tuple(KINDS)
 """Kinds of faults that it can play: all that have a name."""
 ELEMENTS = 256
 """Elements that an estimate with a path counts for (see `steps`)."""
+CATCHES_UP: Seconds = 0.02
+"""Seconds between two looks at whether it has come to a target that has moved."""
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
@@ -191,7 +194,7 @@ class SimulatedBody(Body):
 
     def see(self, world: World) -> None:
         self._torso.world = world
-        self._torso.follow()
+        follow(self._torso)
 
     # -- what it does not measure -------------------------------------------------------------------------------
 
@@ -275,11 +278,11 @@ class SimulatedBody(Body):
                 self._torso.extend(run)
             point = run.pending[0]
             due = run.due(point)
-            if due is None or not run.bell.is_past(due):
+            if not run.holding and (due is None or not run.bell.is_past(due)):
                 await run.bell.wait(inf if due is None else due)
             elif point.sync in (STALL, OVERHEAT):
                 await self._fail_or_stall(run, point)
-            elif (came := await self._come(run, point, due)) is None:
+            elif (came := await self._come(run, point, self._loop.time() if due is None else due)) is None:
                 continue
             elif not run.holding and self._torso.is_off_target(run, point.sync):
                 raise _out_of_reach(run)
@@ -291,6 +294,8 @@ class SimulatedBody(Body):
                 while not run.may_pass(point.held_with) and not run.is_over:
                     await run.bell.wait(inf)
                     self._check_joints(run)
+                while is_behind(self._torso, run) and not run.is_over:
+                    await run.bell.wait(self._loop.time() + CATCHES_UP)
                 if await self._come(run, point, self._loop.time()) is None:
                     continue
                 if not run.is_over and self._torso.is_off_target(run, point.sync):
@@ -354,7 +359,7 @@ class SimulatedBody(Body):
         except Impossible as impossible:
             raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
         self._torso.set_base(behavior, course, authority)
-        self._torso.follow()
+        follow(self._torso)
         now = self._loop.time()
         yield Reached("start", now, now)
         async with aclosing(pass_end(authority)) as points:

@@ -72,6 +72,12 @@ Looked = tuple[Aim, tuple[float, ...]]
 
 def plan(behavior: BlockBehavior, situation: Situation) -> Course:
     """Plan the course of `behavior` in `situation`. Speech and wait move nothing and have none. Raises Impossible."""
+    made = _planned(behavior, situation)
+    is_of_arms = made.parts[0].endswith("_arm")
+    return replace(made, trunks=situation.trunks) if is_of_arms and situation.trunks != made.trunks else made
+
+
+def _planned(behavior: BlockBehavior, situation: Situation) -> Course:
     match behavior:
         case Gaze():
             return _noted(_glance(_gaze_aim(behavior, situation), situation), behavior)
@@ -180,7 +186,7 @@ def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:
     reasons = []
     for side in arms:
         try:
-            aim = kinematics.point_at(side, entity.position, entity.radius, situation.pose)
+            aim = kinematics.point_at(side, entity.position, entity.radius, situation.pose, situation.trunks)
         except Unreachable as error:
             reasons.append(str(error))
             continue

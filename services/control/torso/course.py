@@ -10,7 +10,7 @@ from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.world import World
-from engage_hri.services.control.torso.aiming import Aim, Trunk
+from engage_hri.services.control.torso.aiming import UPRIGHT, Aim, Trunk
 from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
@@ -50,6 +50,8 @@ class Course(Struct, frozen=True, kw_only=True):
     """True if it may be made smaller for want of time; false for a motion with a target."""
     aim: Aim | None = None
     """The place that it is on from its beginning until it leaves its target: the trunk may move meanwhile."""
+    trunks: tuple[Trunk, ...] = (UPRIGHT,)
+    """Places where the trunk may be while arms move along it. A course that moves the trunk itself needs none."""
     note: str = ""
     """Warning, if this is only the nearest to what was asked: names both."""
 
@@ -58,6 +60,7 @@ class Situation(Struct, frozen=True):
     """Circumstances of a course. pose: joint angles at its start, with the trunk where it is going to be.
 
     rest: joint angles that it returns to. trunk: where the trunk is at its start; None: where it is going to be.
+    trunks: places where the trunk is, or may be, from its start to its end.
     """
 
     pose: Mapping[str, float]
@@ -68,6 +71,7 @@ class Situation(Struct, frozen=True):
     """Names of parts in use: a pointing without a mode takes the other arm."""
     repertoire: Repertoire = BUILT_IN
     trunk: Trunk | None = None
+    trunks: tuple[Trunk, ...] = (UPRIGHT,)
 
     def start(self, aim: Aim) -> tuple[float, ...]:
         """Angles from which the path of a part begins that is going to be on a place."""

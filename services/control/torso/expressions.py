@@ -32,6 +32,7 @@ from engage_hri.services.control.torso.course import (
     marks,
 )
 from engage_hri.services.control.torso.kinematics import Side
+from engage_hri.services.control.torso.lifting import clear_of_table
 from engage_hri.services.control.torso.pace import arm_time, moving_time, return_time
 from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import Absent, Found, GesturePath, HeadPath, Table
@@ -55,11 +56,16 @@ def gesture(lexeme: str, mode: Hand | None, situation: Situation) -> Course:
     both = sides(mode, lambda side: 0.0 if side == "right" else 1.0, situation)
     both = both if mode == "BOTH_HANDS" else both[:1]
     joints = tuple(joint for side in both for joint in kinematics.joints_of(f"{side}_arm"))
-    ready, stroke, after = (
-        tuple(angle for side in both for angle in pose.joints(side).values())
-        for pose in (path.ready, path.stroke, path.stroke_end)
-    )
     here, home = angles(joints, situation.pose), angles(joints, situation.rest)
+    ready, stroke, after = clear_of_table(
+        joints,
+        [
+            tuple(angle for side in both for angle in pose.joints(side).values())
+            for pose in (path.ready, path.stroke, path.stroke_end)
+        ],
+        home,
+        situation.trunks,
+    )
     stops = (here, ready, stroke, after, home)
     # The stroke is slow enough to take no longer from rest, after a hold: estimates are right with and without one.
     seconds = (

@@ -113,14 +113,16 @@ def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
 
 
 def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | None:
-    """Path for the rest of a gaze or shift on its way whose target has moved; None: not noticeably.
+    """Path for the rest of a gaze or shift, on its way or on its target, that has moved; None: not noticeably.
 
     course: to where the target is now.
     """
     if not differ(_target(course.on_target), going_to(run.course, course)):
         return None
-    legs = (replace(course.legs[0], seconds=_left(run, now)), *course.legs[1:])
-    return Path(track.start_at(now, course.aim), run.with_faults(legs), track.limits(now, course.aim))
+    start = track.start_at(now, course.aim)
+    seconds = turning_time(start.q.tolist(), course.legs[0].goal) if run.holding else _left(run, now)
+    legs = (replace(course.legs[0], seconds=max(seconds, SHORTEST)), *course.legs[1:])
+    return Path(start, run.with_faults(legs), track.limits(now, course.aim))
 
 
 def homeward(run: Run, base: tuple[float, ...], track: Track, now: Seconds, aim: Aim | None) -> Path | None:

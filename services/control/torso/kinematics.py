@@ -35,6 +35,8 @@ TABLE_TOP: Meters = 0.72
 TABLE_EDGE: Meters = 0.20
 """x of the edge at the robot's side."""
 CLEARANCE: Meters = 0.01
+ROOM: Meters = 0.005
+"""Beyond the clearance, of an arm that points while the torso leans: on its way home it comes so much lower."""
 REACH: Meters = 1.5
 """Greatest distance from the shoulder to a target of pointing: farther, people can't tell which object is meant."""
 HAND_TO_TARGET: Meters = 0.06
@@ -171,21 +173,26 @@ def arm_angles(side: Side, target: Vector, pitch: Radians, pose: Pose) -> tuple[
     return _pointing(x, y, z, pitch)
 
 
-def point_at(side: Side, target: Vector, radius: Meters, pose: Pose) -> ArmAim:
+def point_at(
+    side: Side, target: Vector, radius: Meters, pose: Pose, trunks: tuple[tuple[float, ...], ...] = ()
+) -> ArmAim:
     """Angles of the `side` arm that point at `target` without touching it, as extended as the table allows.
 
-    radius: of what is pointed at. Raises Unreachable.
+    radius: of what is pointed at. trunks: turn and lean of other places of the torso where the arm is to be clear of
+    the table as it stays on target. Raises Unreachable.
     """
-    aim = _aim(side, target, radius, pose["torso_turn"], pose["torso_lean"])
+    aim = _aim(side, target, radius, (pose["torso_turn"], pose["torso_lean"]), trunks)
     if isinstance(aim, str):
         raise Unreachable(aim)
     return aim
 
 
 @lru_cache(256)  # of one place it is asked from many poses of the arm, with the same answer
-def _aim(side: Side, target: Vector, radius: Meters, turn: Radians, lean: Radians) -> ArmAim | str:
+def _aim(
+    side: Side, target: Vector, radius: Meters, trunk: tuple[float, float], trunks: tuple[tuple[float, ...], ...]
+) -> ArmAim | str:
     """Angles that point at `target`, or why there are none."""
-    pose = {"torso_turn": turn, "torso_lean": lean}
+    pose = _leaning(trunk)
     x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
     distance = hypot(x, y, z)
     if distance > REACH:
@@ -195,9 +202,27 @@ def _aim(side: Side, target: Vector, radius: Meters, turn: Radians, lean: Radian
         pitch = radians(degrees)
         stroke, held = (_pointing(x, y, z, angle) for angle in (pitch, pitch - SLIDE))
         reason = _objection(side, stroke, target, radius, pose) or _objection(side, held, target, radius, pose)
+        if not reason and any(_is_low(side, target, pitch, each) for each in trunks if any(each)):
+            reason = "the table is in the way as the torso moves"
         if not reason:
             return ArmAim(stroke, held)
     return f"the {side} arm finds no way to point at it: {reason}"
+
+
+def _leaning(trunk: tuple[float, ...]) -> dict[str, float]:
+    turn, lean = trunk
+    return {"torso_turn": turn, "torso_lean": lean}
+
+
+def _is_low(side: Side, target: Vector, pitch: Radians, trunk: tuple[float, ...]) -> bool:
+    """True if an arm that points, or comes as near to that as its joints do, is in the table or has no room to it."""
+    names = joints_of(f"{side}_arm")
+    for angle in (pitch, pitch - SLIDE):
+        free = zip(names, arm_angles(side, target, angle, _leaning(trunk)), strict=True)
+        angles = [[min(max(angle, LIMIT[name].low), LIMIT[name].high)] for name, angle in free]
+        if above_table(side, np.array(angles), np.array(trunk)[:, None]).min() < ROOM:
+            return True
+    return False
 
 
 def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool:

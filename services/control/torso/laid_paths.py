@@ -1,6 +1,7 @@
 """Paths of courses, each laid once: the same question to the body costs its thinking only the first time.
 
-A path follows from where it starts, at which speed, its legs and its parts, and from nothing else. All of that is the
+A path follows from where it starts, at which speed, its legs and its parts, and whether the table is in its way from
+where the trunk is meanwhile, and from nothing else. All of that is the
 key by which it is known, to the last bit: a body that has moved starts elsewhere, an entity that has moved makes
 other legs, and their path is a new one. So nothing here can be out of date.
 """
@@ -10,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from engage_hri.services.control.torso import tracks
+from engage_hri.services.control.torso.aiming import Trunk
 from engage_hri.services.control.torso.course import Course, Impossible
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path
 
@@ -18,10 +20,15 @@ KEPT = 128
 
 
 def laid_path(start: JointMotion, course: Course, *, is_free: bool = False) -> Path:
-    """The path along `course`. is_free: without the ranges of joints (`tracks.limits_of`). Raises Impossible."""
+    """The path along `course`. Raises Impossible.
+
+    is_free: for a trunk that moves, without the ranges of joints (`tracks.limits_of`); who asks minds the table.
+    """
+    # What is on a place is planned such that it is clear there wherever the trunk is; its way home is laid anew.
+    trunks = course.trunks if course.aim is None else course.trunks[:1]
     state = (np.asarray(each, dtype=np.float64).tobytes() for each in (start.q, start.v, start.a))
-    path, is_blocked = _laid(*state, course.legs, course.parts, course.joints, is_free)
-    if is_blocked:
+    path, is_blocked = _laid(*state, course.legs, course.parts, course.joints, is_free, trunks)
+    if is_blocked and not is_free:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
     return path
 
@@ -35,8 +42,9 @@ def _laid(
     parts: tuple[str, ...],
     joints: tuple[str, ...],
     is_free: bool,
+    trunks: tuple[Trunk, ...],
 ) -> tuple[Path, bool]:
     """A path, and whether the table is in its way. q, v, a: the arrays of the state in which it starts."""
     start = JointMotion(*(np.frombuffer(each, dtype=np.float64) for each in (q, v, a)))
     path = Path(start, legs, tracks.limits_of(parts, is_free=is_free))
-    return path, tracks.meets_table(path, joints)
+    return path, tracks.meets_table(path, joints, trunks)

@@ -6,12 +6,14 @@ without having stopped if the limit is moved in time.
 """
 
 import math
+from collections.abc import Sequence
 from math import inf, sqrt
 
+import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso.path import JointMotion, Path, resting
+from engage_hri.services.control.torso.path import Array, JointMotion, Path, resting
 
 SLOWEST = 0.01
 """The least steady rate: a time that the author of a block has fixed is kept, however slow that looks."""
@@ -115,6 +117,11 @@ class Motion:
         piece = self._piece(t)
         rate, state = piece.rate_at(t), self.path.at(min(piece.s_at(t), self._stop))
         return JointMotion(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
+
+    def positions(self, times: Sequence[Seconds]) -> Array:
+        """Positions of the joints at instants in order: an array of instants x joints."""
+        length = self.path.length or 1.0
+        return self.path.positions(np.array([self.s(t) for t in times]) / length)
 
     def crossing(self, s: Seconds) -> Seconds | None:
         """Instant at which s is reached; None if s lies beyond the limit."""

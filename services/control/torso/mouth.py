@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import MouthShape
-from engage_hri.services.control.torso.alive import smooth
+from engage_hri.services.control.extras import smooth
 
 CHANGE: Seconds = 0.09
 """Seconds in which the lips go from one shape to the next, half of them before the next begins, as people's do: as

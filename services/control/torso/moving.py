@@ -6,7 +6,6 @@ Time is that of a clock: of the event loop for the body, of its own for a rehear
 import math
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Protocol
 
 from msgspec.structs import replace
 
@@ -15,13 +14,14 @@ from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, NoPointZone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso import choreography, head, kinematics, tracks
+from engage_hri.services.control.torso import choreography, clearing, head, kinematics, tracks
 from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.estimates import Added, going_home, infeasible, motion_estimate, poses
 from engage_hri.services.control.torso.head import Fixation
 from engage_hri.services.control.torso.laid_paths import laid_path
 from engage_hri.services.control.torso.motion import Motion
+from engage_hri.services.control.torso.parts import Clock
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 from engage_hri.services.control.torso.repertoire import Repertoire
 from engage_hri.services.control.torso.runs import Run
@@ -31,12 +31,6 @@ from engage_hri.services.control.waiting import Bell
 
 STEP: Seconds = 0.02
 """Seconds between two looks at where the trunk will be."""
-
-
-class Clock(Protocol):
-    """Source of the time."""
-
-    def time(self) -> Seconds: ...
 
 
 class Torso:
@@ -113,7 +107,9 @@ class Torso:
         if not real:
             here.update(self.misbelieved)
         rest = {**tracks.bases(self.tracks), **self._gaze_at_rest(here)}
-        described = Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk)
+        is_sure = real or self.misbelieved.keys().isdisjoint(TRUNK)
+        trunks = clearing.places(self, now) if is_sure else clearing.way_along([[here[joint] for joint in TRUNK]])
+        described = Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk, trunks)
         return described if pose is None else self.placed(described, pose)
 
     def placed(self, situation: Situation, pose: BodyPose) -> Situation:
@@ -121,7 +117,8 @@ class Torso:
         here, rest = tracks.updated(situation.pose, pose), situation.rest
         if any(here[joint] != situation.pose[joint] for joint in TRUNK):
             rest = {**rest, **self._gaze_at_rest(here)}
-        return replace(situation, pose=here, rest=rest, trunk=None)
+        trunks = clearing.way_along([[here[joint] for joint in TRUNK]])
+        return replace(situation, pose=here, rest=rest, trunk=None, trunks=trunks)
 
     def _gaze_at_rest(self, pose: Mapping[str, float]) -> dict[str, float]:
         """Angles to which the head goes back, with the trunk as in `pose`."""
@@ -135,7 +132,10 @@ class Torso:
         start = self.start(course, situation)
         if situation is None and self.is_carried(course):
             return self._path_on_the_move(start, course)
-        return laid_path(start, course)
+        path = laid_path(start, course)
+        if "torso" in course.parts:
+            clearing.check(self, course, path, None if situation is None else situation.pose)
+        return path
 
     def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
         """State in which a path along `course` begins. situation: as for `path`."""
@@ -154,6 +154,7 @@ class Torso:
         arrival = _arrival(course)
         if delay := self._delay(course.aim, self.clock.time() + path.marks[arrival]):
             path = laid_path(start, replace(course, legs=_delayed(course.legs, arrival, delay)), is_free=True)
+        clearing.check_carried(self, course, path)
         return path
 
     def _delay(self, aim: Aim | None, at: Seconds) -> Seconds:
@@ -176,14 +177,15 @@ class Torso:
                 track = self.tracks[run.course.parts[0]]
                 left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
                 start, legs = track.start_at(now, run.course.aim), _delayed(left, arrival, delay)
-                path = Path(start, run.with_faults(legs), self._limits(run, run.course.aim, now))
-                self._play(run, path, run.course.aim)
+                path = Path(start, run.with_faults(legs), self.limits(run, run.course.aim, now))
+                self.play(run, path, run.course.aim)
                 run.bell.ring()
 
     def is_off_target(self, run: Run, sync: str) -> bool:
-        """True if `sync` says that a behavior is on its target, which is out of reach, since the trunk has moved."""
+        """True if `sync` says that a behavior is on its target, which is out of reach."""
         aim, trunk = run.course.aim, self.tracks["torso"].angles(self.clock.time())
-        return aim is not None and sync == _arrival(run.course) and not aim.is_in_reach(trunk)
+        is_claim = sync == _arrival(run.course) or (isinstance(run.behavior, Pointing) and sync == "stroke_end")
+        return aim is not None and is_claim and (run.is_lost or not aim.is_in_reach(trunk))
 
     # -- motion -------------------------------------------------------------------------------------------------
 
@@ -192,6 +194,7 @@ class Torso:
         run.began = self.clock.time()
         for joint in run.course.joints:
             self.misbelieved.pop(joint, None)
+        left: list[str] = []
         for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):
             self.release(earlier)
             if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
@@ -199,7 +202,7 @@ class Torso:
             else:
                 earlier.authority.revoke("taken_over")
             earlier.bell.ring()
-            self.relax(tuple(part for part in earlier.course.parts if part not in run.course.parts))
+            left += [part for part in earlier.course.parts if part not in run.course.parts]
         for part in run.course.parts:
             self.runs[part] = run
         for bell in self.homeward:
@@ -208,11 +211,13 @@ class Torso:
             self.set_base(run.behavior, run.course, run.authority)
         elif isinstance(run.behavior, choreography.SETTLING):
             tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
-        self._play(run, path, run.course.aim)
+        self.play(run, path, run.course.aim)
+        self.relax(tuple(left))
         if "torso" in run.course.parts:
             self._wait_for_reach()
+            clearing.give_way(self)
 
-    def _play(self, run: Run, path: Path, aim: Aim | None) -> None:
+    def play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now, run.gate = self.clock.time(), inf
         run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
         column = 0
@@ -229,7 +234,7 @@ class Torso:
         now = self.clock.time()
         track, aim = self.tracks[run.course.parts[0]], self._home(run)[1]
         if (path := self.way_home(run, run.motion, now)) is not None:
-            self._play(run, path, aim)
+            self.play(run, path, aim)
         else:
             track.aim = None if aim is None else aim.at(track.trunk.angles(now))
 
@@ -244,7 +249,23 @@ class Torso:
         trunk = torso.at(at)
         start = run.course.aim.added(motion.at(at), trunk)
         start = start if aim is None else aim.removed(start, trunk)
-        return Path(start, run.with_faults((_leg_home(run, start, goal),)), self._limits(run, aim, at))
+        return self._path_home(run, start, goal, self.limits(run, aim, at), at)
+
+    def _path_home(
+        self, run: Run, start: JointMotion, goal: tuple[float, ...], limits: tuple[JointLimit, ...], at: Seconds
+    ) -> Path:
+        """Path from a target to where the part belongs, from then on; of an arm a way that is clear of the table."""
+        leg = _leg_home(run, start, goal)
+        path = Path(start, run.with_faults((leg,)), limits)
+        if run.course.parts != ("head",):
+            trunks = clearing.places(self, at)
+            for above in tracks.raised(tuple(start.q.tolist()), run.course.joints):
+                if not tracks.meets_table(path, run.course.joints, trunks):
+                    break
+                first = Leg(goal=above, seconds=tracks.RAISING, marks=leg.marks[:1])
+                legs = run.with_faults((first, replace(leg, marks=leg.marks[1:])))
+                path = Path(start, legs, limits)
+        return path
 
     def _home(self, run: Run) -> tuple[tuple[float, ...], Aim | None]:
         """Angles to which a behavior goes home, and the place that its part is on there."""
@@ -262,12 +283,12 @@ class Torso:
             aim = aim if is_homeward else run.course.aim
             start = tracks.joined([self.tracks[part].start_at(now, aim) for part in run.course.parts])
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
-            if is_homeward:
-                legs = (_leg_home(run, start, goal),)
-            self._play(run, Path(start, run.with_faults(legs), self._limits(run, aim, now)), aim)
+            limits = self.limits(run, aim, now)
+            path = self._path_home(run, start, goal, limits, now) if is_homeward else None
+            self.play(run, path or Path(start, run.with_faults(legs), limits), aim)
         return passed
 
-    def _limits(self, run: Run, aim: Aim | None, at: Seconds) -> tuple[JointLimit, ...]:
+    def limits(self, run: Run, aim: Aim | None, at: Seconds) -> tuple[JointLimit, ...]:
         """Limits of a path with this aim that begins then."""
         is_free = aim is not None and not self.tracks["torso"].is_still(at, aim)
         return tracks.limits_of(run.course.parts, is_free=is_free)
@@ -275,7 +296,7 @@ class Torso:
     def extend(self, run: Run) -> None:
         now = self.clock.time()
         if (path := run.hurry(now)) is not None:
-            self._play(run, path, self.tracks[run.course.parts[0]].aim)
+            self.play(run, path, self.tracks[run.course.parts[0]].aim)
         limit = run.limit(run.motion.path)
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
@@ -320,15 +341,17 @@ class Torso:
 
     def relax(self, parts: tuple[str, ...]) -> None:
         now = self.clock.time()
-        for part in parts:
+        # The trunk first: arms are not down before it is up.
+        for part in sorted(parts, key=lambda part: part != "torso"):
             track = self.tracks[part]
             if part == "head":
                 track.return_to(self.attention.angles, now, self.attention.aim)
                 self.attention.expect(self.attention.entity, track.motion.end, now)
             else:
-                track.return_to(track.base, now)
+                track.return_to(track.base, now, trunks=clearing.places(self, now))
         if "torso" in parts:
             self._wait_for_reach()
+            clearing.give_way(self)
 
     # -- gaze ---------------------------------------------------------------------------------------------------
 
@@ -342,30 +365,6 @@ class Torso:
             self.base.revoke("taken_over")
         self.attention.shift(behavior, course)
         self.base = authority
-
-    def follow(self) -> None:
-        """Turn the head to follow the entity that it looks at, or is about to look at."""
-        now, situation, track = self.clock.time(), self.situation(self.world, real=True), self.tracks["head"]
-        self.attention.update(situation)
-        aim = self.attention.aim
-        if (run := self.runs.get("head")) is None:
-            head.turn(track, self.attention.angles, now, aim)
-            return
-        try:
-            course = choreography.plan(run.behavior, situation)
-        except Impossible:
-            return
-        path: Path | None = None
-        if run.stands:
-            head.turn(track, tuple(course.on_target.values()), now, course.aim)
-        elif run.awaits("stroke") or head.is_shift(run.behavior):
-            path, aim = head.retargeted(run, course, track, now), course.aim
-            run.course = course if path is not None else run.course
-        elif not run.awaits("relax"):
-            path = head.homeward(run, self.attention.angles, track, now, aim)
-        if path is not None:
-            self._play(run, path, aim)
-            run.bell.ring()
 
 
 def is_last_on_target(behavior: BlockBehavior, sync: str) -> bool:

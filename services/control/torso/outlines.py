@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from engage_hri.schemas.units import Degrees
 from engage_hri.services.control.torso import kinematics
+from engage_hri.services.control.torso.aiming import UPRIGHT
 from engage_hri.services.control.torso.path import (
     LEAST,
     MARGIN,
@@ -25,7 +26,7 @@ from engage_hri.services.control.torso.path import (
     Array,
     Leg,
 )
-from engage_hri.services.control.torso.tracks import ALONG, limits_of
+from engage_hri.services.control.torso.tracks import ALONG, FINELY, limits_of
 
 Flags = NDArray[np.bool_]
 
@@ -44,7 +45,7 @@ _CHANGES = _POWERS[2:] * _POWERS[1:5] * SAMPLES[:, None] ** _POWERS[:4]
 class Asked(Struct, frozen=True):
     """A path from the angles `start`, at `speeds`, along `legs`.
 
-    to_target: the number of legs to the target. is_arm: the table matters.
+    to_target: the number of legs to the target. is_arm: the table matters. trunk: where the trunk rests meanwhile.
     """
 
     start: tuple[float, ...]
@@ -53,6 +54,7 @@ class Asked(Struct, frozen=True):
     to_target: int
     is_arm: bool
     parts: tuple[str, ...]
+    trunk: tuple[float, ...] = UPRIGHT
 
 
 def outlines(asked: Sequence[Asked]) -> list[Degrees | None]:
@@ -112,7 +114,8 @@ def _are_clear(asked: Sequence[Asked], first: Sequence[int], terms: Array, secon
             arms.setdefault(len(each.legs), []).append(number)
     for count, numbers in arms.items():
         legs = np.array([first[number] for number in numbers])[:, None] + np.arange(count)
-        for number, is_clear in zip(numbers, _is_clear(terms[:, legs], seconds[legs]).tolist(), strict=True):
+        above = _is_clear(terms[:, legs], seconds[legs], [asked[number] for number in numbers])
+        for number, is_clear in zip(numbers, above.tolist(), strict=True):
             clear[number] = is_clear
     return clear
 
@@ -164,16 +167,22 @@ def _excess(values: Array, columns: Array, seconds: Array, bounds: Array) -> Arr
     return np.asarray(worst.max(axis=1))
 
 
-def _is_clear(terms: Array, seconds: Array) -> Flags:
+def _is_clear(terms: Array, seconds: Array, asked: Sequence[Asked]) -> Flags:
     """True for each path of an arm that stays clear of the table, beyond doubt.
 
-    terms: 6 x paths x legs x joints. seconds: paths x legs.
+    terms: 6 x paths x legs x joints. seconds: paths x legs. asked: of each path.
     """
     ends = seconds.cumsum(axis=1)
-    at = ALONG * ends[:, -1:]
+    is_upright = all(each.trunk == UPRIGHT for each in asked)
+    at = (ALONG if is_upright else FINELY) * ends[:, -1:]
     leg = np.minimum((at[..., None] >= ends[:, None]).sum(axis=2), seconds.shape[1] - 1)
     path = np.arange(len(seconds))[:, None]
     share = np.clip((at - (ends - seconds)[path, leg]) / seconds[path, leg], 0.0, 1.0)
-    # To which side the arm is makes no difference, the torso upright.
     angles = np.einsum("psk,kpsj->jps", share[..., None] ** _POWERS, terms[:, path, leg])
-    return np.asarray((kinematics.above_table("left", angles) > DOUBT).all(axis=1))
+    if is_upright:
+        # To which side the arm is makes no difference, the torso upright.
+        return np.asarray((kinematics.above_table("left", angles) > DOUBT).all(axis=1))
+    trunks = np.array([each.trunk for each in asked]).T[:, :, None]
+    left, right = (kinematics.above_table(side, angles, trunks) for side in kinematics.SHOULDER)
+    is_left = np.array([each.parts == ("left_arm",) for each in asked])[:, None]
+    return np.asarray((np.where(is_left, left, right) > DOUBT).all(axis=1))

@@ -82,7 +82,7 @@ class _Questions:
         situation = self._here if item.pose is None else self._torso.placed(self._here, item.pose)
         course = choreography.plan(item.behavior, situation)
         to_target = next((count for count, leg in enumerate(course.legs, 1) if ("stroke", 1.0) in leg.marks), 0)
-        if not to_target or not (is_gaze(course) or is_arm(course)):
+        if not to_target or not (is_gaze(course) or is_arm(course)) or len(course.trunks) > 1:
             return None
         if item.pose is None and not self._torso.misbelieved:
             state = self._state(course)
@@ -91,7 +91,9 @@ class _Questions:
         if state is None:
             return None
         legs = course.legs if is_arm(course) else course.legs[:to_target]
-        return _Open(number, course, situation, Asked(*state, legs, to_target, is_arm(course), course.parts))
+        return _Open(
+            number, course, situation, Asked(*state, legs, to_target, is_arm(course), course.parts, course.trunks[0])
+        )
 
     def _state(self, course: Course) -> State | None:
         """Angles and speeds of the parts now; None: the trunk carries them, or they are about to change speed."""

@@ -16,7 +16,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso import choreography, head, tracks
+from engage_hri.services.control.torso import choreography, following, head, tracks
 from engage_hri.services.control.torso.copied import Clock
 from engage_hri.services.control.torso.course import Course, Impossible
 from engage_hri.services.control.torso.estimates import beneath_a_look
@@ -289,7 +289,7 @@ def _begin(
         if estimate.feasible:
             course = choreography.plan(behavior, torso.situation(torso.world))
             torso.set_base(behavior, course, MovementAuthority(behavior, START))
-            torso.follow()
+            following.follow(torso)
         # Nothing moves: it ends at once, or whenever it is asked to.
         return beneath_a_look(estimate)
     try:

@@ -44,6 +44,8 @@ class Run:
         self.holding = False
         self.is_beneath = False
         """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
+        self.is_lost = False
+        """True while its target is where it cannot follow."""
         self.motion: Motion
         self.size = 1.0
         """Share of the full amplitude, 0 to 1."""

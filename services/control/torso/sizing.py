@@ -30,7 +30,7 @@ def quickest(course: Course, path: Path) -> dict[str, Seconds]:
     """Earliest times of the sync points: as fast as the joints permit and, where allowed, at the least size."""
     if course.is_resizable:
         small = _reduced(course, Motion(path, 0.0), 0.0, SIZES[-1])
-        path = path if tracks.meets_table(small, course.joints) else small
+        path = path if tracks.meets_table(small, course.joints, course.trunks) else small
     return {sync: s / path.fastest for sync, s in path.marks.items()}
 
 
@@ -54,7 +54,7 @@ def hurried(
         if each < size and least > 0.0:
             path = _reduced(course, motion, now, each / size)
             late = lateness(course, Motion(path, now, cruise=cruise), aims, now, cruise, stops)
-            if late < least and not tracks.meets_table(path, course.joints):
+            if late < least and not tracks.meets_table(path, course.joints, course.trunks):
                 least, best = late, Reduced(path, each)
     return best
 

@@ -5,21 +5,28 @@ Only the nod tilts the head.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 import numpy as np
 
 from engage_hri.schemas.body import BodyPose, JointLimit
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Meters, Seconds
 from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
+from engage_hri.services.control.torso.aiming import NECK, TRUNK, UPRIGHT, Aim, Trunk
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.pace import return_time, turning_time
-from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
+from engage_hri.services.control.torso.path import Array, JointMotion, Leg, Path, resting
 
 ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table."""
+FINELY = np.linspace(0.0, 1.0, 65)
+"""The same where the trunk leans: there is less room."""
+UP = (0.2, 0.4, 0.6, 0.8)
+"""Radians by which an arm is raised on its way home, in the order in which they are tried."""
+RAISING: Seconds = 0.4
+MOMENTS = 25
+"""Instants at which an arm that goes home is held against the table while the trunk moves."""
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
@@ -76,16 +83,18 @@ class Track:
         self.trunk = self
         self.joints = tuple(limit.joint for limit in LIMITS[part])
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
-        self._column = 0
+        self.columns = slice(0, len(self.joints))
+        """Which of the joints of the motion are its own."""
         self._last: JointMotion | None = None
         """Whose angles are known as numbers: of a motion that is over, it is the same all the time."""
         self._angles: tuple[float, ...] = ()
 
     def play(self, motion: Motion, column: int = 0, aim: Aim | None = None) -> None:
-        self.motion, self._column, self.aim, self._last = motion, column, aim, None
+        self.motion, self.aim, self._last = motion, aim, None
+        self.columns = slice(column, column + len(self.joints))
 
     def at(self, t: Seconds) -> JointMotion:
-        state, columns = self.motion.at(t), slice(self._column, self._column + len(self.joints))
+        state, columns = self.motion.at(t), self.columns
         state = JointMotion(state.q[columns], state.v[columns], state.a[columns])
         if self.aim is None or self.is_still(t, self.aim):
             return state
@@ -107,7 +116,7 @@ class Track:
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
         state = self.motion.at(t)
-        columns = slice(self._column, self._column + len(self.joints))
+        columns = self.columns
         if self.aim is not None and not self.is_still(t, self.aim):
             return tuple(self.aim.within(state.q[columns] + self.aim.offset(self.trunk.angles(t))).tolist())
         if state is not self._last:
@@ -117,24 +126,62 @@ class Track:
     def is_moving(self, t: Seconds) -> bool:
         return t < self.motion.end
 
-    def return_to(self, goal: tuple[float, ...], now: Seconds, aim: Aim | None = None) -> None:
+    def return_to(
+        self, goal: tuple[float, ...], now: Seconds, aim: Aim | None = None, trunks: Sequence[Trunk] = (UPRIGHT,)
+    ) -> None:
         """Leave the current motion and go to rest at `goal`, by a path that is clear of the table.
 
-        aim: the place that it is on at `goal`.
+        aim: the place that it is on at `goal`. trunks: where the trunk may be meanwhile.
         """
         start = self.start_at(now, aim)
         time = turning_time if self.part in ("head", "nod") else return_time
         seconds = time(start.q.tolist(), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), self.limits(now, aim))
-        if not meets_table(direct, self.joints):
+        if not meets_table(direct, self.joints, trunks):
             self.play(Motion(direct, now), aim=aim)
             return
-        # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table.
-        yaw, pitch, elbow = self.angles(now)
-        limits = LIMITS[self.part]
-        above = (yaw, min(max(pitch, 0.2) + 0.2, limits[1].high), min(elbow + 0.4, limits[2].high))
-        legs = (Leg(goal=above, seconds=0.4), Leg(goal=goal, seconds=max(seconds, 0.4)))
-        self.play(Motion(Path(start, legs, limits), now))
+        # Up first: the elbow bends and the upper arm lifts, which takes elbow and hand away from the table. Where the
+        # trunk leans over it the arm is not down before the trunk is up.
+        rising = self.trunk.motion.end - now
+        stay = Leg(goal=tuple(start.q.tolist()), seconds=rising)
+        ways: list[tuple[Leg, ...]] = [(stay, Leg(goal=goal, seconds=seconds))] if rising > RAISING else []
+        seconds = max(seconds, RAISING, rising)
+        ways = [(Leg(goal=goal, seconds=seconds),), *ways]
+        ways += [
+            (Leg(goal=above, seconds=RAISING), Leg(goal=goal, seconds=seconds))
+            for above in raised(self.angles(now), self.joints)
+        ]
+        # Or with the elbow bent all the way.
+        bent, (yaw, pitch, _) = LIMITS[self.part][2].high, self.angles(now)
+        ways.append(
+            (
+                Leg(goal=(yaw, pitch, bent), seconds=max(RAISING, rising)),
+                Leg(goal=(*goal[:2], bent), seconds=seconds),
+                Leg(goal=goal, seconds=RAISING),
+            )
+        )
+        found, best = Motion(direct, now), -math.inf
+        for legs in ways:
+            motion = Motion(Path(start, legs, LIMITS[self.part]), now)
+            if (above := self._above_table(motion, now)) > best:
+                found, best = motion, above
+            if best >= 0.0:
+                break
+        self.play(found)
+
+    def _above_table(self, motion: Motion, now: Seconds) -> Meters:
+        """Least distance by which an arm that moves so stays out of the table as the trunk moves."""
+        at = np.linspace(now, max(motion.end, self.trunk.motion.end), MOMENTS).tolist()
+        trunk = self.trunk.motion.positions(at)[:, self.trunk.columns]
+        return above_table_along(motion.positions(at), self.joints, trunk)
+
+
+def raised(arm: tuple[float, ...], joints: Sequence[str]) -> Iterator[tuple[float, ...]]:
+    """Angles of an arm on a detour home, from lower to higher."""
+    yaw, pitch, elbow = arm
+    for up in UP:
+        highest = [kinematics.LIMIT[joint].high for joint in joints]
+        yield (yaw, min(max(pitch, 0.2) + up, highest[1]), min(elbow + 2 * up, highest[2]))
 
 
 def bases(tracks: Mapping[str, Track]) -> dict[str, float]:
@@ -169,18 +216,51 @@ def joined(states: Sequence[JointMotion]) -> JointMotion:
     )
 
 
-def meets_table(path: Path, joints: Sequence[str]) -> bool:
-    """True if an elbow or hand comes into the table anywhere on `path`."""
-    sides = [side for side in kinematics.SHOULDER if f"{side}_elbow" in joints]
-    if not path.length or not sides:
+def meets_table(
+    path: Path,
+    joints: Sequence[str],
+    trunks: Sequence[Trunk] = (UPRIGHT,),
+    since: Seconds = 0.0,
+) -> bool:
+    """True if an elbow or hand comes into the table anywhere on `path`, with the trunk at any of `trunks`.
+
+    A path of the trunk, too, has it where it goes. since: where on the path it is.
+    """
+    if not path.length:
         return False
-    angles = dict(zip(joints, path.positions(ALONG).T, strict=True))
-    trunk = np.array([angles[joint] for joint in TRUNK]) if TRUNK[0] in angles else None
-    for side in sides:
-        arm = np.array([angles[joint] for joint in kinematics.joints_of(f"{side}_arm")])
-        if (kinematics.above_table(side, arm, trunk) < 0.0).any():
-            return True
-    return False
+    shares = ALONG if tuple(trunks) == (UPRIGHT,) else FINELY
+    if since:
+        shares = min(since / path.length, 1.0) + max(0.0, 1.0 - since / path.length) * shares
+    angles = path.positions(shares)
+    if TRUNK[0] in joints:
+        columns = [list(joints).index(joint) for joint in TRUNK]
+        return above_table_along(angles, joints, angles[:, columns]) < 0.0
+    return (
+        above_table(angles, joints, UPRIGHT if len(trunks) == 1 == trunks.count(UPRIGHT) else np.array(trunks)) < 0.0
+    )
+
+
+def above_table(angles: Array, joints: Sequence[str], trunk: Trunk | Array) -> Meters:
+    """Least distance by which arms stay out of the table; below 0: they do not; infinite: `joints` has none of them.
+
+    angles: poses x joints. trunk: a place of the trunk, or places x 2: each pose counts at each of them.
+    """
+    places = None if isinstance(trunk, tuple) and trunk == UPRIGHT else np.reshape(trunk, (-1, 2)).T[:, :, None]
+    return _least(angles[:, None, :].T if places is not None else angles.T, joints, places)
+
+
+def above_table_along(angles: Array, joints: Sequence[str], trunks: Array) -> Meters:
+    """The same for arms and a trunk that move at once: trunks: the place for each pose, poses x 2."""
+    return _least(angles.T, joints, trunks.T)
+
+
+def _least(angles: Array, joints: Sequence[str], trunks: Array | None) -> Meters:
+    least, row = math.inf, {joint: number for number, joint in enumerate(joints)}
+    for side in kinematics.SHOULDER:
+        if f"{side}_elbow" in row:
+            arm = angles[[row[joint] for joint in kinematics.joints_of(f"{side}_arm")]]
+            least = min(least, float(np.min(kinematics.above_table(side, arm, trunks))))
+    return least
 
 
 def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:

@@ -267,3 +267,18 @@ async def test_looks_and_shifts_over_one_another_tell_their_points_from_the_firs
     assert any(stage.passed for stage in stages)
     for stage in stages:
         assert stage.passed == list(stage.authority.points[: len(stage.passed)])
+
+
+async def test_a_head_whose_motor_is_weak_falls_no_farther_than_its_range() -> None:
+    """It falls onto the end stop of its pitch, which gives way a little."""
+    body = MujocoBody()
+    body.see(WORLD)
+    limit = next(limit for limit in body.capabilities.joints if limit.joint == "neck_pitch")
+    body.switch_faults([BodyFault(kind="weak", part="head")])
+    stage, lowest = Stage(body, Gaze(id="look", target="near-right"), "end"), 0.0
+    for _ in range(400):
+        await asyncio.sleep(0.005)
+        lowest = min(lowest, next(each.angle for each in body.state().pose.joints if each.joint == "neck_pitch"))
+    with pytest.raises(BodyFailed):
+        await stage.over()
+    assert limit.low <= lowest < limit.low + math.radians(1.0)
