@@ -5,7 +5,6 @@ knows only its own joints; what one says of poses is completed with where the ot
 """
 
 import asyncio
-from collections import Counter
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from math import inf
@@ -59,9 +58,6 @@ class ComposedBody(Body):
         refuse_carried(self._members)
         self.capabilities = _joined(self._members)
         self._world = World(entities=())
-        self._moved_by: Counter[Member] = Counter()
-        """Behaviors of each driver that move more than a face or a voice."""
-        self._stillness = {member: Gate() for member in self._members}
         for member in self._members:
             member.body.on_fault = self._tell_fault
             member.body.on_lips = self.move_lips
@@ -156,14 +152,9 @@ class ComposedBody(Body):
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         member = self._performer(behavior)
-        moves = not {LIPS_PART, VOICE_PART}.issuperset(PARTS_OF_TYPES.get(type_name(behavior), ()))
-        self._moved_by[member] += moves
-        try:
-            async with aclosing(member.body.perform(behavior, authority)) as stream:
-                async for progress in stream:
-                    yield progress
-        finally:
-            self._moved_by[member] -= moves
+        async with aclosing(member.body.perform(behavior, authority)) as stream:
+            async for progress in stream:
+                yield progress
 
     def _performer(self, behavior: BlockBehavior) -> Member:
         """The driver that is to perform a behavior now. Raises BehaviorRefused."""
@@ -225,16 +216,9 @@ class ComposedBody(Body):
     def idle(self) -> Idle:
         added: dict[str, Radians] = {}
         quick_at = inf
-        faces = {limit.joint for limit in self.capabilities.joints if limit.part == LIPS_PART}
-        now = asyncio.get_running_loop().time()
         for member in self._members:
-            # A driver knows when its own parts do something, and not that another's do.
-            are_others_still = self._moved_by.total() == self._moved_by[member]
-            share = self._stillness[member].share(now, is_open=are_others_still)
             idle = member.body.idle()
-            for joint, angle in idle.added.items():
-                if member.tells_of(joint) and (by := angle if joint in faces else share * angle):
-                    added[joint] = by
+            added |= {joint: angle for joint, angle in idle.added.items() if member.tells_of(joint)}
             quick_at = min(quick_at, idle.quick_at)
         return Idle(added=added, quick_at=quick_at)
 

@@ -25,7 +25,7 @@ from engage_hri.services.control.composed import ComposedBody, composed
 from engage_hri.services.control.members import Member
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract
-from engage_hri.services.control.testing.stage import Stage, performed
+from engage_hri.services.control.testing.stage import performed
 from engage_hri.services.control.torso.body import SimulatedBody
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")
@@ -331,28 +331,3 @@ async def test_a_fault_without_a_part_is_played_once_by_each_driver_that_can(nam
     assert told.gaze is not None
     assert state.gaze is not None
     assert cosine == pytest.approx(sum(a * b for a, b in zip(told.gaze.axis, state.gaze.axis, strict=True)))
-
-
-@pytest.mark.parametrize("kind", ["a pointing that waits", "a speech"])
-async def test_breath_gives_way_to_what_another_driver_does(kind: str) -> None:
-    """The arms of one driver point and wait: the trunk of another is still. Words move no trunk."""
-    trunk = Member("trunk", SimulatedBody(alive=True), ("head", "torso", "face"))
-    arms = Member("arms", SimulatedBody(), ("left_arm", "right_arm", "voice"))
-    body = ComposedBody([trunk, arms])
-    body.see(WORLD)
-    behavior = Pointing(id="it", target="far-left", mode="LEFT_HAND")
-    is_speech = kind == "a speech"
-    stage = Stage(body, Speech(id="it", text="word " * 60), "end") if is_speech else Stage(body, behavior, "stroke")
-    body.idle()
-    await asyncio.sleep(1.0)
-    leaned = 0.0
-    for _ in range(100):
-        leaned = max(leaned, abs(body.idle().added.get("torso_lean", 0.0)))
-        await asyncio.sleep(0.05)
-    assert (leaned > 0.001) == is_speech
-
-    stage.authority.revoke()
-    await stage.over()
-    body.idle()
-    await asyncio.sleep(3.0)
-    assert body.idle().added["torso_lean"] == trunk.body.idle().added["torso_lean"]
