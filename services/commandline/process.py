@@ -6,6 +6,7 @@ import signal
 import sys
 import uuid
 from collections.abc import Coroutine
+from contextlib import suppress
 from importlib import import_module
 from types import FrameType
 from typing import Any, TypeVar
@@ -94,15 +95,26 @@ async def forever() -> None:
 
 async def until_closed() -> None:
     """Wait until the other end of standard input is closed."""
-    reader = asyncio.StreamReader()
-    transport, _ = await asyncio.get_running_loop().connect_read_pipe(
-        lambda: asyncio.StreamReaderProtocol(reader), sys.stdin
-    )
-    try:
-        while await reader.read(1024):
-            pass
-    finally:
-        transport.close()
+    while await typed():
+        pass
+
+
+async def typed() -> bytes:
+    """Wait for standard input, and return the next of it; empty at its end.
+
+    No loop can wait for a file or /dev/null (uvloop ends the process as it tries to), and they never let wait.
+    """
+    if sys.stdin is None:  # it was closed before we were started
+        return b""
+    loop, descriptor = asyncio.get_running_loop(), sys.stdin.fileno()
+    ready = asyncio.Event()
+    with suppress(PermissionError):
+        loop.add_reader(descriptor, ready.set)
+        try:
+            await ready.wait()
+        finally:
+            loop.remove_reader(descriptor)
+    return os.read(descriptor, 4096)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
