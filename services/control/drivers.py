@@ -2,8 +2,8 @@
 
     body = made(config)             # of `control.body`, `control.voice` and `control.drivers`, inside the event loop
 
-A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodies`, `package.module:Class`, or
-`FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
+A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodies`, `package.module:Class`, which
+may lie in the current folder, or `FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
 """
 
 import inspect
@@ -128,6 +128,7 @@ def load(spec: str) -> Driver:
         module = _file(Path(file), spec)
         return _attribute(module, name, spec) if colon else _only(module, spec)
     if colon:
+        _find_beside(Path.cwd())
         return _attribute(_imported(where, spec), name, spec)
     offered = {point.name: point for point in entry_points(group=GROUP)}
     if spec in offered:
@@ -218,8 +219,7 @@ def _file(path: Path, spec: str) -> ModuleType:
     assert plan is not None
     assert plan.loader is not None
     module = module_from_spec(plan)
-    if (folder := str(path.resolve().parent)) not in sys.path:
-        sys.path.append(folder)
+    _find_beside(path.resolve().parent)
     sys.modules[name] = module
     try:
         plan.loader.exec_module(module)
@@ -229,6 +229,12 @@ def _file(path: Path, spec: str) -> ModuleType:
             raise
         raise _refusal(f"it cannot be imported: {words_of(error)}", spec, place_of(error)) from error
     return module
+
+
+def _find_beside(folder: Path) -> None:
+    """Let what lies in a folder be imported, after all that is installed."""
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
 
 
 def _attribute(module: ModuleType, name: str, spec: str) -> Driver:

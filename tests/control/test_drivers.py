@@ -117,6 +117,13 @@ async def test_an_installed_package_offers_bodies(monkeypatch: pytest.MonkeyPatc
         drivers.made(ControlConfig(body="offred"))
 
 
+async def test_a_module_may_lie_in_the_current_folder(file: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(file.parent)
+
+    assert type(_made(ControlConfig(body="my_robot:Mine"))).__name__ == "Mine"
+    sys.modules.pop("my_robot")
+
+
 def test_a_function_may_make_the_body(file: Path):
     file.write_text(PLAIN + "\ndef make():\n    return Mine()\n")
 
