@@ -26,6 +26,7 @@ from engage_hri.services.control.body import Body
 from engage_hri.services.control.composed import Member, composed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
+from engage_hri.services.runtime.configuration import explained
 
 GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
@@ -165,9 +166,8 @@ def _settings(asked: Named, driver: Driver, config: ControlConfig) -> Struct | N
     try:
         return msgspec.convert(given, kind)  # type: ignore[no-any-return]
     except msgspec.ValidationError as error:
-        reason, _, place = str(error).partition(" - at `$")
-        key = f"{where}{place.strip('`')}"
-        raise _refusal(reason, key, f"known are {', '.join(kind.__struct_fields__)}") from error
+        reason, key = explained(error, kind)
+        raise _refusal(reason, f"{where}.{key}".rstrip("."), "") from error
 
 
 def _given(asked: Named, driver: Driver, config: ControlConfig) -> tuple[Mapping[str, Any], str]:

@@ -3,9 +3,10 @@
 import sys
 from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
@@ -50,9 +51,16 @@ class Bare(Body):
     def see(self, world: World) -> None: ...
 
 
+class Pin(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    use: Literal["in", "out"]
+
+
 class Port(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     device: str = "/dev/null"
     baud: int = 9600
+    parity: Literal["none", "even"] | None = None
+    stops: Annotated[int, Meta(ge=1, le=2)] = 1
+    pins: tuple[Pin, ...] = ()
 
 
 class Serial(Bare):
@@ -176,9 +184,13 @@ def test_what_is_no_body_is_refused_with_what_to_do(file: Path, name: str, text:
         (
             "Serial",
             {"bauds": 1},
-            "control.drivers.Serial: no setting bauds (known are device, baud)",
+            "control.drivers.Serial: no setting bauds (known are device, baud, parity, stops, pins)",
         ),
         ("Serial", {"baud": "fast"}, "control.drivers.Serial.baud: Expected `int`, got `str`"),
+        ("Serial", {"parity": "evn"}, "control.drivers.Serial.parity: 'evn' is none of 'none', 'even'"),
+        ("Serial", {"stops": 3}, "control.drivers.Serial.stops: Expected `int` <= 2"),
+        ("Serial", {"pins": [{"use": "in"}, {"use": "on"}]}, "Serial.pins[1].use: 'on' is none of 'in', 'out'"),
+        ("Serial", {"pins": [{"uses": "in"}]}, "Serial.pins[0]: unknown key `uses`; do you mean `use`?"),
         (
             "Bare",
             {"baud": 1},
