@@ -361,6 +361,7 @@ def _joined(members: Sequence[Member]) -> Capabilities:
         gaze_half_angle=max((one.gaze_half_angle for one in each), default=none.gaze_half_angle),
         pointing_radius=max((one.pointing_radius for one in each), default=none.pointing_radius),
         faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
+        fault_kinds=tuple(kind for one in each for kind in one.fault_kinds),
     )
 
 

@@ -19,7 +19,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.composed import ComposedBody, Member
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
-from engage_hri.services.control.mujoco.faults import OURS, refuse
+from engage_hri.services.control.mujoco.faults import OURS, refuse, told
 from engage_hri.services.control.mujoco.film import Film, Frame
 from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.ik import Chain
@@ -163,4 +163,5 @@ def _capabilities(described: Description, stage: Stage, of_parts: Capabilities) 
         joints=joints,
         reach=described.reach,
         faults=FAULTS,
+        fault_kinds=told(FAULTS),
     )

@@ -75,7 +75,7 @@ class Physics:
         self._u = np.array(servos, dtype=int)
         self._lead = np.array([motor.damping / motor.stiffness for motor in motors.values()])
         self._drag = np.array([motor.drag for motor in motors.values()])
-        self._limit = np.array([motor.limit for motor in motors.values()])
+        self._limit = np.array([motor.limit for motor in motors.values()], dtype=float)
         self._stick, self._bent = np.zeros(len(motors)), np.zeros(len(motors))
         self._friction = np.array([motor.friction for motor in motors.values()])
         self._stiffness = np.array([motor.stiffness for motor in motors.values()])

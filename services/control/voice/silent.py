@@ -37,13 +37,13 @@ class SilentVoice(Speaker):
         if not isinstance(behavior, Speech):
             return unsupported(behavior)
         if self._is_voiceless:
-            return unspeakable(behavior, _fault(behavior, "the voice is mute"))
+            return unspeakable(behavior, _fault(behavior, "the voice cannot speak"))
         return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         behavior = speech(behavior)
         if self._is_voiceless:
-            raise BehaviorRefused(_fault(behavior, "the voice is mute"))
+            raise BehaviorRefused(_fault(behavior, "the voice cannot speak"))
         await self._voice.wait_for_silence(authority)
         if authority.revoked is not None:
             return
@@ -53,7 +53,7 @@ class SilentVoice(Speaker):
                 if isinstance(progress, Reached) and progress.sync == "end":
                     return
         if self._is_voiceless:
-            raise BodyFailed(_fault(behavior, "the voice is mute"))
+            raise BodyFailed(_fault(behavior, "the voice cannot speak"))
 
     @property
     def faults(self) -> tuple[BodyFault, ...]:
