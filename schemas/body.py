@@ -300,8 +300,9 @@ class JointLimit(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class FaultKind(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A kind of fault.
 
-    kind: its name, where no table has it. does: what goes wrong, and what one sees of it. on: what `part` may name; empty: it takes none. voice: true if the
-    voice is among these parts. parts: the only ones that it may name; empty: all of which `on` tells.
+    kind: its name, where no table has it. does: what goes wrong, and what one sees of it.
+    on: what `part` may name; empty: it takes none. voice: true if the voice is among these parts. parts: the only
+    ones that it may name; empty: all of which `on` tells.
     amount: what `amount` is, with its unit; empty: it takes none. usual: the amount where none is given; None: as
     `amount` says. low, high: the range of the amount. needs_amount: true if there must be one.
     before, behavior: true if it takes that field.
