@@ -8,7 +8,8 @@ may lie in the current folder, or `FILE.py:Class`. `head,face=NAME` takes only t
 
 import inspect
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
@@ -20,6 +21,7 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.body import Body
@@ -45,10 +47,14 @@ Driver = Callable[..., Body]
 
 
 class Named(Struct, frozen=True):
-    """A driver as it was asked for. spec: its name. parts: the only ones that it is to have; empty: all it has."""
+    """A driver as it was asked for, as a body or as the voice.
+
+    spec: its name. parts: the only ones that it is to have; empty: all it has.
+    """
 
     spec: str
     parts: tuple[str, ...] = ()
+    is_voice: bool = False
 
     @property
     def name(self) -> str:
@@ -72,10 +78,11 @@ def made(config: ControlConfig, *, is_guarded: bool = True) -> Body:
     """
     members = []
     for each in _asked(config):
-        body = make(each, config)
-        if is_guarded and each.spec not in BUILT_IN:
-            body = GuardedBody(each.spec, body)
-        members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
+        with _called(each):
+            body = make(each, config)
+            if is_guarded and each.spec not in BUILT_IN:
+                body = GuardedBody(each.spec, body)
+            members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
     return composed(members)
 
 
@@ -83,11 +90,12 @@ def check(config: ControlConfig) -> None:
     """Refuse drivers that cannot be had, without making a body. Raises InputRefused."""
     for each in _asked(config):
         if each.spec != "simulated":
-            _settings(each, load(each.spec), config)
+            with _called(each):
+                _settings(each, load(each.spec), config)
 
 
 def _asked(config: ControlConfig) -> list[Named]:
-    voice = [Named(config.voice, ("voice",))] if config.voice else []
+    voice = [Named(config.voice, ("voice",), is_voice=True)] if config.voice else []
     return [*map(named, config.bodies), *voice]
 
 
@@ -271,6 +279,22 @@ def _bodies(module: ModuleType) -> Sequence[str]:
 
 
 # -- words --------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _called(asked: Named) -> Iterator[None]:
+    """Say of a driver that was asked for as the voice that it is one, and no body."""
+    try:
+        yield
+    except InputRefused as error:
+        fault = error.fault
+        if asked.is_voice and fault.where == f"body {asked.spec}":
+            start = "no body "
+            reason = (
+                f"no voice {fault.reason.removeprefix(start)}" if fault.reason.startswith(start) else fault.reason
+            )
+            raise InputRefused(replace(fault, where=f"voice {asked.spec}", reason=reason)) from error
+        raise
 
 
 def _refusal(reason: str, spec: str, advice: str) -> InputRefused:

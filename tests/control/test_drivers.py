@@ -205,6 +205,16 @@ async def test_wrong_settings_are_refused_by_their_key(name: str, settings: dict
     assert reason in str(refused.value)
 
 
+@pytest.mark.parametrize("does", [drivers.check, drivers.made])
+async def test_a_voice_is_refused_as_a_voice_and_a_body_of_the_same_name_as_a_body(does):
+    with pytest.raises(InputRefused, match=r"^voice nosuch: no voice 'nosuch' \(known are espeak"):
+        does(ControlConfig(voice="nosuch"))
+    with pytest.raises(InputRefused, match=r"^body nosuch: no body 'nosuch' \(known are espeak"):
+        does(ControlConfig(body="nosuch"))
+    with pytest.raises(InputRefused, match=r"^voice .*: it has no part voice"):
+        drivers.made(ControlConfig(voice=f"{__name__}:Bare"))
+
+
 async def test_a_voice_takes_the_place_of_the_one_of_the_body():
     body = drivers.made(ControlConfig(body="simulated", voice="simulated"))
 
