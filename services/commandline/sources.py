@@ -27,7 +27,7 @@ class InputFile(Struct, frozen=True, kw_only=True):
 
     @contextmanager
     def naming_file(self) -> Iterator[None]:
-        """Add this file to the place of each InputRefused in the body of `with`, but for those of the robot's body."""
+        """Add this file to the place of each InputRefused in the body of `with`, but for those of the robot."""
         try:
             yield
         except InputRefused as error:
