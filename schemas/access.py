@@ -134,7 +134,7 @@ TABLE: tuple[Row, ...] = (
     *(
         Row("perception", "subscribes", key)
         for key in (keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
-                    keys.ROBOT_MOTION, keys.ROBOT_SEEN)
+                    keys.ROBOT_MOTION, keys.ROBOT_SEEN, keys.BODY_FAULTS)
     ),
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),

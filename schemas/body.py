@@ -8,6 +8,7 @@ each type are in docs/control.md: before and after the stroke of an arm or a nod
 a gaze, a face or a posture.
 """
 
+from math import inf
 from typing import ClassVar, Literal, Self
 
 from msgspec import Struct
@@ -296,6 +297,31 @@ class JointLimit(Struct, frozen=True, kw_only=True, omit_defaults=True):
     acceleration: float
 
 
+class FaultKind(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A kind of fault.
+
+    kind: its name, where no table has it. does: what goes wrong, and what one sees of it.
+    on: what `part` may name; empty: it takes none. voice: true if the voice is among these parts. parts: the only
+    ones that it may name; empty: all of which `on` tells.
+    amount: what `amount` is, with its unit; empty: it takes none. usual: the amount where none is given; None: as
+    `amount` says. low, high: the range of the amount. needs_amount: true if there must be one.
+    before, behavior: true if it takes that field.
+    """
+
+    kind: str = ""
+    does: str
+    on: Literal["", "part", "joint", "part or joint"] = ""
+    voice: bool = False
+    parts: tuple[str, ...] = ()
+    amount: str = ""
+    usual: float | None = None
+    low: float = 0.0
+    high: float = inf
+    needs_amount: bool = False
+    before: bool = False
+    behavior: bool = False
+
+
 class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_defaults=True):
     """Abilities of a body. Answer to `DescribeBody`.
 
@@ -314,6 +340,8 @@ class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_d
     """Radius of the pointing cylinder."""
     faults: tuple[str, ...] = ()
     """Kinds of faults that it can play when it is told to (`SwitchFaults`); none: a real body."""
+    fault_kinds: tuple[FaultKind, ...] = ()
+    """What those of them are that it has alone, or means in another way than `schemas/body_faults.py` says."""
 
 
 class RobotSeen(Struct, frozen=True, kw_only=True, tag="robot_seen", omit_defaults=True):

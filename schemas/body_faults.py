@@ -1,12 +1,10 @@
 """Faults of a simulated body: what can be switched on while it runs, and what is on. Thesis 4.2.2, 4.5.3, 5.4.3."""
 
 from collections.abc import Mapping
-from math import inf
-from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.body import Capabilities, FaultKind
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Stamp
@@ -53,28 +51,6 @@ class BodyFaults(Struct, frozen=True, kw_only=True, tag="body_faults", omit_defa
 
     at: Stamp
     faults: tuple[BodyFault, ...] = ()
-
-
-class FaultKind(Struct, frozen=True, kw_only=True):
-    """A kind of fault.
-
-    does: what goes wrong, and what one sees of it. on: what `part` may name; empty: it takes none. voice: true if the
-    voice is among these parts.
-    amount: what `amount` is, with its unit; empty: it takes none. usual: the amount where none is given; None: as
-    `amount` says. low, high: the range of the amount. needs_amount: true if there must be one.
-    before, behavior: true if it takes that field.
-    """
-
-    does: str
-    on: Literal["", "part", "joint", "part or joint"] = ""
-    voice: bool = False
-    amount: str = ""
-    usual: float | None = None
-    low: float = 0.0
-    high: float = inf
-    needs_amount: bool = False
-    before: bool = False
-    behavior: bool = False
 
 
 KINDS: Mapping[str, FaultKind] = {
@@ -124,16 +100,21 @@ KINDS: Mapping[str, FaultKind] = {
         amount="share of these messages, 0 to 1", usual=0.1, high=1.0,
     ),
 }  # fmt: skip
-"""Faults that all simulated bodies mean alike. A body may have others, of which it says itself what they do."""
+"""Faults that simulated bodies mean alike, but for those of which they say something else in their abilities."""
 SYNCS = SYNC_POINTS[1:]
 """Sync points that a fault may come before."""
+
+
+def kind_of(name: str, body: Capabilities) -> FaultKind | None:
+    """What a kind of fault is for a body; None: it does not say so."""
+    return next((kind for kind in body.fault_kinds if kind.kind == name), KINDS.get(name))
 
 
 def flaw(fault: BodyFault, body: Capabilities) -> str:
     """Say why a body cannot play a fault, as far as that is known without it; empty: it can."""
     if fault.kind not in body.faults:
         return f"this body cannot play {fault.kind!r}; it can play {', '.join(body.faults) or 'no fault'}"
-    if (kind := KINDS.get(fault.kind)) is None:
+    if (kind := kind_of(fault.kind, body)) is None:
         return ""
     superfluous = [
         name
@@ -158,6 +139,8 @@ def flaw(fault: BodyFault, body: Capabilities) -> str:
 
 def parts_of(kind: FaultKind, body: Capabilities) -> tuple[str, ...]:
     """Names of the parts and joints of a body that a fault of this kind may concern. The face has no angles."""
+    if kind.parts:
+        return tuple(part for part in kind.parts if part in body.parts)
     parts = [part for part in body.parts if kind.voice or part != "voice"] if "part" in kind.on else []
     joints = [limit.joint for limit in body.joints if limit.part != "face"] if "joint" in kind.on else []
     return (*(part for part in parts if not joints or part not in ("face", "voice")), *joints)

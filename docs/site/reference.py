@@ -40,6 +40,10 @@ BESIDE = {
     "Writing a body": (
         "schemas.body.Capabilities", "schemas.body.Estimate", "schemas.body.Phase", "services.control.body.BodyState",
         "services.control.body.Spoke", "services.control.body.MouthShape",
+        "services.control.voice.synthesis.Synthesizer", "services.control.voice.synthesis.Phrase",
+        "services.control.voice.synthesis.Said", "services.control.voice.synthesis.Heard",
+        "services.control.voice.synthesis.Phone", "services.control.voice.sounding.SoundingVoice",
+        "services.control.voice.settings.VoiceSettings",
     ),
     "What goes wrong": ("services.control.body.BodyFailed", "schemas.faults.NoReply"),
 }  # fmt: skip

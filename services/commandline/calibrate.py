@@ -1,7 +1,5 @@
 """Command `engage calibrate body`: measure where a body really looks and points, and write what corrects it."""
 
-import asyncio
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +13,9 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.folder import ResultFile
 from engage_hri.services.commandline.options import Configured
-from engage_hri.services.commandline.process import DONE, run
+from engage_hri.services.commandline.process import DONE, run, typed
 from engage_hri.services.control.body import Body, BodyState
 from engage_hri.services.control.calibration import PARTS, WIDEST, Calibration, written
 from engage_hri.services.control.fitting import Fit, Measurement, fit
@@ -56,7 +55,7 @@ class AskedEyes:
     """Eyes of whoever sits at the terminal, and types a place."""
 
     def __init__(self) -> None:
-        self._lines: asyncio.StreamReader | None = None
+        self._typed = b""
 
     async def place(self, part: str, mark: Entity, state: BodyState) -> Vector | None:
         """Ask until a place is typed, or nothing. Raises RunFailed at the end of the input."""
@@ -65,7 +64,8 @@ class AskedEyes:
             print(
                 f"{part} is on {mark.id} ({meant}). Where really? x y z in metres, or nothing: ", end="", flush=True
             )
-            if not (line := await self._line()).strip():
+            line = await self._line()
+            if not line.strip():
                 return None
             try:
                 x, y, z = (float(each) for each in line.replace(",", " ").split())
@@ -75,12 +75,13 @@ class AskedEyes:
             return (x, y, z)
 
     async def _line(self) -> str:
-        if self._lines is None:
-            self._lines = asyncio.StreamReader()
-            protocol = asyncio.StreamReaderProtocol(self._lines)
-            await asyncio.get_running_loop().connect_read_pipe(lambda: protocol, sys.stdin)
-        if not (line := await self._lines.readline()):
-            raise RunFailed(Fault(reason="standard input has ended before all places were typed", where="--ask"))
+        while b"\n" not in self._typed:
+            more = await typed()
+            if not (more or self._typed):
+                reason = "standard input has ended before all places were typed"
+                raise RunFailed(Fault(reason=reason, where="--ask"))
+            self._typed += more or b"\n"
+        line, _, self._typed = self._typed.partition(b"\n")
         return line.decode(errors="replace")
 
 
@@ -92,12 +93,18 @@ def main(options: Options) -> int:
             Fault(reason=f"no part {unknown[0]!r}", where="--part", advice=f"known: {', '.join(PARTS)}")
         )
     known = None if options.measurements is None else read_measurements(options.measurements)
-    run(_calibrate(options, config, parts, known), virtual_time=not options.ask)
+    out, record = ResultFile(options.out), None if options.record is None else ResultFile(options.record)
+    run(_calibrate(options, config, parts, known, out, record), virtual_time=not options.ask)
     return DONE
 
 
 async def _calibrate(
-    options: Options, config: Config, parts: Sequence[str], known: Sequence[Measurement] | None
+    options: Options,
+    config: Config,
+    parts: Sequence[str],
+    known: Sequence[Measurement] | None,
+    out: ResultFile,
+    record: ResultFile | None,
 ) -> None:
     from engage_hri.services.control.drivers import made
     from engage_hri.services.simulation.still import load_world
@@ -117,8 +124,8 @@ async def _calibrate(
     else:
         found, checked = list(known), {}
         fits = _fits(body, parts, found)
-    if options.record is not None:
-        options.record.write_bytes(b"".join(msgspec.json.encode(each) + b"\n" for each in found))
+    if record is not None:
+        record.write(b"".join(msgspec.json.encode(each) + b"\n" for each in found))
     if not fits:
         raise RunFailed(
             Fault(
@@ -129,8 +136,7 @@ async def _calibrate(
     offsets = {joint: offset for each in fits for joint, offset in each.offsets.items()}
     errors = {each.part: min(each.error, WIDEST) for each in fits}
     told = {each.part: [*said(each), *checked.get(each.part, ())] for each in fits}
-    text = written(Calibration(offsets=offsets, errors=errors), body.capabilities.body, told)
-    options.out.write_text(text, encoding="utf-8")
+    out.write(written(Calibration(offsets=offsets, errors=errors), body.capabilities.body, told).encode())
     for part, lines in told.items():
         print("\n    ".join((f"{part}: {lines[0]}", *lines[1:], f"within {errors[part]:.2f} degrees 19 times in 20")))
     print(f"written: {options.out}; it counts with control.calibration={options.out}")

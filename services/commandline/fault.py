@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from engage_hri.schemas.body import Capabilities
-from engage_hri.schemas.body_faults import KINDS, BodyFault, FaultKind, parts_of, words
+from engage_hri.schemas.body import Capabilities, FaultKind
+from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, words
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
@@ -80,8 +80,8 @@ def listed(body: Capabilities, on: tuple[BodyFault, ...]) -> str:
     """Text about all faults that a body can play, and those that are on."""
     lines = []
     for name in body.faults:
-        kind = KINDS.get(name)
-        lines.append(f"{name}: {kind.does if kind else 'a fault of this body alone'}")
+        kind = kind_of(name, body)
+        lines.append(f"{name}: {kind.does if kind else 'a fault of this body, which does not say what it does'}")
         lines += [f"    --{option}: {what}" for option, what in (_options(kind, body) if kind else {}).items()]
     lines.append(f"on: {', '.join(map(words, on)) or 'nothing'}" if body.faults else "this body can play no faults")
     return "\n".join(lines)

@@ -4,18 +4,25 @@ import asyncio
 import os
 import signal
 import sys
+import time
 import uuid
 from collections.abc import Coroutine
+from contextlib import suppress
 from importlib import import_module
 from types import FrameType
 from typing import Any, TypeVar
 
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
 DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE
 """Exit codes: all done; input refused, nothing moved; failed while running; reader of the output gone."""
 SHOW_CURSOR = b"\x1b[?25h"
+AT_ONCE: Seconds = 1.0
+"""Time within which two SIGTERM are one: `timeout` tells a process and its group, systemd and `up` tell services."""
+_terminated: Seconds | None = None
+"""When SIGTERM came last, by time.monotonic."""
 _stopping = [signal.SIGINT]
 """Signals received; the last one is the reason to stop."""
 
@@ -23,8 +30,8 @@ _stopping = [signal.SIGINT]
 def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
     """Run to the end, on uvloop if it is installed (measured a fifth faster on Zenoh), or in virtual time.
 
-    Ctrl-C and SIGTERM cancel `main`; when it has ended, KeyboardInterrupt is raised. A second Ctrl-C does not wait
-    for that: it ends the process. A SIGTERM is ignored after either.
+    Ctrl-C and SIGTERM cancel `main`; when it has ended, KeyboardInterrupt is raised. A second one does not wait for
+    that: it ends the process. The first SIGTERM after a Ctrl-C is none: `up` sends it to services that both reach.
     """
     # asyncio.Runner cancels `main` only if it finds Python's handler. A shell that starts us in the background has
     # had Ctrl-C ignored.
@@ -39,6 +46,8 @@ def run(main: Coroutine[Any, Any, T], *, virtual_time: bool = False) -> T:
 def end_like_ctrl_c() -> None:
     """Let a SIGTERM end what runs loops of its own as Ctrl-C does, with KeyboardInterrupt."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    global _terminated
+    _terminated = None
     del _stopping[1:]
     signal.signal(signal.SIGTERM, _terminate)
 
@@ -61,7 +70,13 @@ async def _interruptible(main: Coroutine[Any, Any, T]) -> T:
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    """End the process at once, and show the cursor that a live view has hidden."""
+    """End the process at once, and show the cursor that a live view has hidden.
+
+    Said is where, if that is in a driver's call that does not come back.
+    """
+    guarded = sys.modules.get("engage_hri.services.control.guarded")
+    if guarded is not None and sys.stderr is not None and (told := guarded.held_up(frame)):
+        os.write(sys.stderr.fileno(), f"{told}\n".encode(errors="backslashreplace"))
     if sys.stdout is not None and sys.stdout.isatty():
         os.write(sys.stdout.fileno(), SHOW_CURSOR)
     os._exit(interrupted())
@@ -94,22 +109,37 @@ async def forever() -> None:
 
 async def until_closed() -> None:
     """Wait until the other end of standard input is closed."""
-    reader = asyncio.StreamReader()
-    transport, _ = await asyncio.get_running_loop().connect_read_pipe(
-        lambda: asyncio.StreamReaderProtocol(reader), sys.stdin
-    )
-    try:
-        while await reader.read(1024):
-            pass
-    finally:
-        transport.close()
+    while await typed():
+        pass
+
+
+async def typed() -> bytes:
+    """Wait for standard input, and return the next of it; empty at its end.
+
+    No loop can wait for a file or /dev/null (uvloop ends the process as it tries to), and they never let wait.
+    """
+    if sys.stdin is None:  # it was closed before we were started
+        return b""
+    loop, descriptor = asyncio.get_running_loop(), sys.stdin.fileno()
+    ready = asyncio.Event()
+    with suppress(PermissionError):
+        loop.add_reader(descriptor, ready.set)
+        try:
+            await ready.wait()
+        finally:
+            loop.remove_reader(descriptor)
+    return os.read(descriptor, 4096)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
+    global _terminated
+    before, _terminated = _terminated, time.monotonic()
     is_stopping = signal.getsignal(signal.SIGINT) is _leave
-    if not is_stopping and _stopping[-1] != signal.SIGTERM:  # `timeout` sends it twice, to the process and its group
+    if before is None and not is_stopping:
         _stopping.append(signal.SIGTERM)
         signal.raise_signal(signal.SIGINT)
+    elif before is not None and _terminated - before > AT_ONCE:
+        _leave(number, frame)
 
 
 def interrupted() -> int:

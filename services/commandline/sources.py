@@ -27,12 +27,12 @@ class InputFile(Struct, frozen=True, kw_only=True):
 
     @contextmanager
     def naming_file(self) -> Iterator[None]:
-        """Add this file to the place of each InputRefused that is raised in the body of `with`."""
+        """Add this file to the place of each InputRefused in the body of `with`, but for those of the robot."""
         try:
             yield
         except InputRefused as error:
             fault = error.fault
-            if not fault.where.startswith(str(self.path)):
+            if fault.service != "control" and not fault.where.startswith(str(self.path)):
                 where = ": ".join(part for part in (str(self.path), fault.where) if part)
                 fault = msgspec.structs.replace(fault, where=where)
             raise InputRefused(fault) from error

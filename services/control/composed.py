@@ -26,7 +26,7 @@ from engage_hri.services.control.body import (
     MovementAuthority,
     Progress,
 )
-from engage_hri.services.control.extras import Gate, Idle, Seen
+from engage_hri.services.control.extras import Idle, Seen
 from engage_hri.services.control.members import (
     GAZE_PART,
     LIPS_PART,
@@ -320,4 +320,5 @@ def _joined(members: Sequence[Member]) -> Capabilities:
         gaze_half_angle=max((one.gaze_half_angle for one in each), default=none.gaze_half_angle),
         pointing_radius=max((one.pointing_radius for one in each), default=none.pointing_radius),
         faults=tuple(dict.fromkeys(kind for one in each for kind in one.faults)),
+        fault_kinds=tuple(kind for one in each for kind in one.fault_kinds),
     )

@@ -2,13 +2,14 @@
 
     body = made(config)             # of `control.body`, `control.voice` and `control.drivers`, inside the event loop
 
-A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodies`, `package.module:Class`, or
-`FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
+A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodies`, `package.module:Class`, which
+may lie in the current folder, or `FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
 """
 
 import inspect
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
@@ -20,6 +21,7 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.body import Body
@@ -27,6 +29,7 @@ from engage_hri.services.control.composed import composed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
 from engage_hri.services.control.members import Member
+from engage_hri.services.runtime.configuration import explained
 
 GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
@@ -45,10 +48,14 @@ Driver = Callable[..., Body]
 
 
 class Named(Struct, frozen=True):
-    """A driver as it was asked for. spec: its name. parts: the only ones that it is to have; empty: all it has."""
+    """A driver as it was asked for, as a body or as the voice.
+
+    spec: its name. parts: the only ones that it is to have; empty: all it has.
+    """
 
     spec: str
     parts: tuple[str, ...] = ()
+    is_voice: bool = False
 
     @property
     def name(self) -> str:
@@ -72,10 +79,11 @@ def made(config: ControlConfig, *, is_guarded: bool = True) -> Body:
     """
     members = []
     for each in _asked(config):
-        body = make(each, config)
-        if is_guarded and each.spec not in BUILT_IN:
-            body = GuardedBody(each.spec, body)
-        members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
+        with _called(each):
+            body = make(each, config)
+            if is_guarded and each.spec not in BUILT_IN:
+                body = GuardedBody(each.spec, body)
+            members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
     return composed(members)
 
 
@@ -83,11 +91,12 @@ def check(config: ControlConfig) -> None:
     """Refuse drivers that cannot be had, without making a body. Raises InputRefused."""
     for each in _asked(config):
         if each.spec != "simulated":
-            _settings(each, load(each.spec), config)
+            with _called(each):
+                _settings(each, load(each.spec), config)
 
 
 def _asked(config: ControlConfig) -> list[Named]:
-    voice = [Named(config.voice, ("voice",))] if config.voice else []
+    voice = [Named(config.voice, ("voice",), is_voice=True)] if config.voice else []
     return [*map(named, config.bodies), *voice]
 
 
@@ -129,6 +138,7 @@ def load(spec: str) -> Driver:
         module = _file(Path(file), spec)
         return _attribute(module, name, spec) if colon else _only(module, spec)
     if colon:
+        _find_beside(Path.cwd())
         return _attribute(_imported(where, spec), name, spec)
     offered = {point.name: point for point in entry_points(group=GROUP)}
     if spec in offered:
@@ -165,9 +175,8 @@ def _settings(asked: Named, driver: Driver, config: ControlConfig) -> Struct | N
     try:
         return msgspec.convert(given, kind)  # type: ignore[no-any-return]
     except msgspec.ValidationError as error:
-        reason, _, place = str(error).partition(" - at `$")
-        key = f"{where}{place.strip('`')}"
-        raise _refusal(reason, key, f"known are {', '.join(kind.__struct_fields__)}") from error
+        reason, key = explained(error, kind)
+        raise _refusal(reason, f"{where}.{key}".rstrip("."), "") from error
 
 
 def _given(asked: Named, driver: Driver, config: ControlConfig) -> tuple[Mapping[str, Any], str]:
@@ -219,8 +228,7 @@ def _file(path: Path, spec: str) -> ModuleType:
     assert plan is not None
     assert plan.loader is not None
     module = module_from_spec(plan)
-    if (folder := str(path.resolve().parent)) not in sys.path:
-        sys.path.append(folder)
+    _find_beside(path.resolve().parent)
     sys.modules[name] = module
     try:
         plan.loader.exec_module(module)
@@ -230,6 +238,12 @@ def _file(path: Path, spec: str) -> ModuleType:
             raise
         raise _refusal(f"it cannot be imported: {words_of(error)}", spec, place_of(error)) from error
     return module
+
+
+def _find_beside(folder: Path) -> None:
+    """Let what lies in a folder be imported, after all that is installed."""
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
 
 
 def _attribute(module: ModuleType, name: str, spec: str) -> Driver:
@@ -266,6 +280,22 @@ def _bodies(module: ModuleType) -> Sequence[str]:
 
 
 # -- words --------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _called(asked: Named) -> Iterator[None]:
+    """Say of a driver that was asked for as the voice that it is one, and no body."""
+    try:
+        yield
+    except InputRefused as error:
+        fault = error.fault
+        if asked.is_voice and fault.where == f"body {asked.spec}":
+            start = "no body "
+            reason = (
+                f"no voice {fault.reason.removeprefix(start)}" if fault.reason.startswith(start) else fault.reason
+            )
+            raise InputRefused(replace(fault, where=f"voice {asked.spec}", reason=reason)) from error
+        raise
 
 
 def _refusal(reason: str, spec: str, advice: str) -> InputRefused:

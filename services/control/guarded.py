@@ -4,10 +4,23 @@ A driver is somebody's program, and its robot may be unplugged in any call. Each
 an estimate says that it cannot be done, a behavior fails, a measurement tells the last joint angles and no look.
 """
 
+import asyncio
+import time
 import traceback
-from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping, Sequence
-from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from collections.abc import (
+    AsyncGenerator,
+    AsyncIterator,
+    Awaitable,
+    Callable,
+    Generator,
+    Iterator,
+    Mapping,
+    Sequence,
+)
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager, contextmanager
+from functools import partial
 from pathlib import Path
+from types import FrameType, coroutine
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
@@ -16,7 +29,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Ray
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
-from engage_hri.schemas.units import Radians
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     Body,
@@ -35,6 +48,8 @@ from engage_hri.services.runtime.steps import Steps
 T = TypeVar("T")
 BREAKS = (Exception, SystemExit)
 """Errors of a driver. Some SDKs call `sys.exit`."""
+STANDSTILL: Seconds = 0.5
+"""Seconds for which a call may keep all else of the service from going on: longer ones are told, once a call."""
 _PACKAGE = str(Path(__file__).parents[2])
 
 
@@ -50,6 +65,8 @@ class GuardedBody(Body):
         self._last = BodyState(pose=BodyPose(), moving=False)
         self._broken: set[str] = set()
         """Calls that broke when they were made last: each is told once until it works again."""
+        self._slow: set[str] = set()
+        """Calls that have held everything up."""
         body.on_fault = lambda fault: self.on_fault(fault)
         body.on_lips = lambda shapes: self.on_lips(shapes)
         body.others_say = lambda: self.others_say()
@@ -90,7 +107,8 @@ class GuardedBody(Body):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         try:
-            return _of(Estimate, self.body.estimate(behavior, pose, world))
+            with self._timed("in an estimate"):
+                return _of(Estimate, self.body.estimate(behavior, pose, world))
         except BREAKS as error:
             return self._refusal(behavior, error)
 
@@ -126,7 +144,7 @@ class GuardedBody(Body):
         async with aclosing(stream):
             while True:
                 try:
-                    progress = await anext(stream)
+                    progress = await self._stepping(anext(stream), "as it moves")
                 except StopAsyncIteration:
                     return
                 except (EngageError, Revoked):
@@ -137,7 +155,7 @@ class GuardedBody(Body):
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         try:
-            await self.body.home(parts)
+            await self._stepping(self.body.home(parts), "on the way home")
         except EngageError:
             raise
         except BREAKS as error:
@@ -179,7 +197,8 @@ class GuardedBody(Body):
 
     def _asked(self, call: Callable[[], T], otherwise: Any, when: str) -> T:
         try:
-            told = call()
+            with self._timed(when):
+                told = call()
         except BREAKS as error:
             self._tell(error, when)
             return otherwise  # type: ignore[no-any-return]
@@ -193,6 +212,38 @@ class GuardedBody(Body):
             raise
         except BREAKS as error:
             raise InputRefused(self._fault(error, when)) from error
+
+    @contextmanager
+    def _timed(self, when: str) -> Iterator[None]:
+        """Tell once if a call has held everything up, by the loop's clock: virtual time never stands still."""
+        clock = _clock()
+        began = clock()
+        try:
+            yield
+        finally:
+            if (seconds := clock() - began) > STANDSTILL and when not in self._slow:
+                self._slow.add(when)
+                reason = f"its driver blocks {when}: everything has stood still for {seconds:.1f} s"
+                advice = "no method may wait but by await: see docs/control.md"
+                self.on_fault(Fault(reason=reason, where=f"body {self.name}", advice=advice, service="control"))
+
+    @coroutine
+    def _stepping(self, awaited: Awaitable[T], when: str) -> Generator[Any, Any, T]:
+        """Await, and time each step in which others have to wait."""
+        steps = awaited.__await__()
+        resume: Callable[[], Any] = partial(next, steps)
+        while True:
+            try:
+                with self._timed(when):
+                    given = resume()
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            try:
+                sent = yield given
+            except BaseException as error:
+                resume = partial(steps.throw, error)
+            else:
+                resume = partial(steps.send, sent)
 
     def _tell(self, error: BaseException, when: str) -> None:
         if when not in self._broken:
@@ -222,6 +273,25 @@ def _of(kind: type[T], told: object) -> T:
     if not isinstance(told, kind):
         raise TypeError(f"it returns a {type(told).__name__}, and no {kind.__name__}")
     return told
+
+
+def _clock() -> Callable[[], Seconds]:
+    try:
+        return asyncio.get_running_loop().time
+    except RuntimeError:
+        return time.monotonic
+
+
+def held_up(frame: FrameType | None) -> str:
+    """Say where the driver is in whose call a signal has come; empty: it came in none."""
+    frames: list[FrameType] = []
+    while frame is not None:
+        frames.append(frame)
+        frame = frame.f_back
+    if not any(each.f_code.co_filename == __file__ for each in frames):
+        return ""
+    own = next((each for each in frames if not each.f_code.co_filename.startswith(_PACKAGE)), frames[0])
+    return f"a driver's call had not come back: {own.f_code.co_name}, {own.f_code.co_filename}, line {own.f_lineno}"
 
 
 def words_of(error: BaseException) -> str:

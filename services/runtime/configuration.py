@@ -6,7 +6,8 @@ import tomllib
 from collections.abc import Container, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Struct
@@ -69,19 +70,47 @@ def bus_config(**given: object) -> BusConfig:
     return read(_OnlyBus, settings=settings, variables=os.environ).bus
 
 
-def _explained(error: msgspec.ValidationError, kind: Any) -> str:
-    """Explain an error: what is wrong, what would be right, and the key."""
+def explained(error: msgspec.ValidationError, kind: Any) -> tuple[str, str]:
+    """Explain an error of a value of this type: what is wrong and would be right, and the key; empty: the whole."""
     reason, _, place = str(error).partition(" - at `$")
     key = place.strip("`").lstrip(".")
-    for name in key.split(".") if key else ():
-        kind = get_type_hints(kind)[name.partition("[")[0]]
+    kinds = _inside(kind, key)
     if reason.startswith("Invalid enum value"):
-        reason = f"{reason.removeprefix('Invalid enum value ')} is none of {', '.join(map(repr, _choices(kind)))}"
+        choices = [repr(choice) for each in kinds for choice in _choices(each)]
+        reason = f"{reason.removeprefix('Invalid enum value ')} is none of {', '.join(choices)}"
     elif unknown := re.fullmatch(r"Object contains unknown field `(.*)`", reason):
-        close = get_close_matches(unknown[1], kind.__struct_fields__, n=1)
-        known = f"do you mean `{close[0]}`?" if close else f"known are {', '.join(kind.__struct_fields__)}"
+        fields = [field for each in kinds for field in getattr(each, "__struct_fields__", ())]
+        close = get_close_matches(unknown[1], fields, n=1)
+        known = f"do you mean `{close[0]}`?" if close else f"known are {', '.join(fields)}"
         reason = f"unknown key `{unknown[1]}`; {known}"
+    return reason, key
+
+
+def _explained(error: msgspec.ValidationError, kind: Any) -> str:
+    reason, key = explained(error, kind)
     return f"{reason}, in `{key}`" if key else reason
+
+
+def _inside(kind: Any, key: str) -> list[Any]:
+    """Types that a value inside of one of this type may have. key: its place, such as `stalls[0].part`."""
+    kinds = _alternatives(kind)
+    for step in re.findall(r"\[|[^.\[\]]+(?=[.\[]|$)", key):
+        if step == "[":
+            inner = [part for each in kinds for part in get_args(each) if part is not Ellipsis]
+        else:
+            hints = [get_type_hints(each) for each in kinds if _is_struct(each)]
+            inner = [each[step] for each in hints if step in each]
+        kinds = [part for each in inner for part in _alternatives(each)]
+    return kinds
+
+
+def _is_struct(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Struct)
+
+
+def _alternatives(kind: Any) -> list[Any]:
+    is_union = get_origin(kind) in (Union, UnionType)
+    return [part for each in get_args(kind) for part in _alternatives(each)] if is_union else [kind]
 
 
 def _choices(kind: Any) -> list[str]:

@@ -10,6 +10,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.body_faults import BodyFaults
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.services.simulation.human import Lay
@@ -32,6 +33,19 @@ class HeardSpeech(Struct, frozen=True):
     @property
     def is_request(self) -> bool:
         return REQUEST.search(self.words) is not None
+
+
+class Ears:
+    """What of the robot's words there is to hear: none while its voice makes no sound (fault `mute`)."""
+
+    def __init__(self) -> None:
+        self._is_mute = False
+
+    def hear(self, message: Message) -> bool:
+        """Take a message about the robot. Returns False for a word that nobody can hear."""
+        if isinstance(message, BodyFaults):
+            self._is_mute = any(fault.kind == "mute" for fault in message.faults)
+        return not (self._is_mute and isinstance(message, WordSpoken))
 
 
 class Hearing:

@@ -12,6 +12,7 @@ from engage_hri.schemas.body import RobotSeen
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import (
     FACE,
     Act,
@@ -46,7 +47,7 @@ class PersonAtTable:
         self._frame = frame
         self._stamp = stamp
         self._actor = table.layout.person.id
-        self._arms = SeenArms()
+        self._arms, self._ears = SeenArms(), Ears()
         self._look: str | None = None
         self._last_world: Seconds | None = None
 
@@ -64,7 +65,7 @@ class PersonAtTable:
     def feed(self, message: Message, now: Seconds) -> None:
         if isinstance(message, RobotSeen):
             self._arms.see(message)
-        else:
+        elif self._ears.hear(message):
             self._human.feed(message, now)
 
     def world(self, now: Seconds) -> World:

@@ -34,6 +34,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     perceived = PerceivedActions(bus)
     with bus.subscribe(
         keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT, keys.ROBOT_SEEN,
+        keys.BODY_FAULTS,
         *([keys.ROBOT_MOTION] if config.perception == "raw" else []),
     ) as inbox:  # fmt: skip
         bus.publish(keys.WORLD, cameras.world(bus.now()))

@@ -19,6 +19,7 @@ from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import FACE, Act, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
@@ -40,7 +41,7 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
 
     is_attentive: the first person follows the robot's gaze and answers it; else all just sit there.
     """
-    with bus.subscribe(keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK) as inbox:
+    with bus.subscribe(keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK, keys.BODY_FAULTS) as inbox:
         ready()
         bus.publish(keys.WORLD, msgspec.structs.replace(world, at=bus.stamp()))
         perceived = PerceivedActions(bus)
@@ -49,11 +50,11 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
             await asyncio.get_running_loop().create_future()
         sees = frozenset(entity.id for entity in world.objects)
         human = AttentiveHuman(world.people[0].id, sees, bus.robot)
-        body = Bystander(world.people[0].id, bus.robot)
+        body, ears = Bystander(world.people[0].id, bus.robot), Ears()
         human.schedule((LookAt(FACE),), bus.now())
         while not inbox.is_over:
             received = await inbox.next(human.deadline)
-            if received is not None:
+            if received is not None and ears.hear(received.message):
                 human.feed(received.message, bus.now())
             while acts := human.due(bus.now()):
                 perceived.tell(*body.does(acts[0], bus.stamp()))

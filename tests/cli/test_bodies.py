@@ -108,6 +108,16 @@ def test_it_is_asked_for_estimates_without_a_connection(
     assert "AssertionError" not in result.err
 
 
+@pytest.mark.parametrize("command", ["plan", "explain"])
+def test_a_wrong_body_is_not_the_fault_of_the_file(engage: Engage, tmp_path: Path, robot: str, command: str) -> None:
+    body = engage(command, tmp_path / "ask.xml", "--body", "nosuch")
+    voice = engage(command, tmp_path / "ask.xml", "--voice", "nosuch")
+
+    assert (body.code, voice.code) == (2, 2)
+    assert body.err.startswith("body nosuch: no body 'nosuch' (known are ")
+    assert voice.err.startswith("voice nosuch: no voice 'nosuch' (known are ")
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [

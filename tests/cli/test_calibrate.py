@@ -2,7 +2,10 @@
 
 import asyncio
 import json
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -121,3 +124,28 @@ async def test_who_sits_before_it_types_where_it_points(tmp_path: Path) -> None:
     assert "head is on a (0.500 -0.100 0.730). Where really? x y z in metres, or nothing: " in told.decode()
     assert "three numbers, such as 0.500 -0.100 0.730" in told.decode()
     assert tomllib.loads(out.read_text())["offsets"]["neck_yaw"] > 0.5  # 2 cm to the left, at half a metre
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("lines", [0, 1])
+def test_the_end_of_a_file_on_standard_input_is_told(tmp_path: Path, lines: int) -> None:
+    (tmp_path / "typed.txt").write_text("\n" * lines)
+    with open(tmp_path / "typed.txt" if lines else os.devnull) as places:
+        command = [sys.executable, "-m", "engage_hri", "calibrate", "body", "--ask", "--part", "head"]
+        ended = subprocess.run(command, stdin=places, capture_output=True, timeout=PATIENCE, cwd=tmp_path, text=True)
+
+    error = "--ask: standard input has ended before all places were typed"
+    assert (ended.returncode, ended.stderr.strip()) == (3, error)
+    assert ended.stdout.count("Where really?") == lines + 1
+    assert not list(tmp_path.glob("*.toml"))
+
+
+@pytest.mark.parametrize("option", ["--out", "--record"])
+def test_a_file_that_cannot_be_written_is_refused_before_anything_moves(
+    engage: Engage, tmp_path: Path, option: str
+) -> None:
+    result = engage("calibrate", "body", "--part", "head", option, tmp_path / "nosuch" / "c.toml")
+
+    assert (result.code, result.out) == (2, "")
+    assert result.err.strip() == f"{tmp_path}/nosuch/c.toml: there is no folder {tmp_path}/nosuch"
+    assert "is a folder" in engage("calibrate", "body", option, tmp_path).err

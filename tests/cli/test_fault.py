@@ -3,10 +3,11 @@
 import asyncio
 from asyncio.subprocess import Process
 
+import msgspec
 import pytest
 
-from engage_hri.schemas.body import Capabilities
-from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.body import Capabilities, FaultKind
+from engage_hri.schemas.body_faults import BodyFault, flaw
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.commandline.fault import listed, switched
 from engage_hri.services.control.torso.body import SimulatedBody
@@ -69,3 +70,33 @@ async def test_the_list_tells_what_each_kind_does_and_takes() -> None:
     assert "\n    --amount: factor of time; below 1: quicker, within the limits; without it 2\n" in text
     assert text.endswith("\non: slow head 3")
     assert listed(Capabilities(body="real", types=(), parts=()), ()) == "this body can play no faults"
+
+
+def test_the_list_tells_what_a_body_says_of_its_own_kinds_as_the_bus_brings_it() -> None:
+    own = (
+        FaultKind(kind="slow", does="Its gears are stiff.", on="part", amount="degrees", low=1.0, high=3.0),
+        FaultKind(kind="blocked", does="Something stands in the way.", on="part", parts=("left_arm",)),
+    )
+    able = Capabilities(
+        body="b", types=(), parts=("left_arm", "right_arm"), faults=("slow", "blocked", "x"), fault_kinds=own
+    )
+    text = listed(msgspec.json.decode(msgspec.json.encode(able), type=Capabilities), ())
+
+    assert text.splitlines() == [
+        "slow: Its gears are stiff.", "    --part: left_arm, right_arm; without it all", "    --amount: degrees",
+        "blocked: Something stands in the way.", "    --part: left_arm; without it all",
+        "x: a fault of this body, which does not say what it does", "on: nothing",
+    ]  # fmt: skip
+    assert flaw(BodyFault(kind="slow", amount=4.0), able) == "the amount of slow is 4: expected 1..3 (degrees)"
+    assert flaw(BodyFault(kind="blocked", part="right_arm"), able) == "blocked of 'right_arm': known are left_arm"
+
+
+async def test_no_kind_of_the_torso_with_physics_is_without_a_meaning() -> None:
+    pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
+    from engage_hri.services.control.mujoco.body import MujocoBody
+
+    text = listed(MujocoBody().capabilities, ())
+
+    assert "does not say" not in text
+    assert "\nweak: The motor has a share of its torque" in text
+    assert "\nslow: The gears are stiff with old grease" in text

@@ -108,5 +108,5 @@ def test_a_fragment_of_which_no_word_is_spoken_has_failed(engage: Engage, tmp_pa
     result = engage(*PLAY, "--set", "control.variability.mute=refuse", "--outcomes", "-", fragment)
 
     assert result.code == 3
-    assert f"{fragment}: ask: none of its words was spoken: say-1 was dropped: the voice is mute\n" in result.err
+    assert f"{fragment}: ask: none of its words was spoken: say-1 was dropped: the voice cannot speak\n" in result.err
     assert lines(result.out)[0]["status"] == "failed"

@@ -16,6 +16,37 @@ from tests.realizer.fake_body import FakeBody
 pytestmark = pytest.mark.real_time
 
 
+BLOCKING = """
+import time
+from tests.control.test_drivers import Bare
+
+class Forever(Bare):
+    def see(self, world):
+        print("blocks", flush=True)
+        while True:
+            time.sleep(60.0)
+"""
+
+
+@pytest.mark.parametrize(("how", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+async def test_a_driver_that_never_comes_back_is_left_at_the_second_and_named(
+    tmp_path: Path, how: signal.Signals, code: int
+) -> None:
+    (tmp_path / "b.xml").write_text('<bml id="b"><wait id="w" duration="60"/></bml>')
+    (tmp_path / "liar.py").write_text(BLOCKING)
+    play = await start("play", tmp_path / "b.xml", "--embedded", "--body", tmp_path / "liar.py")
+    await line(play, "blocks", log=False)
+    play.send_signal(how)
+    await asyncio.sleep(1.1)
+    assert play.returncode is None
+    play.send_signal(how)
+    async with asyncio.timeout(PATIENCE):
+        _, err = await play.communicate()
+
+    assert play.returncode == code
+    assert f"a driver's call had not come back: see, {tmp_path}/liar.py, line 9\n" in err.decode()
+
+
 @pytest.mark.parametrize("pause", [0.0, 0.0005, 0.005, 0.05])
 async def test_a_second_ctrl_c_ends_it_at_once_without_a_word(tmp_path: Path, pause: float) -> None:
     """Whatever it does then. The realizer stands still: it does not say that the block has ended."""

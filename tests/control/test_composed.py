@@ -25,7 +25,7 @@ from engage_hri.services.control.composed import ComposedBody, composed
 from engage_hri.services.control.members import Member
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract
-from engage_hri.services.control.testing.stage import performed
+from engage_hri.services.control.testing.stage import Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")

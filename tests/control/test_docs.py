@@ -1,6 +1,5 @@
 """The driver in docs/control.md, as it stands there, held to the contract on a simulated SDK."""
 
-import asyncio
 import re
 import sys
 import types
@@ -9,12 +8,8 @@ from pathlib import Path
 from unittest.mock import patch
 
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.testing import BodyContract
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import JointMotion, Leg, resting
-from engage_hri.services.control.torso.path import Path as Way
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.control.liars_by_deed import Noisy
 
@@ -22,56 +17,33 @@ PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 CONTRACT = PAGE.with_name("contract.md")
 
 
-CODE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
-
-
-class Motors:
-    """SDK of two motors that go where they are told in the time they are told, and lag by `LAG`."""
-
-    def __init__(self) -> None:
-        self.motions: list[tuple[float, Motion]] = []
-        self.is_connected = False
-
-    def connect(self) -> None:
-        self.is_connected = True
-
-    def move(self, goal: dict[str, float], seconds: float) -> None:
-        assert self.is_connected
-        now = asyncio.get_running_loop().time()
-        leg = Leg(goal=(goal["pan"], goal["tilt"]), seconds=seconds)
-        self.motions.append((now, Motion(Way(self._at(now), [leg], driver().PanTilt.joints), now)))
-
-    def measured(self) -> dict[str, float]:
-        assert self.is_connected
-        pan, tilt = self._at(asyncio.get_running_loop().time() - LAG).q
-        return {"pan": float(pan), "tilt": float(tilt)}
-
-    def _at(self, time: float) -> JointMotion:
-        motion = next((motion for start, motion in reversed(self.motions) if start <= time), None)
-        return motion.at(time) if motion else resting((0.0, 0.0))
-
-
-LAG = 0.02
+CODE, SDK, TEST, VOICE, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+"""The driver, a simulated SDK for it, its test, and a voice."""
 
 
 @cache
 def driver() -> types.ModuleType:
-    """The first Python block of the page, as a module, on a simulated SDK."""
-    sdk = types.ModuleType("pan_tilt_sdk")
-    sdk.Motors = Motors  # type: ignore[attr-defined]
-    module = types.ModuleType("pan_tilt")
+    """The driver of the page, as a module, on its simulated SDK."""
+    sdk, module = types.ModuleType("pan_tilt_sdk"), types.ModuleType("pan_tilt")
+    exec(compile(SDK, str(PAGE), "exec"), sdk.__dict__)
     with patch.dict(sys.modules, {"pan_tilt_sdk": sdk}):
         exec(compile(CODE, str(PAGE), "exec"), module.__dict__)
     return module
 
 
-class TestPanTilt(BodyContract):
-    tolerance = 0.15
+@cache
+def suite() -> type[BodyContract]:
+    """The test on the page, as it stands there."""
+    module = types.ModuleType("test_pan_tilt")
+    with patch.dict(sys.modules, {"pan_tilt": driver()}):
+        exec(compile(TEST, str(PAGE), "exec"), module.__dict__)
+    found = module.TestPanTilt
+    assert isinstance(found, type)
+    assert issubclass(found, BodyContract)
+    return found
 
-    def make(self) -> Body:
-        body = driver().PanTilt()
-        assert isinstance(body, Body)
-        return body
+
+TestPanTilt = suite()
 
 
 class Robot(Noisy):

@@ -3,9 +3,10 @@
 import sys
 from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
@@ -50,9 +51,16 @@ class Bare(Body):
     def see(self, world: World) -> None: ...
 
 
+class Pin(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    use: Literal["in", "out"]
+
+
 class Port(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     device: str = "/dev/null"
     baud: int = 9600
+    parity: Literal["none", "even"] | None = None
+    stops: Annotated[int, Meta(ge=1, le=2)] = 1
+    pins: tuple[Pin, ...] = ()
 
 
 class Serial(Bare):
@@ -117,6 +125,13 @@ async def test_an_installed_package_offers_bodies(monkeypatch: pytest.MonkeyPatc
         drivers.made(ControlConfig(body="offred"))
 
 
+async def test_a_module_may_lie_in_the_current_folder(file: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(file.parent)
+
+    assert type(_made(ControlConfig(body="my_robot:Mine"))).__name__ == "Mine"
+    sys.modules.pop("my_robot")
+
+
 def test_a_function_may_make_the_body(file: Path):
     file.write_text(PLAIN + "\ndef make():\n    return Mine()\n")
 
@@ -169,9 +184,13 @@ def test_what_is_no_body_is_refused_with_what_to_do(file: Path, name: str, text:
         (
             "Serial",
             {"bauds": 1},
-            "control.drivers.Serial: no setting bauds (known are device, baud)",
+            "control.drivers.Serial: no setting bauds (known are device, baud, parity, stops, pins)",
         ),
         ("Serial", {"baud": "fast"}, "control.drivers.Serial.baud: Expected `int`, got `str`"),
+        ("Serial", {"parity": "evn"}, "control.drivers.Serial.parity: 'evn' is none of 'none', 'even'"),
+        ("Serial", {"stops": 3}, "control.drivers.Serial.stops: Expected `int` <= 2"),
+        ("Serial", {"pins": [{"use": "in"}, {"use": "on"}]}, "Serial.pins[1].use: 'on' is none of 'in', 'out'"),
+        ("Serial", {"pins": [{"uses": "in"}]}, "Serial.pins[0]: unknown key `uses`; do you mean `use`?"),
         (
             "Bare",
             {"baud": 1},
@@ -184,6 +203,16 @@ async def test_wrong_settings_are_refused_by_their_key(name: str, settings: dict
         drivers.made(ControlConfig(body=f"{__name__}:{name}", drivers={name: settings}))
 
     assert reason in str(refused.value)
+
+
+@pytest.mark.parametrize("does", [drivers.check, drivers.made])
+async def test_a_voice_is_refused_as_a_voice_and_a_body_of_the_same_name_as_a_body(does):
+    with pytest.raises(InputRefused, match=r"^voice nosuch: no voice 'nosuch' \(known are espeak"):
+        does(ControlConfig(voice="nosuch"))
+    with pytest.raises(InputRefused, match=r"^body nosuch: no body 'nosuch' \(known are espeak"):
+        does(ControlConfig(body="nosuch"))
+    with pytest.raises(InputRefused, match=r"^voice .*: it has no part voice"):
+        drivers.made(ControlConfig(voice=f"{__name__}:Bare"))
 
 
 async def test_a_voice_takes_the_place_of_the_one_of_the_body():

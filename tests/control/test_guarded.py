@@ -35,6 +35,29 @@ QUIET = ("see", "move_lips", "idle", "seen", "ray_at", "state", "faults")
 """Calls that go on with less where they break, and tell it."""
 
 
+class Slow(Bare):
+    """A driver in whose calls the loop stands still. A clock of virtual time does not, so it is moved by hand."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, seconds: float) -> None:
+        super().__init__()
+        self.loop, self.seconds, self.late = loop, seconds, 0.0
+        self.time, loop.time = loop.time, lambda: self.time() + self.late  # type: ignore[method-assign]
+
+    def block(self) -> None:
+        self.late += self.seconds
+
+    def state(self) -> BodyState:
+        self.block()
+        return THERE
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        await asyncio.sleep(5.0)
+        yield Reached("start", 0.0, 0.0)
+        await asyncio.sleep(5.0)
+        self.block()
+        yield Reached("end", 0.0, 0.0)
+
+
 class Breaking(Bare):
     """A driver that raises in the calls that are named in `at`."""
 
@@ -254,3 +277,21 @@ async def test_a_driver_that_breaks_keeps_no_other_from_going_home():
         await body.home()
 
     assert (driver.went, other.went) == (["home"], ["home"])
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(0.4, []), (0.6, ["as it moves", "in `state`"])])
+async def test_a_call_in_which_everything_stands_still_is_told_once_and_awaiting_is_none(
+    seconds: float, told: list[str]
+):
+    loop = asyncio.get_running_loop()
+    slow = Slow(loop, seconds)
+    guarded, faults = GuardedBody("slow", slow), list[Fault]()
+    guarded.on_fault = faults.append
+    for _ in range(2):
+        passed = [each async for each in guarded.perform(LOOK, MovementAuthority(LOOK, "end"))]
+        assert guarded.state() is THERE
+    del loop.time
+
+    assert len(passed) == 2
+    said = "everything has stood still for 0.6 s (no method may wait but by await: see docs/control.md)"
+    assert [str(fault) for fault in faults] == [f"body slow: its driver blocks {when}: {said}" for when in told]

@@ -206,7 +206,7 @@ async def test_a_voice_that_knows_it_has_gone_fails_at_a_word(body: SimulatedBod
     stage = Stage(body, SPEECH, "end")
     await asyncio.sleep(1.0)
     body.switch_faults([BodyFault(kind="voiceless")])
-    with pytest.raises(BodyFailed, match="mute"):
+    with pytest.raises(BodyFailed, match="cannot speak"):
         await stage.over()
 
     assert stage.passed == ["start"]

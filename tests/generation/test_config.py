@@ -67,6 +67,11 @@ def test_a_bad_value_is_refused_by_file_and_key_with_what_is_allowed(tmp_path: P
     [
         ("[gneration]\ndwell = 1", "unknown key `gneration`; do you mean `generation`?"),
         ("generation = 3", "Expected `object`, got `int`, in `generation`"),
+        (
+            "[control.variability]\nslow = [{part = 3}]",
+            "Expected `str`, got `int`, in `control.variability.slow[0].part`",
+        ),
+        ("[control.variability]\nstall = [{pat = 'head'}]", "unknown key `pat`; do you mean `part`?"),
         ("[recognition]\naccept = ['sing']", "'sing' is none of 'look', 'point', 'nod'"),
         ("[generation\n", "not TOML"),
     ],

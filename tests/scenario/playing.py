@@ -84,9 +84,7 @@ async def play(
         finished.set()
 
     services: dict[str, Service] = {
-        "control": partial(
-            embody, config=control or ControlConfig(variability=Variability(seed=seed, noise=noise))
-        ),
+        "control": partial(embody, config=control or ControlConfig(variability=Variability(seed=seed, noise=noise))),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
         "generation": partial(generate, config=GenerationConfig(condition=condition)),

@@ -27,7 +27,7 @@ from engage_hri.services.control.extras import Seen
 from engage_hri.services.control.mujoco import along
 from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
-from engage_hri.services.control.mujoco.faults import KINDS, SHARED, refuse
+from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, refuse, told
 from engage_hri.services.control.mujoco.film import Film, Frame
 from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.pulse import TICK, Pulse
@@ -66,7 +66,7 @@ class MujocoBody(SimulatedBody):
         self._settings = settings or MujocoSettings()
         self.capabilities = msgspec.structs.replace(
             self.capabilities, body="mujoco", joints=tuple(map(_as_measured, self.capabilities.joints)),
-            faults=KINDS,
+            faults=KINDS, fault_kinds=told(OURS),
         )  # fmt: skip
         self.bench = Workbench(self._plan(), self._loop.time(), self._settings.seed)
         self._watches: dict[Run, Watch] = {}

@@ -20,7 +20,7 @@ from engage_hri.services.control.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.composed import ComposedBody
 from engage_hri.services.control.members import Member
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
-from engage_hri.services.control.mujoco.faults import OURS, refuse
+from engage_hri.services.control.mujoco.faults import OURS, refuse, told
 from engage_hri.services.control.mujoco.film import Film, Frame
 from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.ik import Chain
@@ -48,7 +48,7 @@ class DescribedBody(ComposedBody):
         """file: its description. Raises InputRefused: that, its model, or a setting is wrong."""
         self._settings = settings or MujocoSettings()
         described, path = read(file)
-        model, motors = _model(msgspec.json.encode(described), path)
+        model, motors = _model(msgspec.json.encode(described), path, file)
         ranges = {joint: tuple(model.joint(PREFIX + joint).range.tolist()) for joint in motors}
         limits = {name: limits_of(name, part, ranges) for name, part in described.parts.items()}
         own = {limit.joint: limit for each in limits.values() for limit in each}
@@ -141,9 +141,9 @@ class DescribedBody(ComposedBody):
 
 
 @lru_cache(8)
-def _model(described: bytes, path: Path) -> tuple[mujoco.MjModel, dict[str, Motor]]:
+def _model(described: bytes, path: Path, file: Path) -> tuple[mujoco.MjModel, dict[str, Motor]]:
     """The model of a described robot at the table. To compile one of forty meshes takes half a second."""
-    return assembled(msgspec.json.decode(described, type=Description), path, tangram_table())
+    return assembled(msgspec.json.decode(described, type=Description), path, tangram_table(), file)
 
 
 def _shoulder(body: Body, target: tuple[float, float, float]) -> Seconds:
@@ -180,4 +180,5 @@ def _capabilities(described: Description, stage: Stage, of_parts: Capabilities) 
         joints=joints,
         reach=described.reach,
         faults=FAULTS,
+        fault_kinds=told(FAULTS),
     )

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.body import Capabilities
-from engage_hri.schemas.body_faults import BodyFault, FaultKind
+from engage_hri.schemas.body import Capabilities, FaultKind
+from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Vector
 from engage_hri.services.control.mujoco.model import AWAY, OBSTACLES
@@ -42,7 +42,7 @@ OURS: Mapping[str, FaultKind] = {
         on="part or joint", amount="times as fast as a good one that it heats", usual=300.0, low=1.0, high=10_000.0,
     ),
     "blocked": FaultKind(
-        does="Something stands in the way: the part runs into it.", on="part",
+        does="Something stands in the way: the part runs into it.", on="part", parts=tuple(OBSTACLES),
     ),
     "table": FaultKind(
         does="The table is higher than the body believes: arms run into it, as the arm of the thesis' robot did.",
@@ -59,6 +59,11 @@ OURS: Mapping[str, FaultKind] = {
 }  # fmt: skip
 """What each kind does, and what else a fault of it says."""
 KINDS = (*SHARED, *OURS)
+
+
+def told(kinds: Iterable[str]) -> tuple[FaultKind, ...]:
+    """What some of our kinds do, for `Capabilities.fault_kinds`."""
+    return tuple(replace(OURS[kind], kind=kind) for kind in kinds)
 
 
 def refuse(faults: Iterable[BodyFault], body: Capabilities) -> None:
@@ -79,8 +84,7 @@ def flaw(fault: BodyFault, body: Capabilities) -> str:
     if fault.amount is not None and not (kind.amount and kind.low <= fault.amount <= kind.high):
         expected = f"{kind.low:g}..{kind.high:g} ({kind.amount})" if kind.amount else "none"
         return f"the amount of {fault.kind} is {fault.amount:g}: expected {expected}"
-    known = _known(kind, body) if fault.kind != "blocked" else tuple(OBSTACLES)
-    if fault.part and fault.part not in known:
+    if fault.part and fault.part not in (known := _known(kind, body)):
         return f"{fault.kind} of {fault.part!r}: known are {', '.join(known) or 'none'}"
     return ""
 
@@ -154,5 +158,7 @@ def _worse(condition: Condition, fault: BodyFault, motor: Motor) -> Condition:
 def _known(kind: FaultKind, body: Capabilities) -> tuple[str, ...]:
     if not kind.on:
         return ()
+    if kind.parts:
+        return kind.parts
     limits = [limit for limit in body.joints if limit.part != "face"]
     return (*dict.fromkeys(limit.part for limit in limits), *(limit.joint for limit in limits))

@@ -75,7 +75,7 @@ class Physics:
         self._u = np.array(servos, dtype=int)
         self._lead = np.array([motor.damping / motor.stiffness for motor in motors.values()])
         self._drag = np.array([motor.drag for motor in motors.values()])
-        self._most = np.array([motor.limit for motor in motors.values()])
+        self._most = np.array([motor.limit for motor in motors.values()], dtype=float)
         self._limit = self._most.copy()
         self._strength, self._heating = np.ones(len(motors)), np.ones(len(motors))
         self._stick, self._bent = np.zeros(len(motors)), np.zeros(len(motors))

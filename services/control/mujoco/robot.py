@@ -7,6 +7,7 @@ described frequency, and the torque that a lively motion takes. Its servos know 
 
 import math
 import re
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import mujoco
@@ -14,7 +15,7 @@ import numpy as np
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.control.mujoco import model
-from engage_hri.services.control.mujoco.description import Description, Place
+from engage_hri.services.control.mujoco.description import ArmDescription, Description, Place
 from engage_hri.services.control.mujoco.motors import Motor
 from engage_hri.services.tangram.table import TangramTable
 
@@ -24,19 +25,28 @@ ROTOR = 0.4
 """Inertia of a rotor behind its gear, as a share of that of what the joint moves."""
 PREFIX = "robot/"
 """Before the names of the robot's bodies and joints, in the room."""
+SLACK = 0.1
+"""Degrees by which a safe pose may be beyond a range: models round."""
 MESH = re.compile(r'filename\s*=\s*"([^"]+)"')
 
 
-def assembled(described: Description, path: Path, table: TangramTable) -> tuple[mujoco.MjModel, dict[str, Motor]]:
-    """The model at the table, and its motors. Raises InputRefused: the model lacks something described."""
+def assembled(
+    described: Description, path: Path, table: TangramTable, file: Path
+) -> tuple[mujoco.MjModel, dict[str, Motor]]:
+    """The model at the table, and its motors. path: of the model. file: of the description.
+
+    Raises InputRefused: the model lacks something described, or a joint cannot be at home where it is described.
+    """
     robot = _loaded(path)
-    _check(described, robot, path)
+    _check(described, robot, file)
     _prepare(described, robot)
     scene = mujoco.MjSpec.from_string(model.room(table, _pedestal(described)))
     half = math.radians(described.yaw) / 2
     frame = scene.worldbody.add_frame(pos=described.position, quat=(math.cos(half), 0.0, 0.0, math.sin(half)))
     scene.attach(robot, frame=frame, prefix=PREFIX)
-    motors = _motors(described, scene)
+    bare = scene.compile()
+    _check_home(described, bare, file)
+    motors = _motors(described, bare)
     for joint, motor in motors.items():
         servo = scene.add_actuator(name=PREFIX + joint, target=PREFIX + joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(kp=motor.stiffness, kv=motor.damping)
@@ -79,22 +89,42 @@ def _urdf(path: Path) -> tuple[str, dict[str, bytes]]:
     return re.sub(r"(<robot\b[^>]*>)", rf"\1{options}", text, count=1), assets
 
 
-def _check(described: Description, robot: mujoco.MjSpec, path: Path) -> None:
+def _check(described: Description, robot: mujoco.MjSpec, file: Path) -> None:
     joints, bodies = {each.name for each in robot.joints}, {each.name for each in robot.bodies}
-    named = [(joint, joints, "joint") for part in described.parts.values() for joint in part.joints]
-    named += [(joint, joints, "joint") for joint in described.home]
-    named += [(place.body, bodies, "body") for place in _places(described)]
-    for name, known, kind in named:
+    named = [(f"{part}.joints", joint) for part, each in described.parts.items() for joint in each.joints]
+    named += [("home", joint) for joint in described.home]
+    _refuse_unknown(named, joints, "joint", file)
+    _refuse_unknown([(key, place.body) for key, place in _places(described)], bodies, "body", file)
+
+
+def _refuse_unknown(named: Sequence[tuple[str, str]], known: Collection[str], kind: str, file: Path) -> None:
+    for key, name in named:
         if name not in known:
             advice = f"it has {', '.join(sorted(filter(None, known)))[:600]}"
-            reason = f"{described.name}: the model has no {kind} {name!r}"
-            raise InputRefused(Fault(reason=reason, where=str(path), advice=advice, service="control"))
+            reason = f"{key}: the model has no {kind} {name!r}"
+            raise InputRefused(Fault(reason=reason, where=str(file), advice=advice, service="control"))
 
 
-def _places(described: Description) -> list[Place]:
-    arms = [arm for arm in (described.left_arm, described.right_arm) if arm is not None]
-    heads = [described.head.eyes] if described.head is not None else []
-    return [*heads, *(arm.elbow for arm in arms), *(arm.hand for arm in arms)]
+def _check_home(described: Description, model: mujoco.MjModel, file: Path) -> None:
+    """Refuse angles of the safe pose that the joints of the parts cannot have. Raises InputRefused."""
+    for joint in [joint for part in described.parts.values() for joint in part.joints]:
+        one = model.joint(PREFIX + joint)
+        angle, low, high = described.home.get(joint, 0.0), *map(math.degrees, one.range)
+        if model.jnt_limited[one.id] and not low - SLACK <= angle <= high + SLACK:
+            given = "is" if joint in described.home else "is not given, and so"
+            reason = f"home.{joint} {given} {angle:g} degrees: expected {low:.1f}..{high:.1f}"
+            raise InputRefused(Fault(reason=reason, where=str(file), service="control"))
+
+
+def _places(described: Description) -> list[tuple[str, Place]]:
+    """Places on the robot, each with its key."""
+    arms = [(name, arm) for name, arm in described.parts.items() if isinstance(arm, ArmDescription)]
+    heads = [("head.eyes", described.head.eyes)] if described.head is not None else []
+    return [
+        *heads,
+        *((f"{name}.elbow", arm.elbow) for name, arm in arms),
+        *((f"{name}.hand", arm.hand) for name, arm in arms),
+    ]
 
 
 def _prepare(described: Description, robot: mujoco.MjSpec) -> None:
@@ -119,9 +149,8 @@ def _prepare(described: Description, robot: mujoco.MjSpec) -> None:
             geom.group = geom.group if has_looks else 3
 
 
-def _motors(described: Description, scene: mujoco.MjSpec) -> dict[str, Motor]:
-    """Motors to the measure of what they move, in the safe pose."""
-    bare = scene.compile()
+def _motors(described: Description, bare: mujoco.MjModel) -> dict[str, Motor]:
+    """Motors to the measure of what they move, in the safe pose. bare: the model without motors."""
     data = mujoco.MjData(bare)
     for joint, angle in described.home.items():
         if mujoco.mj_name2id(bare, mujoco.mjtObj.mjOBJ_JOINT, PREFIX + joint) >= 0:

@@ -111,7 +111,7 @@ class SimulatedBody(Body):
     def _estimate(self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         match behavior:
             case Speech() if self._deviations.of("voiceless"):
-                return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice is mute"))
+                return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak"))
             case Speech(text=text):
                 return speech_estimate(behavior, utter(text), torso.pose(world, pose))
             case Wait(duration=duration):
@@ -373,7 +373,7 @@ class SimulatedBody(Body):
         if authority.revoked is not None:
             return
         if self._deviations.of("voiceless"):
-            raise BehaviorRefused(_fault(behavior, "the voice is mute"))
+            raise BehaviorRefused(_fault(behavior, "the voice cannot speak"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
         lips = LipSync(behavior, utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
@@ -385,7 +385,7 @@ class SimulatedBody(Body):
                     if isinstance(progress, Reached) and progress.sync == "end":
                         return
         if self._deviations.of("voiceless"):
-            raise BodyFailed(_fault(behavior, "the voice is mute"))
+            raise BodyFailed(_fault(behavior, "the voice cannot speak"))
 
 
 def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:

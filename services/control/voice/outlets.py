@@ -194,7 +194,7 @@ class Gag:
             self._since = self._asked = now
         late, self._asked = now - self._asked, now
         if now - self._since > STUCK:
-            self._fault = Fault(reason=f"the voice is mute: no sound is taken for {STUCK} s", service="control")
+            self._fault = Fault(reason=f"the device is silent: no sound is taken for {STUCK} s", service="control")
         return late
 
     def cut(self, at: Seconds, tail: bytes) -> None:

@@ -53,7 +53,7 @@ class Speaker(Body):
 
 def voiceless(behavior: BlockBehavior) -> Fault:
     """Say why a voice that knows that it is mute does not speak."""
-    return Fault(reason="the voice is mute", where=behavior.id, service="control")
+    return Fault(reason="the voice cannot speak", where=behavior.id, service="control")
 
 
 def speech(behavior: BlockBehavior) -> Speech:

@@ -61,6 +61,12 @@ async def test_a_dead_motor_fails_by_the_name_of_its_joint():
     assert "stroke" not in passed
 
 
+async def test_a_weak_motor_gives_its_share_of_torque_and_its_failure_says_so():
+    reason, _ = await failure(sick(BodyFault(kind="weak", part="right_elbow", amount=0.05)), POINT)
+
+    assert "its motor gives all it can, 0.4 N m" in reason  # of 8
+
+
 async def test_a_motor_that_dies_while_it_holds_cannot_pass_what_it_holds_for():
     body = sick()
     stage = Stage(body, POINT, "stroke")

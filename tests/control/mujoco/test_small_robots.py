@@ -1,5 +1,6 @@
 """Robots with few parts, by descriptions: they take part with what they have."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -82,3 +83,26 @@ async def test_what_a_model_does_not_have_is_said_with_what_it_has(folder: Path)
     with pytest.raises(InputRefused, match="no joint 'tlit'") as refused:
         DescribedBody(folder / "wrong.toml")
     assert "pan, tilt" in refused.value.fault.advice
+    assert str(refused.value).startswith(f"{folder}/wrong.toml: head.joints: ")
+    (folder / "wrong.toml").write_text(DESCRIPTION.replace('"camera"', '"camra"'), encoding="utf-8")
+    with pytest.raises(InputRefused, match=r"wrong\.toml: head\.eyes: the model has no body 'camra'"):
+        DescribedBody(folder / "wrong.toml")
+
+
+@pytest.mark.parametrize(
+    ("home", "range", "said"),
+    [
+        ("tilt = 800", "-70 40", r"home\.tilt is 800 degrees: expected -70\.0\.\.40\.0"),
+        ("", "13 107", r"home\.tilt is not given, and so 0 degrees: expected 13\.0\.\.107\.0"),
+        ("tilt = 13", "13 107", ""),
+    ],
+)
+async def test_a_safe_pose_is_one_that_the_joints_can_have(folder: Path, home: str, range: str, said: str):
+    (folder / "pan-tilt.xml").write_text(PAN_TILT.replace("-70 40", range), encoding="utf-8")
+    (folder / "robot.toml").write_text(f"{DESCRIPTION}\n[home]\n{home}\n", encoding="utf-8")
+
+    if not said:
+        assert DescribedBody(folder / "robot.toml").state().pose.joints[-1].angle == pytest.approx(math.radians(13))
+        return
+    with pytest.raises(InputRefused, match=rf"robot\.toml: {said}"):
+        DescribedBody(folder / "robot.toml")
