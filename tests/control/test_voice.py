@@ -10,7 +10,7 @@ from engage_hri.schemas.behaviors import Mark, Speech
 from engage_hri.services.control.body import MovementAuthority, Spoke
 from engage_hri.services.control.voice.speaking import speak
 from engage_hri.services.control.voice.timeline import utter
-from engage_hri.services.runtime.virtual_time import run_virtual
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop, run_virtual
 
 
 def test_words_take_time_by_their_letters_and_pauses_by_their_punctuation():
@@ -140,3 +140,26 @@ def test_a_voice_that_is_ended_where_it_waits_says_no_word_twice(tenths: int) ->
         return [each.word async for each in speak(speech, authority) if isinstance(each, Spoke)]
 
     assert run_virtual(said()) == ["This"]
+
+
+class Creeping(VirtualTimeLoop):
+    """A clock that goes on while code runs, as a real one does."""
+
+    crept = 0.0
+
+    def time(self) -> float:
+        self.crept += 0.003
+        return super().time() + self.crept
+
+
+def test_what_becomes_due_while_it_looks_is_not_missed():
+    """Marks and ends of words are so near to one another that the clock often passes one between two looks at it."""
+    text = "a b c d e f g h i j k l m n o p q r s t u v w x y z"
+    speech = Speech(id="s", text=text, marks=tuple(Mark(f"m{at}", at) for at in range(0, len(text), 3)))
+
+    async def said() -> list[str]:
+        told = [each async for each in speak(speech, MovementAuthority(speech, "end"), pace=0.2)]
+        return [each.word for each in told if isinstance(each, Spoke)]
+
+    with asyncio.Runner(loop_factory=Creeping) as runner:
+        assert runner.run(said()) == text.split()

@@ -27,7 +27,7 @@ from engage_hri.services.control.voice.outlets import Nowhere, Outlet
 from engage_hri.services.control.voice.parts import Part, silent
 from engage_hri.services.control.voice.score import FADE, Cut, Gap, Item, More, faded, items_of
 from engage_hri.services.control.voice.visemes import Lips
-from engage_hri.services.control.waiting import Bell
+from engage_hri.services.control.waiting import EARLY, Bell
 
 OnLips = Callable[[Sequence[MouthShape]], None]
 CHECK: Seconds = 0.05
@@ -84,12 +84,13 @@ async def utter_parts(
     utterance = _Utterance(behavior, authority, parts, outlet, on_lips, bell)
     try:
         while not utterance.is_over:
+            looked = bell.now()
             utterance.hand_over()
             told = utterance.next_told()
             if told is not None:
                 yield told
             elif not utterance.is_over:
-                await bell.wait(utterance.deadline)
+                await bell.wait(utterance.deadline(looked))
     finally:
         utterance.end()
         for end in ends:
@@ -133,15 +134,17 @@ class _Utterance:
     def is_over(self) -> bool:
         return self._is_done or (self._is_cut and not self._coming)
 
-    @property
-    def deadline(self) -> Seconds:
-        """Loop time of what comes next by itself."""
+    def deadline(self, looked: Seconds) -> Seconds:
+        """Loop time of what comes next by itself. looked: when it was seen last what is due.
+
+        What has become due since then has not been seen yet.
+        """
         due = [self._begin + self._coming[0].at] if self._coming else []
         if self._ahead:
             due.append(self._begin + self._ahead[0].at - (0.0 if self._waits else self._outlet.lead))
         if self._sounds:
             due.append(self._bell.now() + CHECK)
-        return min((each for each in due if not self._bell.is_past(each)), default=inf)
+        return min((each for each in due if each > looked + EARLY), default=inf)
 
     def hand_over(self) -> None:
         """Hand over all that is due and may be said. Raises BodyFailed."""
