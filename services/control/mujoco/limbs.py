@@ -28,7 +28,6 @@ from engage_hri.services.control.ordinary import OrdinaryBody, Way
 from engage_hri.services.control.torso.kinematics import HAND_TO_TARGET, TABLE_TOP
 from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.steps import Steps, finished
-from engage_hri.services.runtime.unhurried import unhurried
 
 NODS: Mapping[str, tuple[Radians, Radians]] = {
     "NOD": (0.0, -math.radians(10.0)), "SHAKE": (math.radians(10.0), 0.0), "TILT": (0.0, math.radians(5.0)),
@@ -120,7 +119,7 @@ class Limb(OrdinaryBody):
     def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
         """Solve what estimates and motions of these behaviors will ask for, a slice at a time."""
         steps = self._ahead([each for each in behaviors if type_name(each) in self.types])
-        return None if next(steps, None) is None else unhurried(steps)
+        return None if next(steps, None) is None else self.stage.pulse.in_turns(steps)
 
     def _ahead(self, behaviors: Sequence[BlockBehavior]) -> Steps[None]:
         for behavior in behaviors:

@@ -1,9 +1,11 @@
 """Steps of a physics on loop time, as long as anything moves: a thin shell that knows neither robots nor plans."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.runtime.steps import Steps
+from engage_hri.services.runtime.unhurried import unhurried
 
 TICK: Seconds = 0.01
 """Seconds from one command to the servos to the next."""
@@ -46,6 +48,10 @@ class Pulse:
     def step(self) -> bool:
         """Compute up to now, between two ticks. False: there is more to compute."""
         return not self._is_awake or self._compute(self.now())
+
+    def in_turns(self, steps: Steps[None]) -> Awaitable[None]:
+        """Begin work that goes on between steps of the physics, and whatever else is due."""
+        return unhurried(steps)
 
     def _tick(self) -> None:
         now = self.now()
