@@ -295,11 +295,14 @@ def test_who_is_stopped_leaves_the_robot(drivers: Path, stop: signal.Signals, co
     os.mkfifo("diary")
     with open(os.open("diary", os.O_RDWR)) as diary:  # for both, so that there is no end of it
         command = (sys.executable, "-m", "engage_hri", "check-body", "drivers.py:Leaving", "--real-time")
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
             told = [next(diary) for _ in range(3)]  # it is described, and then checked
             process.send_signal(stop)
 
-            assert process.wait(60.0) == code
+            out, _ = process.communicate(timeout=60.0)
+            assert process.returncode == code
         told.append(next(diary))
 
     assert told == ["in\n", "out\n", "in\n", "out\n"]
+    assert "Stopped: 0 laws were judged" in out
+    assert "reports every sync point once and in order" in out

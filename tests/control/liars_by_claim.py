@@ -1,6 +1,5 @@
 """Bodies that claim what they do not do, of themselves or of what is to come. See `test_liars.py`."""
 
-import asyncio
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import aclosing
 
@@ -186,9 +185,7 @@ class Gaping(SimulatedBody):
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         if isinstance(behavior, Speech):
-            lips, self.on_lips = self.on_lips, lambda shapes: None
-            lips([MouthShape(self._loop.time(), 1.0), MouthShape(self._loop.time() + 1000.0, 0.0)])
-            asyncio.get_running_loop().call_soon(setattr, self, "on_lips", lips)
+            self.on_lips([MouthShape(self._loop.time(), 1.0), MouthShape(self._loop.time() + 1000.0, 0.0)])
         async with aclosing(super().perform(behavior, authority)) as stream:
             async for progress in stream:
                 yield progress

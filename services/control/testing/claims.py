@@ -41,10 +41,10 @@ SLOWER: Seconds = 0.5
 class ClaimLaws(Suite):
     """Part of `BodyContract`."""
 
-    topic = "predictions"
+    topic = "claims"
 
     async def test_is_along_the_ray_that_it_said(self, body: Body) -> None:
-        """On target the eyes or the forearm are along the `ray` of the estimate, within `accuracy`.
+        """Eyes and forearms are along the `ray` of the estimate once they are on target, within `accuracy`.
 
         Usually the ray is the one of the pose at the start, or its axis points the other way, from the target to the
         eyes. Generation counts by it what else a look or pointing may be taken for.

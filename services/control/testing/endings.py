@@ -276,8 +276,9 @@ class EndingLaws(Suite):
         timers = _timers()
         await asyncio.sleep(0.1)
         if later := _timers() - timers:
-            called = (getattr(each, "_callback", None) for each in later)
-            names = ", ".join(sorted(str(getattr(each, "__qualname__", "a timer")) for each in called))
+            names = ", ".join(
+                sorted(str(getattr(getattr(each, "_callback", None), "__qualname__", "a timer")) for each in later)
+            )
             broken(expected="no timer of the driver once it is disconnected", measured=f"this is set anew: {names}")
 
     async def test_an_aborted_speech_stops_at_a_word(self, body: Body) -> None:

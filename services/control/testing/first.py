@@ -33,7 +33,7 @@ SLACK: Seconds = 5.0
 
 
 class FirstLook(Struct, frozen=True, kw_only=True):
-    """What a body is, and what it cannot be judged by.
+    """Abilities of a body, and what it cannot be judged by.
 
     asked: behaviors that it is asked for. not_asked: those that it cannot do, in words, with the reason. estimate:
     median time that one estimate took. causes: what breaks already here. unable: for types of behaviors that laws

@@ -24,7 +24,7 @@ WIDEST: Radians = math.radians(10.0)
 class LookingLaws(Suite):
     """Part of `BodyContract`."""
 
-    topic = "truth"
+    topic = "looks"
 
     async def test_looks_at_where_its_target_is_now(self, body: Body) -> None:
         """A look at what has moved is where that is now. One that waits follows its target, or its eyes stay.

@@ -199,11 +199,11 @@ class PointsLaws(Suite):
         """
         if "speech" not in self.types(body):
             self.lacks(body, "it has no voice", "speech")
-        moved, told = body.on_lips, list[tuple[Seconds, Sequence[MouthShape]]]()
+        moved, told = body.on_lips, list[Sequence[MouthShape]]()
         now = asyncio.get_running_loop().time
 
         def listen(shapes: Sequence[MouthShape]) -> None:
-            told.append((now(), tuple(shapes)))
+            told.append(tuple(shapes))
             moved(shapes)
 
         body.on_lips = listen
@@ -214,21 +214,20 @@ class PointsLaws(Suite):
                 await asyncio.sleep(0.8)
                 stage.authority.revoke()
             await stage.over()
-            self._check_lips(speech, told, ended=now())
+            self._check_lips(speech, [each for each in told[-1:] if each] if is_cut else told, ended=now())
             told.clear()
 
-    def _check_lips(
-        self, speech: Speech, told: Sequence[tuple[Seconds, Sequence[MouthShape]]], ended: Seconds
-    ) -> None:
-        for at, shapes in told:
+    def _check_lips(self, speech: Speech, told: Sequence[Sequence[MouthShape]], ended: Seconds) -> None:
+        if told and not any(shape.opening > 0.0 for shapes in told for shape in shapes):
+            broken(speech, expected="a mouth that opens while it speaks", measured="shapes that are all closed")
+        for shapes in told:
             if any(later.at < earlier.at for earlier, later in pairwise(shapes)):
                 broken(speech, expected="shapes of the lips in time order", measured="one is earlier than one before")
             if shapes and shapes[-1].opening > 0.0:
                 broken(
                     speech, expected="a last shape that closes the mouth", measured=f"{shapes[-1].opening:.2f} open"
                 )
-            is_last = (at, shapes) == told[-1]
-            if shapes and is_last and (late := shapes[-1].at - ended) > PROMPT + self.tolerance:
+            if shapes and (late := shapes[-1].at - ended) > PROMPT + self.tolerance:
                 broken(speech, "end", expected="a mouth that is closed by then", measured=f"{ms(late)} later")
 
     async def _check_words(self, body: Body, speech: Speech) -> None:

@@ -114,7 +114,7 @@ def _laws(laws: Sequence[CheckedLaw], above: Container[str]) -> Iterator[Rendera
 
 
 def _broken(law: CheckedLaw, above: Container[str]) -> Iterator[Text]:
-    """What a law says, and what was found; what is told above is not told again."""
+    """Tell what a law says, and what was found but for what is told above."""
     yield Text(law.says, style="italic")
     findings = [each for each in law.findings if each.cause not in above]
     for finding in findings[:SHOWN]:

@@ -30,7 +30,7 @@ class Stated(Struct, frozen=True, kw_only=True):
 
 
 class Cause(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What keeps laws from being judged.
+    """Something that keeps laws from being judged.
 
     what: in words. behaviors: those that it keeps from being performed, in words; empty: it was found elsewhere.
     laws: names of the laws in which it showed, or which had nothing left to be judged by.

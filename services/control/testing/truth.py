@@ -179,7 +179,7 @@ class TruthLaws(Suite):
 
 
 def _kind(behavior: BlockBehavior) -> tuple[str, tuple[str, ...]]:
-    """What behaviors have in common that use the same parts in the same way: of a face, some are one."""
+    """Family and points of a behavior: those that share both use the same parts in the same way."""
     row = TYPES[type_name(behavior)]
     return row.family or row.name, row.points
 
