@@ -33,7 +33,7 @@ TELL_APART: Radians = radians(0.25)
 ARMS = ("left_arm", "right_arm")
 LIFTING: Seconds = 0.35
 """Seconds in which an arm that waits is raised."""
-MOMENTS = 25
+MOMENTS = 121
 """Instants at which arms and a trunk that move at once are held against the table."""
 
 

@@ -20,12 +20,12 @@ from engage_hri.services.control.torso.path import Array, JointMotion, Leg, Path
 
 ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table."""
-FINELY = np.linspace(0.0, 1.0, 65)
+FINELY = np.linspace(0.0, 1.0, 129)
 """The same where the trunk leans: there is less room."""
 UP = (0.2, 0.4, 0.6, 0.8)
 """Radians by which an arm is raised on its way home, in the order in which they are tried."""
 RAISING: Seconds = 0.4
-MOMENTS = 25
+MOMENTS = 121
 """Instants at which an arm that goes home is held against the table while the trunk moves."""
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
