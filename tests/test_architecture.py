@@ -49,8 +49,8 @@ LAYERS = {
     " simulation study > client > requests > runtime > bus > tangram",
     "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
-    " > composed guarded ordinary voice > questions shown > actions estimates refusals switching unheard waiting > live > body"
-    " > calibration > extras fitting > variability > config",
+    " > composed guarded ordinary voice > questions shown > actions estimates refusals switching unheard waiting"
+    " > live > body > calibration > extras fitting > variability > config",
     "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"
     " > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
