@@ -106,7 +106,7 @@ SYNCS = SYNC_POINTS[1:]
 
 
 def kind_of(name: str, body: Capabilities) -> FaultKind | None:
-    """What a kind of fault is for a body; None: it does not say so."""
+    """Look up what a kind of fault is for a body; None: nobody says so."""
     return next((kind for kind in body.fault_kinds if kind.kind == name), KINDS.get(name))
 
 

@@ -9,6 +9,7 @@ SHELLS = {
     "services/control/questions.py",  # answers what behaviors would take
     "services/control/estimates.py",  # publishes mistakes of the body
     "services/control/switching.py",  # publishes the faults that are on
+    "services/control/guarded.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points

@@ -23,13 +23,13 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.composed import composed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
 from engage_hri.services.control.members import Member
-from engage_hri.services.runtime.configuration import explained
 
 GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""

@@ -5,7 +5,6 @@ an estimate says that it cannot be done, a behavior fails, a measurement tells t
 """
 
 import asyncio
-import time
 import traceback
 from collections.abc import (
     AsyncGenerator,
@@ -216,12 +215,11 @@ class GuardedBody(Body):
     @contextmanager
     def _timed(self, when: str) -> Iterator[None]:
         """Tell once if a call has held everything up, by the loop's clock: virtual time never stands still."""
-        clock = _clock()
-        began = clock()
+        began = _now()
         try:
             yield
         finally:
-            if (seconds := clock() - began) > STANDSTILL and when not in self._slow:
+            if (seconds := _now() - began) > STANDSTILL and when not in self._slow:
                 self._slow.add(when)
                 reason = f"its driver blocks {when}: everything has stood still for {seconds:.1f} s"
                 advice = "no method may wait but by await: see docs/control.md"
@@ -275,11 +273,11 @@ def _of(kind: type[T], told: object) -> T:
     return told
 
 
-def _clock() -> Callable[[], Seconds]:
+def _now() -> Seconds:
     try:
-        return asyncio.get_running_loop().time
-    except RuntimeError:
-        return time.monotonic
+        return asyncio.get_running_loop().time()
+    except RuntimeError:  # nobody waits
+        return 0.0
 
 
 def held_up(frame: FrameType | None) -> str:

@@ -1,17 +1,15 @@
 """Reading of configurations: TOML in, frozen structs out. A bad one is refused, with the file and the key."""
 
 import os
-import re
 import tomllib
 from collections.abc import Container, Iterable, Mapping
-from difflib import get_close_matches
 from pathlib import Path
-from types import UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.utf8 import is_utf8, utf8
 from engage_hri.services.bus.config import BusConfig, environment
@@ -70,54 +68,9 @@ def bus_config(**given: object) -> BusConfig:
     return read(_OnlyBus, settings=settings, variables=os.environ).bus
 
 
-def explained(error: msgspec.ValidationError, kind: Any) -> tuple[str, str]:
-    """Explain an error of a value of this type: what is wrong and would be right, and the key; empty: the whole."""
-    reason, _, place = str(error).partition(" - at `$")
-    key = place.strip("`").lstrip(".")
-    kinds = _inside(kind, key)
-    if reason.startswith("Invalid enum value"):
-        choices = [repr(choice) for each in kinds for choice in _choices(each)]
-        reason = f"{reason.removeprefix('Invalid enum value ')} is none of {', '.join(choices)}"
-    elif unknown := re.fullmatch(r"Object contains unknown field `(.*)`", reason):
-        fields = [field for each in kinds for field in getattr(each, "__struct_fields__", ())]
-        close = get_close_matches(unknown[1], fields, n=1)
-        known = f"do you mean `{close[0]}`?" if close else f"known are {', '.join(fields)}"
-        reason = f"unknown key `{unknown[1]}`; {known}"
-    return reason, key
-
-
 def _explained(error: msgspec.ValidationError, kind: Any) -> str:
     reason, key = explained(error, kind)
     return f"{reason}, in `{key}`" if key else reason
-
-
-def _inside(kind: Any, key: str) -> list[Any]:
-    """Types that a value inside of one of this type may have. key: its place, such as `stalls[0].part`."""
-    kinds = _alternatives(kind)
-    for step in re.findall(r"\[|[^.\[\]]+(?=[.\[]|$)", key):
-        if step == "[":
-            inner = [part for each in kinds for part in get_args(each) if part is not Ellipsis]
-        else:
-            hints = [get_type_hints(each) for each in kinds if _is_struct(each)]
-            inner = [each[step] for each in hints if step in each]
-        kinds = [part for each in inner for part in _alternatives(each)]
-    return kinds
-
-
-def _is_struct(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, Struct)
-
-
-def _alternatives(kind: Any) -> list[Any]:
-    is_union = get_origin(kind) in (Union, UnionType)
-    return [part for each in get_args(kind) for part in _alternatives(each)] if is_union else [kind]
-
-
-def _choices(kind: Any) -> list[str]:
-    """Words that a Literal type allows."""
-    if get_origin(kind) is Literal:
-        return list(get_args(kind))
-    return [choice for part in get_args(kind) for choice in _choices(part)]
 
 
 def _not_a_number(table: dict[str, Any], place: str = "") -> str:

@@ -36,7 +36,7 @@ class HeardSpeech(Struct, frozen=True):
 
 
 class Ears:
-    """What of the robot's words there is to hear: none while its voice makes no sound (fault `mute`)."""
+    """Ears for the robot's words: there are none to hear while its voice makes no sound (fault `mute`)."""
 
     def __init__(self) -> None:
         self._is_mute = False

@@ -16,6 +16,13 @@ from tests.realizer.fake_body import FakeBody
 pytestmark = pytest.mark.real_time
 
 
+async def later(seconds: float) -> None:
+    """Let time pass, which is what a second signal is told by."""
+    passed = asyncio.get_running_loop().create_future()
+    asyncio.get_running_loop().call_later(seconds, passed.set_result, None)
+    await passed
+
+
 BLOCKING = """
 import time
 from tests.control.test_drivers import Bare
@@ -37,7 +44,7 @@ async def test_a_driver_that_never_comes_back_is_left_at_the_second_and_named(
     play = await start("play", tmp_path / "b.xml", "--embedded", "--body", tmp_path / "liar.py")
     await line(play, "blocks", log=False)
     play.send_signal(how)
-    await asyncio.sleep(1.1)
+    await later(1.1)
     assert play.returncode is None
     play.send_signal(how)
     async with asyncio.timeout(PATIENCE):
@@ -63,9 +70,7 @@ async def test_a_second_ctrl_c_ends_it_at_once_without_a_word(tmp_path: Path, pa
             realizer.send_signal(signal.SIGSTOP)
             play.send_signal(signal.SIGINT)
             for seconds in (pause, 0.05):  # of two that are pending at once the process sees one
-                later = asyncio.get_running_loop().create_future()
-                asyncio.get_running_loop().call_later(seconds, later.set_result, None)
-                await later
+                await later(seconds)
                 with suppress(ProcessLookupError):
                     play.send_signal(signal.SIGINT)
             async with asyncio.timeout(PATIENCE):

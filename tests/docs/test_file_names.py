@@ -17,6 +17,7 @@ THEIRS = {
     "my_robot.py",
     "my_voice.py",
     "pan_tilt.py",
+    "pan_tilt_sdk.py",
     "reachy.py",
 }
 """Files of whoever reads."""

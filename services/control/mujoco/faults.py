@@ -62,7 +62,7 @@ KINDS = (*SHARED, *OURS)
 
 
 def told(kinds: Iterable[str]) -> tuple[FaultKind, ...]:
-    """What some of our kinds do, for `Capabilities.fault_kinds`."""
+    """Tell what some of our kinds do, for `Capabilities.fault_kinds`."""
     return tuple(replace(OURS[kind], kind=kind) for kind in kinds)
 
 
