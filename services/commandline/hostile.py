@@ -46,7 +46,7 @@ class Options(Embodied):
 def main(options: Options) -> int:
     kinds = _kinds(options.only or ())
     config = options.load()
-    make = partial(made, config.control) if options.body else None
+    make = partial(made, config.control, is_guarded=False) if options.body else None
     console = Console(quiet=options.quiet)
     counts: Counter[str] = Counter()
     bad: list[Report] = []

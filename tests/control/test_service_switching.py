@@ -88,7 +88,7 @@ async def test_a_voice_that_goes_fails_by_name(hub: MemoryHub) -> None:
     assert isinstance(outcome, BehaviorOutcome)
     assert outcome.status == "failed"
     assert outcome.fault is not None
-    assert "mute" in outcome.fault.reason
+    assert outcome.fault.reason == "the voice cannot speak"
     assert outcome.spoken == "one two"
 
 

@@ -60,7 +60,7 @@ async def test_it_can_be_mute_without_knowing_and_voiceless_knowing_it() -> None
     voice.switch_faults([BodyFault(kind="mute")])
     assert not voice.state().speaking
     voice.switch_faults([BodyFault(kind="voiceless")])
-    with pytest.raises(BodyFailed, match="mute"):
+    with pytest.raises(BodyFailed, match="the voice cannot speak"):
         await stage.over()
 
     assert not voice.estimate(SPEECH, BodyPose(), WORLD).feasible

@@ -102,7 +102,7 @@ async def test_a_voice_that_knows_it_is_mute_refuses():
     body = body_with(mute="refuse")
 
     assert not body.estimate(Speech(id="s", text="hello"), None, WORLD).feasible
-    with pytest.raises(BehaviorRefused, match="mute"):
+    with pytest.raises(BehaviorRefused, match="the voice cannot speak"):
         await performed(body, Speech(id="s", text="hello"))
 
 
