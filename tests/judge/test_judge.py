@@ -35,7 +35,7 @@ MANY: dict[tuple[Kind, bool], int] = {
     ("alone", False): 18, ("streams", False): 15, ("sentences", False): 12,
     ("alone", True): 9, ("streams", True): 6, ("webs", False): 24, ("webs", True): 12,
 }  # fmt: skip
-"""Number of stories of each kind, without and with a body that has faults. `python -m tests.judge` plays any number."""
+"""Number of stories of each kind, without and with a body that has faults; more by `python -m tests.judge`."""
 PREDICTED_BESIDE_OTHERS, OFF_BESIDE_OTHERS = 60, 0.1
 """The same of stories with several blocks, and the share of blocks there."""
 PREDICTED, OTHERS = 200, 31
