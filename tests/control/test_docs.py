@@ -3,9 +3,11 @@
 import re
 import sys
 import types
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from unittest.mock import patch
+from typing import Any
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.services.control.config import Stall, Variability
@@ -21,12 +23,22 @@ CODE, SDK, TEST, VOICE, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(e
 """The driver, a simulated SDK for it, its test, and a voice."""
 
 
+@contextmanager
+def importable(name: str, module: Any) -> Iterator[None]:
+    """Let a module be imported meanwhile. `patch.dict` would forget all else that is imported meanwhile, too."""
+    sys.modules[name] = module
+    try:
+        yield
+    finally:
+        del sys.modules[name]
+
+
 @cache
 def driver() -> types.ModuleType:
     """The driver of the page, as a module, on its simulated SDK."""
     sdk, module = types.ModuleType("pan_tilt_sdk"), types.ModuleType("pan_tilt")
     exec(compile(SDK, str(PAGE), "exec"), sdk.__dict__)
-    with patch.dict(sys.modules, {"pan_tilt_sdk": sdk}):
+    with importable("pan_tilt_sdk", sdk):
         exec(compile(CODE, str(PAGE), "exec"), module.__dict__)
     return module
 
@@ -35,7 +47,7 @@ def driver() -> types.ModuleType:
 def suite() -> type[BodyContract]:
     """The test on the page, as it stands there."""
     module = types.ModuleType("test_pan_tilt")
-    with patch.dict(sys.modules, {"pan_tilt": driver()}):
+    with importable("pan_tilt", driver()):
         exec(compile(TEST, str(PAGE), "exec"), module.__dict__)
     found = module.TestPanTilt
     assert isinstance(found, type)
@@ -58,7 +70,7 @@ def test_the_suite_on_the_page_is_one():
     (code,) = re.findall(r"```python\n(.*?)```", CONTRACT.read_text(encoding="utf-8"), re.DOTALL)
     theirs, module = types.ModuleType("my_robot"), types.ModuleType("test_my_robot")
     theirs.MyRobot = Robot  # type: ignore[attr-defined]
-    with patch.dict(sys.modules, {"my_robot": theirs}):
+    with importable("my_robot", theirs):
         exec(compile(code, str(CONTRACT), "exec"), module.__dict__)
     suite = module.TestMyRobot()
 
