@@ -70,7 +70,7 @@ class _Connection:
     async def measurement(self) -> str:
         message = await self._state.receive()
         if message.type is not aiohttp.WSMsgType.TEXT:
-            raise Lost(Fault(reason=f"the daemon at {self._url} has closed the connection", advice=_ADVICE))
+            raise Lost(self._closed())
         return str(message.data)
 
     async def command(self, text: str) -> None:
@@ -78,8 +78,11 @@ class _Connection:
             raise Lost(Fault(reason=f"the daemon refuses a target: {self._refusal}", advice=VERSION))
         try:
             await self._targets.send_str(text)
-        except (aiohttp.ClientError, OSError) as error:
-            raise Lost(_unreachable(self._url, error)) from error
+        except (aiohttp.ClientError, OSError) as error:  # noticed before the end of the measurements
+            raise Lost(self._closed()) from error
+
+    def _closed(self) -> Fault:
+        return Fault(reason=f"the daemon at {self._url} has closed the connection", advice=_ADVICE)
 
 
 _ADVICE = (

@@ -74,6 +74,13 @@ class Mockup:
         assert self._process is not None
         self._process.send_signal(number)
 
+    def revive(self) -> None:
+        """Let it go on if it is frozen, and start it if it is gone."""
+        if self._process is not None and self._process.poll() is None:
+            self.send(signal.SIGCONT)
+        else:
+            self.start()
+
     def stop(self) -> None:
         if self._process is not None:
             self._process.send_signal(signal.SIGCONT)

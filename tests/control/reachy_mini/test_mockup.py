@@ -47,9 +47,16 @@ ATTEMPTS = 3
 
 
 @pytest.fixture(scope="module")
-def mockup(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mockup]:
-    with running(tmp_path_factory.mktemp("daemon")) as mockup:
-        yield mockup
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mockup]:
+    with running(tmp_path_factory.mktemp("daemon")) as daemon:
+        yield daemon
+
+
+@pytest.fixture
+def mockup(daemon: Mockup) -> Iterator[Mockup]:
+    """The daemon, which is there again for the next test whatever comes of this one."""
+    yield daemon
+    daemon.revive()
 
 
 class Witness:
