@@ -134,7 +134,7 @@ def _laid(ends: Array, natural: Array, bounds: Array) -> tuple[Array, Array, Arr
     Returns the terms of each leg, its seconds, how far all joints turn on it, and whether that is beyond doubt.
     """
     begin, into, goal, out = ends
-    terms, seconds = np.empty((6, *begin.shape)), natural.copy()
+    terms, seconds = np.zeros((6, *begin.shape)), natural.copy()  # of a leg that is not laid nothing counts
     turned, is_sure = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.bool_)
     left = np.arange(len(begin))
     for stretch in STRETCHES[:TRIES]:
