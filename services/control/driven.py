@@ -160,13 +160,8 @@ class DrivenBody(Body):
                 raise refused(behavior, reason)
 
     def _goals(self, behavior: BlockBehavior, world: World) -> Mapping[str, Angles]:
-        """The goals of a behavior by the first point of each instant, when the joints have to be there.
-
-        Raises BehaviorRefused.
-        """
-        row = TYPES[type_name(behavior)]
-        first = {sync: group[0] for group in row.one_instant for sync in group}
-        return {first.get(sync, sync): goal for sync, goal in self._way(behavior, world)}
+        """The goals of a behavior, as `by_instant`. Raises BehaviorRefused."""
+        return by_instant(behavior, self._way(behavior, world))
 
     def _seconds(self, here: Angles, goal: Angles) -> Seconds:
         """Time of a motion: that of the joint that takes longest, speeding up, cruising and braking."""
@@ -178,6 +173,12 @@ class DrivenBody(Body):
                 ramp = top * top / change
                 longest = max(longest, way / top + top / change if way > ramp else 2 * math.sqrt(way / change))
         return longest + self.settling if longest else 0.0
+
+
+def by_instant(behavior: BlockBehavior, way: Way) -> Mapping[str, Angles]:
+    """The goals of a way by the first point of each instant, when the joints have to be there."""
+    first = {sync: group[0] for group in TYPES[type_name(behavior)].one_instant for sync in group}
+    return {first.get(sync, sync): goal for sync, goal in way}
 
 
 def refused(behavior: BlockBehavior, reason: str) -> BehaviorRefused:

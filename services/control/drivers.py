@@ -183,8 +183,9 @@ def _given(asked: Named, driver: Driver, config: ControlConfig) -> tuple[Mapping
     """The settings of a driver, and where they stand: by the name of its class, or of the file or entry point."""
     names = dict.fromkeys((getattr(driver, "__name__", asked.name), asked.name))
     found = next((name for name in names if name in config.drivers), None)
-    if found is None:
-        rest = [name for name in config.drivers if name not in _known(config)]
+    if found is None and config.drivers:
+        known = _known(config)
+        rest = [name for name in config.drivers if name not in known]
         for name in names:
             if close := get_close_matches(name, rest, n=1, cutoff=0.7):
                 raise _refusal(

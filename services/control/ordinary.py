@@ -35,7 +35,7 @@ from engage_hri.services.control.body import (
     Revoked,
     TakenOver,
 )
-from engage_hri.services.control.driven import Angles, DrivenBody
+from engage_hri.services.control.driven import Angles, DrivenBody, by_instant
 from engage_hri.services.control.driven import Way as Way
 from engage_hri.services.control.refusals import infeasible
 
@@ -87,7 +87,7 @@ class OrdinaryBody(DrivenBody):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         try:
-            way, goals = self._way(behavior, world), self._goals(behavior, world)
+            way = self._way(behavior, world)
         except BehaviorRefused as refused:
             target = getattr(behavior, "target", "")
             warning = "NO_SUCH_TARGET" if target and world.entity(target) is None else "CANNOT_CREATE_BEHAVIOR"
@@ -98,6 +98,7 @@ class OrdinaryBody(DrivenBody):
         here |= {angle.joint: angle.angle for angle in pose.joints if angle.joint in here} if pose else {}
         row, phases, since = TYPES[type_name(behavior)], [], "start"
         at: Angles = here
+        goals = by_instant(behavior, way)
         target = way[-2 if len(way) > 1 else -1][1]
         for sync in row.points[1:]:
             goal = goals.get(sync, at)
@@ -166,12 +167,12 @@ class OrdinaryBody(DrivenBody):
     def state(self) -> BodyState:
         angles = self._measured()
         arm = self.forearm(angles)
-        self._note_arrival()
+        self._note_arrival(angles)
         return BodyState(
             pose=_pose(angles), moving=self._goal is not None, gaze=self.gaze(angles),
             left_arm=arm if self.part == "left_arm" else None,
             right_arm=arm if self.part != "left_arm" else None,
-            looking_at=self._look.target if self._look is not None and self._rests_on(self._look) else "",
+            looking_at=self._look.target if self._look is not None and self._rests_on(self._look, angles) else "",
         )  # fmt: skip
 
     def see(self, world: World) -> None:
@@ -211,8 +212,8 @@ class OrdinaryBody(DrivenBody):
         was, now = before.entity(target), self.world.entity(target)
         return was is not None and now is not None and was.position != now.position
 
-    def _rests_on(self, look: _Look) -> bool:
-        off = self._off(look.goal())
+    def _rests_on(self, look: _Look, angles: Angles) -> bool:
+        off = self._off(look.goal(), angles)
         return off is None or abs(off[1]) <= self.capabilities.gaze_half_angle
 
     # -- motion -------------------------------------------------------------------------------------------------
@@ -277,16 +278,16 @@ class OrdinaryBody(DrivenBody):
         self.go(goal, max(0.0, seconds - self.settling))
         return seconds
 
-    def _note_arrival(self) -> None:
+    def _note_arrival(self, angles: Angles) -> None:
         """Note that a motion that nobody waits for has come to its end."""
-        if self._goal is not None and self._off(self._goal) is None:
+        if self._goal is not None and self._off(self._goal, angles) is None:
             self._goal = None
             if self._doing is None:
                 self._look_at(self._settled, lambda: self._base)
 
-    def _off(self, goal: Angles) -> tuple[str, Radians] | None:
-        """The joint that is farthest from the goal, and by how much; None: all are near."""
-        here = self._measured()
+    def _off(self, goal: Angles, here: Angles | None = None) -> tuple[str, Radians] | None:
+        """The joint that is farthest from the goal, and by how much; None: all are near. here: None: measured now."""
+        here = self._measured() if here is None else here
         off = {joint: goal[joint] - here[joint] for joint in goal}
         joint = max(off, key=lambda name: abs(off[name]), default="")
         return (joint, off[joint]) if off and abs(off[joint]) > self.near else None

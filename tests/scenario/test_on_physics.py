@@ -3,7 +3,6 @@
 The film of it: `engage demo --virtual-time --body mujoco --voice espeak --set control.drivers.mujoco.film=FILE.png`.
 """
 
-import re
 import wave
 from typing import Any
 
@@ -19,6 +18,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.recogniser import Recogniser
 from tests.scenario.playing import Record, play
 from tests.scenario.test_appendix_b import EXPECTED, PERSON_LOOKS, ROBOT_LOOKS, by_step, looks, played
 
@@ -92,34 +92,16 @@ def test_each_word_sounds_before_it_is_told_and_nothing_sounds_between_speeches(
 
 def test_words_end_where_a_recogniser_hears_their_ends(heard: Any) -> None:
     """PocketSphinx, by forced alignment. It gives up on longer texts of this voice, and on words it does not know."""
-    sphinx = pytest.importorskip("pocketsphinx", reason="pip install pocketsphinx")
-    decoder = sphinx.Decoder(samprate=16000, loglevel="FATAL")
-    for word, phones in (("trapezoid", "T R AE P AH Z OY D"), ("tangram", "T AE NG G R AE M"), ("ummmm", "AH M")):
-        decoder.add_word(word, phones, word == "ummmm")
+    recogniser = Recogniser()
     record, sound, rate = heard
     starts, errors = begun(record), list[float]()
     for key, said in spoken(record).items():
         since, until = starts[key] - 0.03, said[-1][1] + 0.03
-        piece = sound[max(0, int(since * rate)) : int(until * rate)]
-        times = np.arange(0.0, len(piece) / rate, 1 / 16000)
-        samples = np.interp(times, np.arange(len(piece)) / rate, piece).astype("<i2").tobytes()
-        ends = _aligned(decoder, samples, " ".join(re.sub("[^a-z']", "", word.lower()) for word, _ in said))
-        if len(ends) == len(said):
-            errors += [abs(at - since - end) for (_, at), end in zip(said, ends, strict=True)]
+        found = recogniser.aligned(sound, rate, since, until, [word for word, _ in said])
+        if len(found) == len(said):
+            errors += [abs(at - end) for (_, at), (_, end) in zip(said, found, strict=True)]
 
     assert len(errors) > 80
     assert np.median(errors) < 0.03
     assert np.quantile(errors, 0.95) < 0.1
     assert max(errors) < 0.15
-
-
-def _aligned(decoder: Any, samples: bytes, words: str) -> list[float]:
-    """Seconds at which words end in a sound of 16000 samples per second; empty: it finds no way."""
-    quiet = bytes(2 * 4800)
-    decoder.set_align_text(words)
-    decoder.start_utt()
-    decoder.process_raw(quiet + samples + quiet, full_utt=True)
-    decoder.end_utt()
-    if decoder.hyp() is None:
-        return []
-    return [(each.end_frame + 1) / 100 - 0.3 for each in decoder.seg() if each.word[0] not in "<(["]

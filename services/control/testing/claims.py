@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase, PlannedTime, Ray
 from engage_hri.schemas.units import Degrees, Radians, Seconds
@@ -15,7 +14,7 @@ from engage_hri.services.control.testing.laws import angles, broken, degrees, li
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.predictions import has_joints
 from engage_hri.services.control.testing.rays import angle
-from engage_hri.services.control.testing.stage import PATIENCE, Stage, done, times
+from engage_hri.services.control.testing.stage import PATIENCE, Stage, done, target_point, times
 from engage_hri.services.control.testing.suite import Suite, does_not_apply, pose_angles
 from engage_hri.services.control.testing.witness import arms
 from engage_hri.services.runtime.steps import finished
@@ -57,7 +56,7 @@ class ClaimLaws(Suite):
                 self._check_ray(behavior, said, [ray for ray in _rays(stage.state, behavior) if ray is not None])
 
     def _check_ray(self, behavior: BlockBehavior, said: Ray | None, seen: Sequence[Ray]) -> None:
-        sync = _target_point(behavior)
+        sync = target_point(behavior)
         if not seen:
             return
         if said is None:
@@ -99,7 +98,7 @@ class ClaimLaws(Suite):
                 joints = sorted(self.joints(body, behavior))
                 if not joints:
                     continue
-                estimate, sync = body.estimate(behavior, None, self.world), _target_point(behavior)
+                estimate, sync = body.estimate(behavior, None, self.world), target_point(behavior)
                 async with recorded(body, joints) as recording:
                     at = times(await done(body, behavior))
                     await asyncio.sleep(0.02)
@@ -128,7 +127,7 @@ class ClaimLaws(Suite):
         if not SHORTER * way - slack <= counted <= (math.inf if is_by_a_way else LONGER * way + slack):
             broken(
                 behavior,
-                _target_point(behavior),
+                target_point(behavior),
                 expected=f"about {way:.0f} degrees of its joints {what}",
                 measured=f"`head_degrees` {said.head_degrees:.0f}, `arm_degrees` {said.arm_degrees:.0f}",
             )
@@ -252,13 +251,8 @@ class _OnTarget(Stage):
         super().__init__(body, behavior, "end")
 
     def hear(self, progress: Progress) -> None:
-        if isinstance(progress, Reached) and progress.sync == _target_point(self.behavior):
+        if isinstance(progress, Reached) and progress.sync == target_point(self.behavior):
             self.state = self._suite.observed(self._body)
-
-
-def _target_point(behavior: BlockBehavior) -> str:
-    """The sync point at which a behavior is on target."""
-    return "stroke" if "stroke" in sync_points(behavior) else "end"
 
 
 def _leads_to_hold(leg: Sequence[Phase]) -> bool:

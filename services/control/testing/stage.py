@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
@@ -17,6 +18,11 @@ LOOK_EVERY: Seconds = 0.02
 def default(points: Sequence[str]) -> tuple[str, ...]:
     """Leave out `stroke:2` and on, which a body may tell of or not."""
     return tuple(sync for sync in points if not sync.startswith("stroke:"))
+
+
+def target_point(behavior: BlockBehavior) -> str:
+    """The sync point at which a behavior is on target, if it has one."""
+    return "stroke" if "stroke" in sync_points(behavior) else "end"
 
 
 def times(progress: Sequence[Progress]) -> dict[str, Seconds]:

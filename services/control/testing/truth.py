@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import TYPES, sync_points
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -17,7 +17,7 @@ from engage_hri.services.control.testing.laws import Finding, LawBroken, angles,
 from engage_hri.services.control.testing.motions import Recording, recorded
 from engage_hri.services.control.testing.playing import Played
 from engage_hri.services.control.testing.predictions import has_joints
-from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, done, standing, times
+from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, done, standing, target_point, times
 from engage_hri.services.control.testing.suite import STILL, Suite, does_not_apply, trials
 from engage_hri.services.control.testing.witness import CROWDS, Witness, crowded
 
@@ -104,7 +104,7 @@ class TruthLaws(Suite):
                     stage.authority.extend(hold)
                 if lies := await witness.close():
                     raise LawBroken(lies)
-                sync = "stroke" if "stroke" in sync_points(behavior) else "end"
+                sync = target_point(behavior)
                 points = [phase.to for phase in estimate.phases]
                 takes = sum(phase.natural for phase in estimate.phases[: points.index(sync) + 1])
                 if not joints or not has_joints(behavior) or takes < 0.05:

@@ -33,8 +33,6 @@ TELL_APART: Radians = radians(0.25)
 ARMS = ("left_arm", "right_arm")
 LIFTING: Seconds = 0.35
 """Seconds in which an arm that waits is raised."""
-MOMENTS = 121
-"""Instants at which arms and a trunk that move at once are held against the table."""
 
 
 def places(torso: Parts, now: Seconds) -> tuple[Trunk, ...]:
@@ -216,7 +214,7 @@ def _clears(
     until = max(arms.end, trunk.end)
     if aim is not None:  # Its way home is laid when it leaves its target.
         until = arms.crossing(arms.path.marks["stroke_end"]) or until
-    at = np.linspace(now, until, MOMENTS).tolist()
+    at = np.linspace(now, until, tracks.MOMENTS).tolist()
     leaning, angles = trunk.positions(at)[:, list(columns)], arms.positions(at)[:, which]
     if aim is not None:
         angles = aim.within(angles + [aim.offset(place) for place in leaning])

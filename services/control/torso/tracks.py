@@ -26,7 +26,7 @@ UP = (0.2, 0.4, 0.6, 0.8)
 """Radians by which an arm is raised on its way home, in the order in which they are tried."""
 RAISING: Seconds = 0.4
 MOMENTS = 121
-"""Instants at which an arm that goes home is held against the table while the trunk moves."""
+"""Instants at which arms and a trunk that move at once are held against the table."""
 GAZE_SHARES = (0.56, 0.42)
 """Shares of the neck's speed and of its acceleration for gaze; the rest is for nods, which are short and quick."""
 
@@ -228,16 +228,15 @@ def meets_table(
     """
     if not path.length:
         return False
-    shares = ALONG if tuple(trunks) == (UPRIGHT,) else FINELY
+    is_upright = tuple(trunks) == (UPRIGHT,)
+    shares = ALONG if is_upright else FINELY
     if since:
         shares = min(since / path.length, 1.0) + max(0.0, 1.0 - since / path.length) * shares
     angles = path.positions(shares)
     if TRUNK[0] in joints:
         columns = [list(joints).index(joint) for joint in TRUNK]
         return above_table_along(angles, joints, angles[:, columns]) < 0.0
-    return (
-        above_table(angles, joints, UPRIGHT if len(trunks) == 1 == trunks.count(UPRIGHT) else np.array(trunks)) < 0.0
-    )
+    return above_table(angles, joints, UPRIGHT if is_upright else np.array(trunks)) < 0.0
 
 
 def above_table(angles: Array, joints: Sequence[str], trunk: Trunk | Array) -> Meters:
