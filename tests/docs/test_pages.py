@@ -45,6 +45,10 @@ EXCUSED = {
     ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
     ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",
     ".venv/bin/python -m pip install -e '.[reachy-mini]'": "the same",
+    "cc examples/connection_events.c '$(pkg-config' --cflags --libs 'zenohpico)' -DZENOH_LINUX -o events": (
+        "needs zenoh-pico; tests/cli/test_c_example.py"
+    ),
+    "./events tcp/127.0.0.1:7447": "the same",
     "make reachy-mini": "takes a minute and a half; .ci/run does it",
 }
 """Commands that do not run here, and why."""
