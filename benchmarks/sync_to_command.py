@@ -235,7 +235,7 @@ async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
         desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
         bus.answer(keys.ESTIMATE, estimate)
         bus.declare_alive()
-        with bus.subscribe(*RequestDesk.patterns("control")) as inbox:
+        with bus.subscribe(*RequestDesk.patterns("control"), *Requester.PATTERNS[:1]) as inbox:
             sizes = []
             for lap in range(2):  # The first one pays for what all blocks share.
                 gc.collect()
@@ -247,6 +247,7 @@ async def memory_per_block(behaviors: int, blocks: int = 100) -> float:
                 while begun < blocks:
                     received = await inbox.next()
                     assert received is not None
+                    requests.feed(received)
                     if isinstance(command := desk.take(received), PerformBehavior):
                         desk.accept(command.id)
                         begun += command.block.startswith(f"block-{lap}-")  # Slow machines: others go on meanwhile.
