@@ -4,18 +4,23 @@
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint docs generate coverage bench reachy-mini clean
+.PHONY: demo test lint style docs generate coverage bench reachy-mini clean
 
 demo: $(READY)
 	@$(BIN)/engage demo $(ARGS)
 
-test: lint
-	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
+# mypy keeps one processor busy for as long as others would wait for it: it runs beside the tests.
+test: style
+	@$(BIN)/mypy --no-error-summary & types=$$!; \
+	$(BIN)/pytest -n auto --dist loadfile $(ARGS); tests=$$?; \
+	wait $$types && exit $$tests
 
-lint: $(READY)
+lint: style
+	@$(BIN)/mypy --no-error-summary
+
+style: $(READY)
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/ruff format --check --quiet . || { echo "run: $(BIN)/ruff format ." >&2; exit 1; }
-	@$(BIN)/mypy --no-error-summary
 
 # Twice as long as the tests alone. The tracer does not see what Zenoh calls on threads of its own (services/bus/zenoh).
 coverage: $(READY)

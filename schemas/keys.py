@@ -259,7 +259,7 @@ def server_of(key: str) -> str:
 
 def matches(pattern: str, key: str) -> bool:
     """Tell whether the key expression `pattern` (`*`: one chunk, `**`: any number) includes the concrete `key`."""
-    return _matches(pattern.split("/"), key.split("/"))
+    return _matches(pattern.split("/"), key.split("/")) if "*" in pattern else pattern == key
 
 
 def first(patterns: Iterable[str], key: str) -> str | None:

@@ -7,13 +7,13 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
-from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Mark, Speech
+from engage_hri.schemas.documents.escaping import escape, quoteattr
 from engage_hri.schemas.documents.xml_source import XML, local_name
 from engage_hri.schemas.units import Seconds
 

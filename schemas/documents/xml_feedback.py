@@ -37,7 +37,7 @@ TAIL = "</ebml:feedback>\n"
 _ATTRIBUTE = re.compile(r"(?!xml|id$|type$)[A-Za-z_][A-Za-z0-9_.-]*", re.IGNORECASE)
 _EBML_TYPES = ("event", "turn", "unknown")
 _PREFIXES: Any = {None: BML_1_0, "ebml": EBML}
-_UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def _ebml(*names: str) -> dict[str, str]:

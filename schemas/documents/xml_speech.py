@@ -6,11 +6,11 @@ it. `xml:space="preserve"` keeps the text as it stands.
 
 import re
 from typing import NamedTuple
-from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
 from engage_hri.schemas.behaviors import Mark, Speech, Timing
+from engage_hri.schemas.documents.escaping import escape, quoteattr
 from engage_hri.schemas.documents.xml_source import (
     BML_1_0,
     CORE,

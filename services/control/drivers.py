@@ -13,11 +13,10 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
-from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from msgspec import Struct
@@ -30,6 +29,9 @@ from engage_hri.services.control.composed import composed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
 from engage_hri.services.control.members import Member
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 GROUP = "engage_hri.bodies"
 """Group of entry points by which an installed package offers its drivers."""
@@ -140,7 +142,7 @@ def load(spec: str) -> Driver:
     if colon:
         _find_beside(Path.cwd())
         return _attribute(_imported(where, spec), name, spec)
-    offered = {point.name: point for point in entry_points(group=GROUP)}
+    offered = {point.name: point for point in _offered()}
     if spec in offered:
         try:
             return offered[spec].load()  # type: ignore[no-any-return]
@@ -196,7 +198,14 @@ def _given(asked: Named, driver: Driver, config: ControlConfig) -> tuple[Mapping
 
 def _known(config: ControlConfig) -> set[str]:
     """Names that settings may have."""
-    return {*(each.name for each in _asked(config)), *BUILT_IN, *(point.name for point in entry_points(group=GROUP))}
+    return {*(each.name for each in _asked(config)), *BUILT_IN, *(point.name for point in _offered())}
+
+
+def _offered() -> "EntryPoints":
+    """Entry points of the drivers of all installed packages."""
+    from importlib.metadata import entry_points  # loads the parser of e-mail, and a body of ours needs none
+
+    return entry_points(group=GROUP)
 
 
 # -- imports ------------------------------------------------------------------------------------------------------

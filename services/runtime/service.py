@@ -10,7 +10,6 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from engage_hri.schemas import keys
@@ -93,6 +92,8 @@ async def _rival(bus: Bus, presence: Subscription) -> None:
 @cache
 def installed_version() -> str:
     """Version of Engage, as its package says; `unknown` without one."""
+    from importlib.metadata import PackageNotFoundError, version  # loads the parser of e-mail, and few ask
+
     try:
         return version("engage-hri")
     except PackageNotFoundError:  # run from its sources

@@ -54,8 +54,7 @@ class _Timer(asyncio.TimerHandle):
         super().__init__(when, *rest)
         self._place = (when, number)
 
-    def __lt__(self, other: object) -> bool:
-        assert isinstance(other, _Timer)
+    def __lt__(self, other: "_Timer") -> bool:  # type: ignore[override]
         return self._place < other._place
 
 

@@ -132,7 +132,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Greatest deviation of reaction times, either way. The scenario's order has room for 0.1 s."""
     await_participants: tuple[str, ...] = ("control", "generation", "realizer", "recognition")
     """Participants that must be on the bus before the person comes. They may start in any order, hours apart."""
-    entrance: Seconds = 1.0
+    entrance: Seconds = 0.0
     """Time from then until the person comes."""
     frame: Seconds = 1 / 15
     """Time between two reports of the world while something moves, and of raw perception while the person sits there.

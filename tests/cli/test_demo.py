@@ -70,19 +70,21 @@ def test_each_block_starts_and_ends_once(played: dict[str, Any]) -> None:
 def test_the_same_seed_gives_the_same_session(engage: Engage, played: dict[str, Any], tmp_path: Path) -> None:
     events, feedback = tmp_path / "events.jsonl", tmp_path / "feedback.jsonl"
 
-    result = engage(*VIRTUAL, "--seed", 1, "--events", events, "--feedback", feedback)
+    # What is the default is said here, and changes nothing.
+    human, resolution = ("--human", "appendix-b"), ("--resolution", "table")
+    result = engage(*VIRTUAL, "--seed", 1, *human, *resolution, "--events", events, "--feedback", feedback)
 
     assert result.out == played["out"]
     assert events.read_bytes() == (played["folder"] / "events.jsonl").read_bytes()
     assert feedback.read_bytes() == (played["folder"] / "feedback.jsonl").read_bytes()
 
 
-def test_another_seed_gives_other_times_but_the_same_story(
+def test_another_seed_gives_other_times_but_the_same_story_and_quiet_prints_nothing(
     engage: Engage, played: dict[str, Any], tmp_path: Path
 ) -> None:
     events = tmp_path / "events.jsonl"
 
-    engage(*VIRTUAL, "--quiet", "--seed", 2, "--events", events)
+    assert engage(*VIRTUAL, "--quiet", "--seed", 2, "--events", events) == (0, "", "")
 
     def story(path: Path) -> list[tuple[str, str, list[str]]]:
         return [
@@ -96,10 +98,6 @@ def test_another_seed_gives_other_times_but_the_same_story(
     assert story(events) == story(first)
 
 
-def test_quiet_prints_nothing(engage: Engage) -> None:
-    assert engage(*VIRTUAL, "--quiet") == (0, "", "")
-
-
 def test_lines_on_stdout_leave_it_to_them(engage: Engage) -> None:
     result = engage(*VIRTUAL, "--events", "-")
 
@@ -107,21 +105,20 @@ def test_lines_on_stdout_leave_it_to_them(engage: Engage) -> None:
     assert "MTBCE" in result.err
 
 
-def test_the_resolution_decides_what_counts_as_shared(engage: Engage, tmp_path: Path) -> None:
-    shared = {}
-    for resolution in ("table", "object"):
-        path = tmp_path / f"{resolution}.jsonl"
-        engage(*VIRTUAL, "--quiet", "--resolution", resolution, "--events", path)
+def test_the_resolution_decides_what_counts_as_shared(engage: Engage, played: dict[str, Any], tmp_path: Path) -> None:
+    by_object = tmp_path / "object.jsonl"
+    engage(*VIRTUAL, "--quiet", "--seed", 1, "--resolution", "object", "--events", by_object)
+
+    def shared(path: Path) -> int:
         events = [line for line in decided(path).values() if line["cause"] == "reference"]
-        shared[resolution] = Counter(line["state"] for line in events)["succeeded"]
+        return Counter(line["state"] for line in events)["succeeded"]
 
-    assert shared["object"] < shared["table"]
+    assert shared(by_object) < shared(played["folder"] / "events.jsonl")
 
 
-def test_a_misplaced_piece_is_asked_for_again(engage: Engage) -> None:
-    usual = engage(*VIRTUAL).out
-    result = engage(*VIRTUAL, "--human", "misplacing")
+def test_a_misplaced_piece_is_asked_for_again(engage: Engage, played: dict[str, Any]) -> None:
+    result = engage(*VIRTUAL, "--seed", 1, "--human", "misplacing")
 
-    fragments = [int(re.findall(r"(\d+) fragments", text)[-1]) for text in (usual, result.out)]
+    fragments = [int(re.findall(r"(\d+) fragments", text)[-1]) for text in (played["out"], result.out)]
     assert result.code == 0
     assert fragments[1] > fragments[0]

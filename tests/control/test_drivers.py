@@ -118,7 +118,9 @@ async def test_a_driver_is_made_with_its_settings():
 
 
 async def test_an_installed_package_offers_bodies(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(drivers, "entry_points", lambda group: [Offering()] if group == drivers.GROUP else [])
+    monkeypatch.setattr(
+        "importlib.metadata.entry_points", lambda group: [Offering()] if group == drivers.GROUP else []
+    )
 
     assert type(_made(ControlConfig(body="offered"))) is Bare
     with pytest.raises(InputRefused, match="do you mean offered"):

@@ -76,7 +76,9 @@ class Physics:
         self._lead = np.array([motor.damping / motor.stiffness for motor in motors.values()])
         self._drag = np.array([motor.drag for motor in motors.values()])
         self._most = np.array([motor.limit for motor in motors.values()], dtype=float)
-        self._limit = self._most.copy()
+        self._whole = self._most.copy()
+        """Torques that the motors can give as long as they are not hot."""
+        self._limit = self._whole
         self._strength, self._heating = np.ones(len(motors)), np.ones(len(motors))
         self._stick, self._bent = np.zeros(len(motors)), np.zeros(len(motors))
         self._friction = np.array([motor.friction for motor in motors.values()])
@@ -184,10 +186,12 @@ class Physics:
             reference = self.commands.plan + (reference - self.commands.plan) * (steps / count)
         start, slope = self.commands.advance(reference, steps * step, angles, self.speeds, reach)
         servo, further = start - self._offset + self._lead * slope, slope * step
+        is_sticky = bool(self._stick.any())
         for _ in range(steps):
             servo += further
             self._commanded[self._u] = servo
-            self._stick_or_slip(step)
+            if is_sticky:
+                self._stick_or_slip(step)
             mujoco.mj_step(self.model, self.data)
         self.time += steps * step
         self._heat((self.torques / self._most) ** 2, steps * step)
@@ -200,8 +204,6 @@ class Physics:
 
         de Wit et al. 1995. MuJoCo's own friction of joints creeps under any torque, and so never sticks.
         """
-        if not self._stick.any():
-            return
         speeds, stiffness = self.speeds, self._stick / BEND
         holds = self._stick * (SLIPPING + (1.0 - SLIPPING) * np.exp(-((speeds / SLIP_SPEED) ** 2)))
         change = speeds - stiffness * np.abs(speeds) / np.maximum(holds, 1e-9) * self._bent
@@ -212,8 +214,9 @@ class Physics:
     def _heat(self, loads: Array, seconds: Seconds) -> None:
         """Warm the motors by the squares of the shares of their torques, and let a hot one give less."""
         self.temperatures = warmed(self.temperatures, self._heating, loads, seconds)
-        limit = self._most * self._strength * derating(self.temperatures)
-        if (np.abs(limit - self._limit) > 1e-9).any():
+        is_hot = self.temperatures.max() > WARM
+        limit = self._whole * derating(self.temperatures) if is_hot else self._whole
+        if limit is not self._limit and (np.abs(limit - self._limit) > 1e-9).any():
             self._limit = limit
             self.model.actuator_forcerange[self._u] = np.stack((-limit, limit), axis=1)
 
@@ -239,6 +242,7 @@ class Physics:
                 self.temperatures[number] = condition.warm
             elif condition.heating <= 1.0:
                 self.temperatures[number] = min(self.temperatures[number], COLD)
+        self._whole = self._most * self._strength
         self.model.dof_damping[self._v] = self._drag
         self.model.dof_frictionloss[self._v] = self._friction
         self._heat(np.zeros(len(self.joints)), 0.0)

@@ -40,6 +40,7 @@ from engage_hri.services.control.torso.estimates import beneath_a_look, infeasib
 from engage_hri.services.control.torso.files import repertoire_of
 from engage_hri.services.control.torso.following import follow, is_behind
 from engage_hri.services.control.torso.idling import idling
+from engage_hri.services.control.torso.measured import Measured, measured
 from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.postures import is_brief, postures
@@ -95,8 +96,7 @@ class SimulatedBody(Body):
         self.on_lips = self.move_lips
         self._offsets: dict[str, float] = {}
         """Radians by which the true angle of a joint is more than what it measures, as its calibration says."""
-        self._shown: tuple[dict[str, float], BodyPose, Ray, Ray, Ray] | None = None
-        """The last pose, as a message, and the rays of eyes and arms in it: often nothing has moved since."""
+        self._told: Measured | None = None
 
     @classmethod
     def configured(cls, config: ControlConfig, settings: None) -> Self:
@@ -181,13 +181,9 @@ class SimulatedBody(Body):
 
     def state(self) -> BodyState:
         now = self._loop.time()
-        pose = tracks.pose_at(self._torso.tracks, now)
-        if self._shown is None or self._shown[0] != pose:
-            arms = kinematics.arm(pose, "left"), kinematics.arm(pose, "right")
-            self._shown = (pose, kinematics.pose_message(pose), kinematics.gaze(pose), *arms)
-        _, message, gaze, left_arm, right_arm = self._shown
+        self._told = told = measured(self._torso.tracks, now, self._told)
         return BodyState(
-            pose=message, gaze=gaze, left_arm=left_arm, right_arm=right_arm,
+            pose=told.pose, gaze=told.gaze, left_arm=told.left_arm, right_arm=told.right_arm,
             moving=self._voice.is_busy or any(track.is_moving(now) for track in self._torso.tracks.values()),
             looking_at=self._torso.attention.fixated(now), speaking=self._voice.saying,
         )  # fmt: skip
@@ -199,8 +195,8 @@ class SimulatedBody(Body):
     # -- what it does not measure -------------------------------------------------------------------------------
 
     def seen(self) -> Seen | None:
-        told = tracks.pose_at(self._torso.tracks, self._loop.time())
-        return truth.seen(told, truth.beside(self._deviations, self._offsets))
+        by = truth.beside(self._deviations, self._offsets)
+        return truth.seen(tracks.pose_at(self._torso.tracks, self._loop.time()), by) if by else None
 
     def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
         return truth.ray_at(part, pose)

@@ -118,6 +118,12 @@ class Motion:
         rate, state = piece.rate_at(t), self.path.at(min(piece.s_at(t), self._stop))
         return JointMotion(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
 
+    def position(self, t: Seconds) -> Array:
+        """Position of the joints at t alone: after the end the same array each time."""
+        if t >= self.end:
+            return self.at(t).q
+        return self.path.position(min(self._piece(t).s_at(t), self._stop))
+
     def positions(self, times: Sequence[Seconds]) -> Array:
         """Positions of the joints at instants in order: an array of instants x joints."""
         length = self.path.length or 1.0

@@ -127,6 +127,14 @@ class Path:
         segment = self._segment(s)
         return JointMotion(*_evaluated(segment.coefficients, min(max(s - segment.start, 0.0), segment.seconds)))
 
+    def position(self, s: Seconds) -> Array:
+        """Position q at s alone, as in `at`."""
+        if not self._segments:
+            return self.at(s).q
+        segment = self._segment(s)
+        powers = np.power(min(max(s - segment.start, 0.0), segment.seconds), _POWERS)
+        return np.asarray(np.dot(powers, segment.coefficients))
+
     def positions(self, shares: Array) -> Array:
         """Positions q at these shares of the length, in order: an array of shares x joints."""
         if not self._segments:

@@ -5,7 +5,7 @@ Only the nod tilts the head.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -85,8 +85,8 @@ class Track:
         self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
         self.columns = slice(0, len(self.joints))
         """Which of the joints of the motion are its own."""
-        self._last: JointMotion | None = None
-        """Whose angles are known as numbers: of a motion that is over, it is the same all the time."""
+        self._last: Array | None = None
+        """Position whose angles are known as numbers: of a motion that is over, it is the same all the time."""
         self._angles: tuple[float, ...] = ()
 
     def play(self, motion: Motion, column: int = 0, aim: Aim | None = None) -> None:
@@ -115,12 +115,11 @@ class Track:
         return not self.trunk.is_moving(t) and aim.is_laid_for(self.trunk.angles(t))
 
     def angles(self, t: Seconds) -> tuple[float, ...]:
-        state = self.motion.at(t)
-        columns = self.columns
+        position, columns = self.motion.position(t), self.columns
         if self.aim is not None and not self.is_still(t, self.aim):
-            return tuple(self.aim.within(state.q[columns] + self.aim.offset(self.trunk.angles(t))).tolist())
-        if state is not self._last:
-            self._last, self._angles = state, tuple(state.q[columns].tolist())
+            return tuple(self.aim.within(position[columns] + self.aim.offset(self.trunk.angles(t))).tolist())
+        if position is not self._last:
+            self._last, self._angles = position, tuple(position[columns].tolist())
         return self._angles
 
     def is_moving(self, t: Seconds) -> bool:
@@ -264,10 +263,15 @@ def _least(angles: Array, joints: Sequence[str], trunks: Array | None) -> Meters
 
 def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:
     """The angle of every joint, nod included."""
+    return pose_of(tracks, [track.angles(t) for track in tracks.values()])
+
+
+def pose_of(tracks: Mapping[str, Track], angles: Iterable[Sequence[float]]) -> dict[str, float]:
+    """The angle of every joint, nod included, from those of each track."""
     pose: dict[str, float] = {}
-    for part, track in tracks.items():
-        angles = zip(track.joints, track.angles(t), strict=True)
-        pose.update(angles if part != "nod" else [(joint, pose.get(joint, 0.0) + angle) for joint, angle in angles])
+    for (part, track), own in zip(tracks.items(), angles, strict=True):
+        named = zip(track.joints, own, strict=True)
+        pose.update(named if part != "nod" else [(joint, pose.get(joint, 0.0) + angle) for joint, angle in named])
     return pose
 
 
