@@ -39,8 +39,7 @@ SAME: Seconds = 0.1
 ELEMENTS, TO_FORESEE, TO_SETTLE, A_WAY_HOME = 256, 16, 4, 384
 """Elements that an event counts for (see `runtime.steps`), each behavior under way at it, and a way home of it."""
 PLANNING, LAYING, TELLING, SETTING_OUT = 256, 512, 256, 512
-"""Elements that the stages of a behavior's beginning count for: as much as where arms have to be kept clear of the
-table. The copy stands still between them."""
+"""Elements of the stages of a beginning, as many as where arms have to be kept clear. The copy stands still there."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
 
