@@ -5,13 +5,14 @@ sets out later, what the arms have still to do is laid anew. A trunk that would 
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from itertools import pairwise
 from math import ceil, inf, radians
 
 import numpy as np
 from msgspec.structs import replace
 
-from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.aiming import SAME, TRUNK, UPRIGHT, Aim, Trunk
 from engage_hri.services.control.torso.course import Course, Impossible
@@ -181,7 +182,7 @@ def _given_way(
         path = relaid(torso, run, course, now)
         if path is None or not _are_clear(path.legs[-1].goal, course.joints, around):
             return None
-        motion, every = Motion(path, now, cruise=run.motion.cruise), range(len(course.joints))
+        motion, every = run.foreseen(path, now), range(len(course.joints))
         is_clear = _clears(motion, every, course.joints, course.aim, trunk, columns, now)
         return (course, path) if is_clear else None
     start = tracks.joined([torso.tracks[part].at(now) for part in run.course.parts])
@@ -205,10 +206,30 @@ def _given_way(
             if not _are_clear(path.legs[-1].goal, joints, around):
                 return None  # All of them end there.
             continue
-        motion = Motion(path, now, cruise=run.motion.cruise)
+        motion = run.foreseen(path, now)
         if _clears(motion, range(len(joints)), joints, None, trunk, columns, now):
             return replace(run.course, trunks=around), path
     return None
+
+
+def keep_clear(torso: Parts, run: Run) -> None:
+    """Let an arm that is slowed go at its own pace, if the trunk would come with it into the table otherwise."""
+    now, trunk = torso.clock.time(), torso.tracks["torso"]
+    parts = [part for part in run.course.parts if part in ARMS]
+    if not parts or "torso" in run.course.parts or not trunk.is_moving(now):
+        return
+    around = places(torso, now)
+    if all(_is_clear(torso.tracks[part], around, now) for part in parts):
+        return
+    own = copy(run.motion)
+    own.run_at(run.cruise, now)
+    columns, every = range(trunk.columns.start, trunk.columns.stop), range(len(run.course.joints))
+    asked_for, free = (
+        _least_above(motion, every, run.course.joints, run.course.aim, trunk.motion, columns, now)
+        for motion in (run.motion, own)
+    )
+    if asked_for < 0.0 and asked_for < free:
+        run.forget_pace(now)
 
 
 def _clears(
@@ -220,7 +241,20 @@ def _clears(
     columns: Sequence[int],
     now: Seconds,
 ) -> bool:
-    """True if arms stay clear of the table as both move at once. which: of the joints in their motion."""
+    """True if arms stay clear of the table as both move at once."""
+    return _least_above(arms, which, joints, aim, trunk, columns, now) >= 0.0
+
+
+def _least_above(
+    arms: Motion,
+    which: Sequence[int] | slice,
+    joints: tuple[str, ...],
+    aim: Aim | None,
+    trunk: Motion,
+    columns: Sequence[int],
+    now: Seconds,
+) -> Meters:
+    """Least distance by which arms stay out of the table as both move at once. which: joints of their motion."""
     until = max(arms.end, trunk.end)
     if aim is not None:  # Its way home is laid when it leaves its target.
         until = arms.crossing(arms.path.marks["stroke_end"]) or until
@@ -228,7 +262,7 @@ def _clears(
     leaning, angles = trunk.positions(at)[:, list(columns)], arms.positions(at)[:, which]
     if aim is not None:
         angles = aim.within(angles + aim.offsets(leaning))
-    return tracks.above_table_along(angles, joints, leaning) >= 0.0
+    return tracks.above_table_along(angles, joints, leaning)
 
 
 def _are_clear(pose: Sequence[float], joints: tuple[str, ...], around: tuple[Trunk, ...]) -> bool:

@@ -294,7 +294,10 @@ class Torso:
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
         run.brake_for_hold(now)
-        if run.keep_pace(now) or is_extended:
+        is_paced = run.keep_pace(now)
+        if is_paced:
+            clearing.keep_clear(self, run)
+        if is_paced or is_extended:
             self.attention.follow_run(run, now)
 
     def deviate(self, deviations: Deviations) -> None:

@@ -1,5 +1,6 @@
 """A behavior in motion: how far it may go, which sync points are still to come, and the faults that are due."""
 
+from copy import copy
 from math import inf
 
 from msgspec.structs import replace
@@ -116,6 +117,18 @@ class Run:
                 # A slow motor is slow at its fastest, too; up to that rate the body makes up for it.
                 self.motion.reach(marks[sync], at, now, self.cruise * self.motion.path.fastest)
         return True
+
+    def foreseen(self, path: Path, now: Seconds) -> Motion:
+        """How it would move along another path from now on: as far and as fast as it may and is asked to."""
+        trial = copy(self)
+        trial.play(Motion(path, now, cruise=self.cruise, limit=self.limit(path)))
+        trial.keep_pace(now)
+        return trial.motion
+
+    def forget_pace(self, now: Seconds) -> None:
+        """Go on at its own rate, until it is next asked to keep its pace."""
+        self.motion.run_at(self.cruise, now)
+        self._aim = None
 
     def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:
         """Sync points ahead that are asked for at an instant, with that instant."""
