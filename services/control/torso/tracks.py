@@ -230,7 +230,7 @@ def meets_table(
     """
     if not path.length:
         return False
-    is_upright = tuple(trunks) == (UPRIGHT,)
+    is_upright = tuple(trunks) == (UPRIGHT,) and TRUNK[0] not in joints
     shares = ALONG if is_upright else FINELY
     if since:
         shares = min(since / path.length, 1.0) + max(0.0, 1.0 - since / path.length) * shares
