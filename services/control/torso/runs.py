@@ -119,7 +119,7 @@ class Run:
         return True
 
     def foreseen(self, path: Path, now: Seconds) -> Motion:
-        """How it would move along another path from now on: as far and as fast as it may and is asked to."""
+        """Tell how it would move along another path from now on: as far and as fast as it may and is asked to."""
         trial = copy(self)
         trial.play(Motion(path, now, cruise=self.cruise, limit=self.limit(path)))
         trial.keep_pace(now)

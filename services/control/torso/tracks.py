@@ -274,7 +274,7 @@ def _least(angles: Array, joints: Sequence[str], trunks: Array | None) -> Meters
 
 
 def _by_side(angles: Array, joints: Sequence[str], trunks: Array | None) -> Iterator[Array]:
-    """How far each arm stays out of the table, of those that `joints` has. angles: joints x any shape."""
+    """Tell how far each arm of `joints` stays out of the table. angles: joints x any shape."""
     row = {joint: number for number, joint in enumerate(joints)}
     for side in kinematics.SHOULDER:
         if f"{side}_elbow" in row:
