@@ -24,10 +24,11 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.services.control.blame import seen_at, words_of
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.composed import composed
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.guarded import GuardedBody, place_of, words_of
+from engage_hri.services.control.guarded import GuardedBody
 from engage_hri.services.control.members import Member
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def make(asked: Named, config: ControlConfig) -> Body:
     except EngageError:
         raise
     except Exception as error:
-        raise _refusal(f"its driver breaks as it is made: {words_of(error)}", asked.spec, place_of(error)) from error
+        raise _refusal(f"its driver breaks as it is made: {words_of(error)}", asked.spec, seen_at(error)) from error
     if not isinstance(body, Body):
         advice = "it is to be a class that inherits from `engage_hri.Body`, or a function that returns one"
         raise _refusal(f"it makes a {type(body).__name__}, and no body", asked.spec, advice)
@@ -147,7 +148,7 @@ def load(spec: str) -> Driver:
         try:
             return offered[spec].load()  # type: ignore[no-any-return]
         except Exception as error:
-            raise _refusal(f"it cannot be imported: {words_of(error)}", spec, place_of(error)) from error
+            raise _refusal(f"it cannot be imported: {words_of(error)}", spec, seen_at(error)) from error
     known = sorted({*BUILT_IN, *offered})
     close = get_close_matches(spec, known, n=1)
     advice = f"do you mean {close[0]}? " if close else ""
@@ -215,7 +216,7 @@ def _imported(module: str, spec: str, extra: str = "") -> ModuleType:
     try:
         return import_module(module)
     except Exception as error:
-        advice = place_of(error)
+        advice = seen_at(error)
         if isinstance(error, ModuleNotFoundError):
             missing = error.name or ""
             if extra:
@@ -246,7 +247,7 @@ def _file(path: Path, spec: str) -> ModuleType:
         del sys.modules[name]
         if not isinstance(error, Exception | SystemExit):
             raise
-        raise _refusal(f"it cannot be imported: {words_of(error)}", spec, place_of(error)) from error
+        raise _refusal(f"it cannot be imported: {words_of(error)}", spec, seen_at(error)) from error
     return module
 
 

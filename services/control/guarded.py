@@ -5,7 +5,6 @@ an estimate says that it cannot be done, a behavior fails, a measurement tells t
 """
 
 import asyncio
-import traceback
 from collections.abc import (
     AsyncGenerator,
     AsyncIterator,
@@ -30,6 +29,7 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.blame import seen_at, words_of
 from engage_hri.services.control.body import (
     Body,
     BodyFailed,
@@ -255,7 +255,7 @@ class GuardedBody(Body):
             error = error.exceptions[0]
         return Fault(
             reason=f"its driver breaks {when}: {words_of(error)}", where=f"body {self.name}",
-            advice=place_of(error), service="control",
+            advice=seen_at(error), service="control",
         )  # fmt: skip
 
     def _placed(self, error: EngageError) -> EngageError:
@@ -290,21 +290,3 @@ def held_up(frame: FrameType | None) -> str:
         return ""
     own = next((each for each in frames if not each.f_code.co_filename.startswith(_PACKAGE)), frames[0])
     return f"a driver's call had not come back: {own.f_code.co_name}, {own.f_code.co_filename}, line {own.f_lineno}"
-
-
-def words_of(error: BaseException) -> str:
-    """Say what was raised, on one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def place_of(error: BaseException) -> str:
-    """Say at which line of which file an error was raised; empty: it is not known.
-
-    That is the last one outside of this package and of what imports modules, so of the driver.
-    """
-    if isinstance(error, SyntaxError):
-        return f"see {error.filename}, line {error.lineno}"
-    frames = [each for each in traceback.extract_tb(error.__traceback__) if "importlib" not in each.filename]
-    own = [each for each in frames if not each.filename.startswith(_PACKAGE)]
-    last = (own or frames)[-1:]
-    return f"see {last[0].filename}, line {last[0].lineno}" if last else ""

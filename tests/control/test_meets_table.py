@@ -6,7 +6,7 @@ import pytest
 
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.path import Leg, Path, resting
-from engage_hri.services.control.torso.tracks import ALONG, limits_of, meets_table
+from engage_hri.services.control.torso.tracks import ALONG, FINELY, limits_of, meets_table
 
 PARTS = [
     ("left_arm",), ("right_arm",), ("left_arm", "right_arm"), ("torso", "right_arm"),
@@ -32,10 +32,11 @@ def path(chance: random.Random, parts: tuple[str, ...]) -> Path:
 def test_many_poses_at_once_meet_the_table_where_one_of_them_does(parts: tuple[str, ...]) -> None:
     chance, hits = random.Random("+".join(parts)), 0
     joints = tuple(joint for part in parts for joint in kinematics.joints_of(part))
+    shares = FINELY if "torso" in parts else ALONG
     sides = [side for side in kinematics.SHOULDER if f"{side}_arm" in parts]
     for _ in range(150):
         made = path(chance, parts)
-        poses = [dict(zip(joints, made.at(made.length * share).q.tolist(), strict=True)) for share in ALONG]
+        poses = [dict(zip(joints, made.at(made.length * share).q.tolist(), strict=True)) for share in shares]
         meets = any(kinematics.touches_table({**kinematics.HOME, **pose}, sides) for pose in poses)
         assert meets_table(made, joints) == (meets and made.length > 0.0)
         hits += meets

@@ -5,7 +5,6 @@ import traceback
 from collections.abc import Sequence, Set
 from contextlib import suppress
 from pathlib import Path
-from sysconfig import get_paths
 from types import TracebackType
 from typing import Any
 
@@ -13,16 +12,13 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import EngageError
+from engage_hri.services.control.blame import place_of, words_of
 from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed
-from engage_hri.services.control.guarded import words_of
 from engage_hri.services.control.testing.laws import Finding, LawBroken, named
 from engage_hri.services.control.testing.stage import PATIENCE, Stage
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
 
 _SUITE = str(Path(__file__).parent)
-_PACKAGE = str(Path(__file__).parents[3])
-_LIBRARY = tuple(f"{Path(get_paths()['stdlib']) / name}" for name in ("asyncio", "contextlib.py", "concurrent"))
-"""Modules of Python through which errors of tasks come."""
 
 
 class Case:
@@ -101,7 +97,7 @@ def findings_of(error: BaseException, behavior: str = "") -> Sequence[Finding] |
                 )
             ]
         case _ if _is_ours(error):
-            measured = f"{words_of(error)}{place_of(error)}"
+            measured = f"{words_of(error)}{_at(error)}"
             advice = "this is a bug of the suite, or it cannot deal with what the body has told before"
             return [Finding(behavior=behavior, expected="that the suite can go on", measured=measured, advice=advice)]
         case Exception():
@@ -109,7 +105,7 @@ def findings_of(error: BaseException, behavior: str = "") -> Sequence[Finding] |
                 Finding(
                     behavior=behavior,
                     expected="no error but BehaviorRefused and BodyFailed",
-                    measured=f"{words_of(error)}{place_of(error)}",
+                    measured=f"{words_of(error)}{_at(error)}",
                     advice="control fails the behavior and takes the body home at such an error",
                     cause=cause_of(error),
                 )
@@ -124,18 +120,13 @@ def cause_of(error: BaseException) -> str:
             return f"it {'failed' if isinstance(error, BodyFailed) else 'refused'}: {error.fault.reason}"
         case Deadlock() | TimeRanOut():
             return "something waits for what never comes"
-    return f"its driver breaks: {words_of(error)}{place_of(error)}"
+    return f"its driver breaks: {words_of(error)}{_at(error)}"
 
 
-def place_of(error: BaseException) -> str:
-    """Say where an error was raised: ` at pan_tilt.py, line 14`.
-
-    That is the last place in the driver: outside of this package if there is one, and of Python's library.
-    """
-    frames = _beyond_the_suite(error) or traceback.extract_tb(error.__traceback__)
-    chosen = [each for each in frames if not each.filename.startswith((_PACKAGE, *_LIBRARY))]
-    chosen = chosen or [each for each in frames if not each.filename.startswith(_LIBRARY)] or list(frames)
-    return f" at {Path(chosen[-1].filename).name}, line {chosen[-1].lineno}" if chosen else ""
+def _at(error: BaseException) -> str:
+    """Say where an error was raised: ` at pan_tilt.py, line 14`. What it came through in the suite does not count."""
+    place = place_of(error, _beyond_the_suite(error))
+    return f" at {Path(place.file).name}, line {place.line}" if place else ""
 
 
 def _is_ours(error: BaseException) -> bool:

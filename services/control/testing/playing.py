@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable, Iterable, Mapping
 
 from engage_hri.schemas.body import Capabilities
-from engage_hri.schemas.body_faults import KINDS, BodyFault, parts_of, words
+from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, words
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.testing.plugin import virtual_loop
 
@@ -12,19 +12,23 @@ Make = Callable[[], Body]
 BY_ENCODERS = ("noisy",)
 """Kinds that make measurements worse and nothing else: for these a suite states `noise`."""
 AMOUNT = 10.0
-"""Of a kind that needs an amount: degrees."""
+"""Of a kind that needs an amount and has no usual one: degrees, as far as its range goes."""
 
 
 def playable(able: Capabilities) -> tuple[BodyFault, ...]:
     """List a fault of each kind that a body can play, in every part that can have it, or in its first joint."""
     found = []
     for kind in able.faults:
-        row = KINDS.get(kind)
-        if kind in BY_ENCODERS or (row is not None and row.on == "joint" and not parts_of(row, able)):
+        row, part, amount = kind_of(kind, able), "", None
+        if kind in BY_ENCODERS:
             continue
-        is_exact = row is not None and row.needs_amount
-        part = parts_of(row, able)[0] if row is not None and row.on == "joint" else ""
-        found.append(BodyFault(kind=kind, part=part, amount=AMOUNT if is_exact else None))
+        if row is not None and row.on == "joint":
+            if not (known := parts_of(row, able)):
+                continue
+            part = known[0]
+        if row is not None and row.needs_amount:
+            amount = row.usual if row.usual is not None else min(max(AMOUNT, row.low), row.high)
+        found.append(BodyFault(kind=kind, part=part, amount=amount))
     return tuple(found)
 
 

@@ -103,6 +103,13 @@ class Aim(Struct, frozen=True, kw_only=True):
         turn, lean = trunk
         return np.subtract(self.angles((float(turn), float(lean))), _supposed(self))
 
+    def offsets(self, trunks: Array) -> Array:
+        """The same for an arm with the trunk at many places at once, places x 2: an array of places x joints."""
+        assert self.side is not None, "arms are asked for"
+        free = kinematics.arm_angles_over(self.side, self.target, self.pitch, trunks.T)
+        is_there = np.all(np.abs(trunks - self.trunk) < SAME, axis=1, keepdims=True)
+        return np.where(is_there, 0.0, self.within(np.stack(free, axis=1)) - _supposed(self))
+
     def added(self, path: JointMotion, trunk: JointMotion) -> JointMotion:
         """The state of the joints whose path is in the state `path`, while the trunk is in the state `trunk`."""
         by = self._moved(trunk)

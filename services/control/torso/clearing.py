@@ -5,13 +5,14 @@ sets out later, what the arms have still to do is laid anew. A trunk that would 
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from itertools import pairwise
 from math import ceil, inf, radians
 
 import numpy as np
 from msgspec.structs import replace
 
-from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.aiming import SAME, TRUNK, UPRIGHT, Aim, Trunk
 from engage_hri.services.control.torso.course import Course, Impossible
@@ -23,6 +24,7 @@ from engage_hri.services.control.torso.parts import Parts
 from engage_hri.services.control.torso.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
+from engage_hri.services.runtime.steps import Steps
 
 APART: Radians = radians(4.0)
 """Greatest angle between two places of the trunk that are looked at."""
@@ -31,6 +33,8 @@ UNDER_WAY = 9
 TELL_APART: Radians = radians(0.25)
 """Places that are nearer to each other count as one: over the table that makes 2 mm."""
 ARMS = ("left_arm", "right_arm")
+OF_A_WAY = 384
+"""Elements that a way on which an arm may give way counts for (see `runtime.steps`)."""
 LIFTING: Seconds = 0.35
 """Seconds in which an arm that waits is raised."""
 
@@ -84,7 +88,7 @@ def _is_same(one: Sequence[float], other: Sequence[float]) -> bool:
     return all(abs(a - b) < SAME for a, b in zip(one, other, strict=True))
 
 
-def check(torso: Parts, course: Course, path: Path, pose: Mapping[str, float] | None) -> None:
+def check(torso: Parts, course: Course, path: Path, pose: Mapping[str, float] | None) -> Steps[None]:
     """Check that arms can be kept clear of the table while the trunk moves along `path`. Raises Impossible.
 
     pose: of arms that rest; None: they are where they are, and do what they do.
@@ -100,14 +104,14 @@ def check(torso: Parts, course: Course, path: Path, pose: Mapping[str, float] | 
             joints = torso.tracks[part].joints
             is_clear = _are_clear([pose[joint] for joint in joints], joints, around)
         else:
-            is_clear = _stays_clear(torso, part, course, Motion(path, torso.clock.time()), around)
+            is_clear = yield from _stays_clear(torso, part, course, Motion(path, torso.clock.time()), around)
         if not is_clear:
             doing = "is there" if run is None else f"has {run.behavior.id!r} to do"
             reason = f"the {part.replace('_', ' ')} would come into the table as the torso leans: it {doing}"
             raise Impossible("CANNOT_CREATE_BEHAVIOR", reason)
 
 
-def _stays_clear(torso: Parts, part: str, course: Course, leaning: Motion, around: tuple[Trunk, ...]) -> bool:
+def _stays_clear(torso: Parts, part: str, course: Course, leaning: Motion, around: tuple[Trunk, ...]) -> Steps[bool]:
     """True if an arm is clear of a trunk that moves so, or can be kept clear of it."""
     track, now = torso.tracks[part], torso.clock.time()
     if _is_clear(track, around, now):
@@ -118,7 +122,8 @@ def _stays_clear(torso: Parts, part: str, course: Course, leaning: Motion, aroun
         target = tuple(course.on_target[joint] for joint in TRUNK)
         return _are_clear(track.base, track.joints, (target, *map(tuple, homes(torso, course))))
     if run is not None:
-        return _given_way(torso, run, course.on_target, around, leaning, columns) is not None
+        found = yield from _given_way(torso, run, course.on_target, around, leaning, columns)
+        return found is not None
     return (
         track.aim is None
         and _are_clear(track.motion.at(inf).q[track.columns].tolist(), track.joints, around)
@@ -136,7 +141,7 @@ def check_carried(torso: Parts, course: Course, path: Path) -> None:
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm, as the torso moves")
 
 
-def give_way(torso: Parts) -> None:
+def give_way(torso: Parts) -> Steps[None]:
     """Lay anew what arms have still to do, if the trunk that has just set out would take them into the table."""
     now = torso.clock.time()
     around, trunk = places(torso, now), torso.tracks["torso"]
@@ -146,7 +151,8 @@ def give_way(torso: Parts) -> None:
             continue
         columns = range(trunk.columns.start, trunk.columns.stop)
         going = torso.situation(torso.world, real=True).pose
-        if (found := _given_way(torso, run, going, around, trunk.motion, columns)) is not None:
+        found = yield from _given_way(torso, run, going, around, trunk.motion, columns)
+        if found is not None:
             run.course, path = found
             torso.play(run, path, run.course.aim)
             run.bell.ring()
@@ -159,7 +165,7 @@ def _given_way(
     around: tuple[Trunk, ...],
     trunk: Motion,
     columns: Sequence[int],
-) -> tuple[Course, Path] | None:
+) -> Steps[tuple[Course, Path] | None]:
     """The rest of what an arm does, clear of the table; None: there is no way.
 
     going: where the trunk is going to be, as angles. trunk, columns: its motion, and which of the joints there it is.
@@ -172,33 +178,58 @@ def _given_way(
             course = replanned(run, replace(situation, pose=pose, trunks=around))
         except Impossible:
             return None
+        yield OF_A_WAY
         path = relaid(torso, run, course, now)
         if path is None or not _are_clear(path.legs[-1].goal, course.joints, around):
             return None
-        motion, every = Motion(path, now, cruise=run.motion.cruise), range(len(course.joints))
+        motion, every = run.foreseen(path, now), range(len(course.joints))
         is_clear = _clears(motion, every, course.joints, course.aim, trunk, columns, now)
         return (course, path) if is_clear else None
     start = tracks.joined([torso.tracks[part].at(now) for part in run.course.parts])
     here = tuple(start.q.tolist())
     joints, left = run.course.joints, run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
-    for lift in LIFTS:
-        poses = [lifted(joints, leg.goal, lift) for leg in left[:-1]] + [lifted(joints, here, lift)] * run.holding
-        if poses and not are_clear(joints, poses, around):
-            continue
+    poses = [leg.goal for leg in left[:-1]] + [here] * run.holding
+    lifts = LIFTS if poses else LIFTS[:1]  # What goes home at once is the same for all.
+    groups = [[lifted(joints, pose, lift) for pose in poses] for lift in lifts]
+    is_possible = are_clear(joints, groups, around) if poses else [True]
+    for lift in (lift for lift, is_clear in zip(lifts, is_possible, strict=True) if is_clear):
         legs = tuple(replace(leg, goal=lifted(joints, leg.goal, lift)) for leg in left[:-1]) + left[-1:]
         if run.holding and legs:
             waiting = tuple((sync, 1.0) for sync, at in legs[0].marks if at <= 0.0)
             rest = tuple(mark for mark in legs[0].marks if mark[1] > 0.0)
             raised = Leg(goal=lifted(joints, here, lift), seconds=LIFTING, marks=waiting)
             legs = (raised, replace(legs[0], marks=rest), *legs[1:])
+        yield OF_A_WAY
         path = Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts))
         since = legs[0].seconds if len(legs) > 1 else path.length
-        motion = Motion(path, now, cruise=run.motion.cruise)
-        if not tracks.meets_table(path, joints, around, since=since) and _clears(
-            motion, range(len(joints)), joints, None, trunk, columns, now
-        ):
+        if tracks.meets_table(path, joints, around, since=since):
+            if not _are_clear(path.legs[-1].goal, joints, around):
+                return None  # All of them end there.
+            continue
+        motion = run.foreseen(path, now)
+        if _clears(motion, range(len(joints)), joints, None, trunk, columns, now):
             return replace(run.course, trunks=around), path
     return None
+
+
+def keep_clear(torso: Parts, run: Run) -> None:
+    """Let an arm that is slowed go at its own pace, if the trunk would come with it into the table otherwise."""
+    now, trunk = torso.clock.time(), torso.tracks["torso"]
+    parts = [part for part in run.course.parts if part in ARMS]
+    if not parts or "torso" in run.course.parts or not trunk.is_moving(now):
+        return
+    around = places(torso, now)
+    if all(_is_clear(torso.tracks[part], around, now) for part in parts):
+        return
+    own = copy(run.motion)
+    own.run_at(run.cruise, now)
+    columns, every = range(trunk.columns.start, trunk.columns.stop), range(len(run.course.joints))
+    asked_for, free = (
+        _least_above(motion, every, run.course.joints, run.course.aim, trunk.motion, columns, now)
+        for motion in (run.motion, own)
+    )
+    if asked_for < 0.0 and asked_for < free:
+        run.forget_pace(now)
 
 
 def _clears(
@@ -210,15 +241,28 @@ def _clears(
     columns: Sequence[int],
     now: Seconds,
 ) -> bool:
-    """True if arms stay clear of the table as both move at once. which: of the joints in their motion."""
+    """True if arms stay clear of the table as both move at once."""
+    return _least_above(arms, which, joints, aim, trunk, columns, now) >= 0.0
+
+
+def _least_above(
+    arms: Motion,
+    which: Sequence[int] | slice,
+    joints: tuple[str, ...],
+    aim: Aim | None,
+    trunk: Motion,
+    columns: Sequence[int],
+    now: Seconds,
+) -> Meters:
+    """Least distance by which arms stay out of the table as both move at once. which: joints of their motion."""
     until = max(arms.end, trunk.end)
     if aim is not None:  # Its way home is laid when it leaves its target.
         until = arms.crossing(arms.path.marks["stroke_end"]) or until
-    at = np.linspace(now, until, tracks.MOMENTS).tolist()
+    at = np.linspace(now, until, tracks.MOMENTS)
     leaning, angles = trunk.positions(at)[:, list(columns)], arms.positions(at)[:, which]
     if aim is not None:
-        angles = aim.within(angles + [aim.offset(place) for place in leaning])
-    return tracks.above_table_along(angles, joints, leaning) >= 0.0
+        angles = aim.within(angles + aim.offsets(leaning))
+    return tracks.above_table_along(angles, joints, leaning)
 
 
 def _are_clear(pose: Sequence[float], joints: tuple[str, ...], around: tuple[Trunk, ...]) -> bool:
@@ -231,10 +275,8 @@ def _is_clear(track: Track, around: tuple[Trunk, ...], now: Seconds) -> bool:
     path, s = track.motion.path, track.motion.s(now)
     until = path.length if track.aim is None else max(s, path.marks.get("stroke_end", 0.0))
     shares = np.linspace(s, until, len(tracks.ALONG)) / (path.length or 1.0)
-    angles = path.positions(shares)[:, track.columns]
+    angles, trunks = path.positions(shares)[:, track.columns], np.array(around)
     if track.aim is None:
-        return tracks.above_table(angles, track.joints, np.array(around)) >= 0.0
-    for trunk in around:
-        if tracks.above_table(track.aim.within(angles + track.aim.offset(trunk)), track.joints, trunk) < 0.0:
-            return False
-    return True
+        return tracks.above_table(angles, track.joints, trunks) >= 0.0
+    on_target = track.aim.within(angles[:, None] + track.aim.offsets(trunks))
+    return tracks.above_table_along(on_target, track.joints, trunks) >= 0.0

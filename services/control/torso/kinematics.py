@@ -6,7 +6,7 @@ hanging down, forward positive; the elbow flexes the forearm forward, so that an
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from math import atan2, cos, hypot, radians, sin
 from typing import Literal
@@ -43,6 +43,8 @@ HAND_TO_TARGET: Meters = 0.06
 """Least distance from the hand to the surface of a target: pointing is not touching."""
 NOD_RESERVE: Radians = radians(18.0)
 """Part of the neck's range that gaze keeps free, so that a nod finds room anywhere."""
+_PITCHES: tuple[Radians, ...] = tuple(radians(degrees) for degrees in range(20, -32, -2))
+"""Pitches of the shoulder at which a pointing is tried, the most extended arm first."""
 SLIDE: Radians = radians(2.0)
 """Change of the shoulder pitch from stroke to stroke_end, the axis staying on target: it keeps the arm in motion."""
 
@@ -173,6 +175,18 @@ def arm_angles(side: Side, target: Vector, pitch: Radians, pose: Pose) -> tuple[
     return _pointing(x, y, z, pitch)
 
 
+def arm_angles_over(side: Side, target: Vector, pitch: Radians | Array, trunks: Array) -> tuple[Array, Array, Array]:
+    """The same for many places of the torso at once. trunks: 2 x places. pitch: one, or any shape x places."""
+    (x, y, z), (turn, lean) = _subtract(target, HIP), trunks
+    ahead, aside = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+    forward, height = ahead * np.cos(lean) - z * np.sin(lean), z * np.cos(lean) + ahead * np.sin(lean)
+    shoulder = _subtract(SHOULDER[side], HIP)
+    x, y, z = forward - shoulder[0], aside - shoulder[1], height - shoulder[2]
+    out = np.arctan2(np.hypot(x, y) - UPPER_ARM * np.sin(pitch), -z - UPPER_ARM * np.cos(pitch)) - pitch
+    yaw, lift, _ = np.broadcast_arrays(np.arctan2(y, x), pitch, out)
+    return yaw, lift, out
+
+
 def point_at(
     side: Side, target: Vector, radius: Meters, pose: Pose, trunks: tuple[tuple[float, ...], ...] = ()
 ) -> ArmAim:
@@ -192,37 +206,38 @@ def _aim(
     side: Side, target: Vector, radius: Meters, trunk: tuple[float, float], trunks: tuple[tuple[float, ...], ...]
 ) -> ArmAim | str:
     """Angles that point at `target`, or why there are none."""
-    pose = _leaning(trunk)
+    pose = {"torso_turn": trunk[0], "torso_lean": trunk[1]}
     x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
     distance = hypot(x, y, z)
     if distance > REACH:
         return f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m"
     reason = ""
-    for degrees in range(20, -32, -2):
-        pitch = radians(degrees)
+    low: list[bool] = []
+    for number, pitch in enumerate(_PITCHES):
         stroke, held = (_pointing(x, y, z, angle) for angle in (pitch, pitch - SLIDE))
         reason = _objection(side, stroke, target, radius, pose) or _objection(side, held, target, radius, pose)
-        if not reason and any(_is_low(side, target, pitch, each) for each in trunks if any(each)):
-            reason = "the table is in the way as the torso moves"
+        if not reason:
+            low = low or _are_low(side, target, [each for each in trunks if any(each)])
+            reason = "the table is in the way as the torso moves" if low[number] else ""
         if not reason:
             return ArmAim(stroke, held)
     return f"the {side} arm finds no way to point at it: {reason}"
 
 
-def _leaning(trunk: tuple[float, ...]) -> dict[str, float]:
-    turn, lean = trunk
-    return {"torso_turn": turn, "torso_lean": lean}
+def _are_low(side: Side, target: Vector, trunks: Sequence[tuple[float, ...]]) -> list[bool]:
+    """Tell for each of `_PITCHES` if an arm is in the table, or has no room to it, with the torso at any of `trunks`.
 
-
-def _is_low(side: Side, target: Vector, pitch: Radians, trunk: tuple[float, ...]) -> bool:
-    """True if an arm that points, or comes as near to that as its joints do, is in the table or has no room to it."""
-    names = joints_of(f"{side}_arm")
-    for angle in (pitch, pitch - SLIDE):
-        free = zip(names, arm_angles(side, target, angle, _leaning(trunk)), strict=True)
-        angles = [[min(max(angle, LIMIT[name].low), LIMIT[name].high)] for name, angle in free]
-        if above_table(side, np.array(angles), np.array(trunk)[:, None]).min() < ROOM:
-            return True
-    return False
+    It points there, or comes as near to that as its joints do.
+    """
+    if not trunks:
+        return [False] * len(_PITCHES)
+    pitches = np.array(_PITCHES)[:, None, None] - np.array([0.0, SLIDE])[:, None]
+    turned = np.array(trunks).T
+    limits = [LIMIT[name] for name in joints_of(f"{side}_arm")]
+    free = zip(arm_angles_over(side, target, pitches, turned), limits, strict=True)
+    angles = np.array([np.clip(angle, limit.low, limit.high) for angle, limit in free])
+    least = above_table(side, angles, turned).min(axis=(1, 2))
+    return [above < ROOM for above in least.tolist()]
 
 
 def touches_table(pose: Pose, sides: Iterable[Side] = ("left", "right")) -> bool:

@@ -32,16 +32,17 @@ def clear_of_table(
         return poses  # So they were made.
     for size in SIZES:
         smaller = [nearer(pose, home, size) for pose in poses]
-        for lift in LIFTS:
-            raised = [lifted(joints, pose, lift) for pose in smaller]
-            if are_clear(joints, raised, trunks):
-                return raised
+        raised = [[lifted(joints, pose, lift) for pose in smaller] for lift in LIFTS]
+        for made, is_clear in zip(raised, are_clear(joints, raised, trunks), strict=True):
+            if is_clear:
+                return made
     raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm, as the torso leans")
 
 
-def are_clear(joints: tuple[str, ...], poses: Sequence[Pose], trunks: Sequence[Trunk]) -> bool:
-    """True if arms are clear of the table in all poses, wherever the trunk is."""
-    return tracks.above_table(np.array(poses), joints, np.array(trunks)) > MARGIN
+def are_clear(joints: tuple[str, ...], groups: Sequence[Sequence[Pose]], trunks: Sequence[Trunk]) -> Sequence[bool]:
+    """For each group of poses, all of a size: True if arms are clear of the table in all, wherever the trunk is."""
+    clear: list[bool] = (tracks.above_table_each(np.array(groups), joints, trunks) > MARGIN).tolist()
+    return clear
 
 
 def lifted(joints: tuple[str, ...], pose: Pose, by: Radians) -> Pose:

@@ -62,7 +62,7 @@ class Motion:
         s, rate = self.s(now), self.rate(now)
         self.cruise = min(cruise, self.path.fastest)
         # Where nothing moves yet the rate may jump.
-        self._replan(now, s, self.cruise if self.path.at(s).at_rest else rate)
+        self._replan(now, s, self.cruise if self.path.rests_at(s) else rate)
 
     def reach(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
         """Change the rate such that `s` is reached at `at`, or as near to that as between `SLOWEST` and `fastest`."""
@@ -71,7 +71,7 @@ class Motion:
         fastest = min(fastest, self.path.fastest)
         if time <= 0.0 or left >= fastest * time:
             cruise = fastest
-        elif self.path.at(here).at_rest:
+        elif self.path.rests_at(here):
             cruise = left / time
         elif left >= rate * time:
             reach = rate + change * time
@@ -96,7 +96,7 @@ class Motion:
     def can_stop_at(self, s: Seconds, now: Seconds) -> bool:
         """True if it has not passed s, and can come to rest there."""
         left, rate = s - self.s(now), self.rate(now)
-        if left < -1e-9 or self.path.at(s).at_rest:
+        if left < -1e-9 or self.path.rests_at(s):
             return left >= -1e-9
         return rate * rate <= 2 * self.path.steepest_brake(s, rate) * left + 1e-9
 
@@ -124,10 +124,19 @@ class Motion:
             return self.at(t).q
         return self.path.position(min(self._piece(t).s_at(t), self._stop))
 
-    def positions(self, times: Sequence[Seconds]) -> Array:
+    def positions(self, times: Sequence[Seconds] | Array) -> Array:
         """Positions of the joints at instants in order: an array of instants x joints."""
         length = self.path.length or 1.0
-        return self.path.positions(np.array([self.s(t) for t in times]) / length)
+        return self.path.positions(self._along(np.asarray(times, dtype=np.float64)) / length)
+
+    def _along(self, times: Array) -> Array:
+        """s at many instants: as `s` has it at each."""
+        pieces = np.array([(piece.t, piece.s, piece.rate, piece.slope) for piece in self._pieces])
+        number = np.maximum(np.searchsorted(pieces[:, 0], times, side="right") - 1, 0)
+        t, s, rate, slope = pieces[number].T
+        since = times - t
+        way = np.minimum(s + rate * since + slope * since * since / 2, self._stop)
+        return np.where(times >= self.end, self._stop, way)
 
     def crossing(self, s: Seconds) -> Seconds | None:
         """Instant at which s is reached; None if s lies beyond the limit."""
@@ -154,10 +163,10 @@ class Motion:
             self.end = now
             self._pieces.append(_Piece(now, s, 0.0, 0.0))
             return
-        if rate == 0.0 and self.path.at(s).at_rest:
+        if rate == 0.0 and self.path.rests_at(s):
             rate = self.cruise
         brake = inf
-        if not self.path.at(self._stop).at_rest:
+        if not self.path.rests_at(self._stop):
             brake = self.path.steepest_brake(self._stop, max(rate, self.cruise))
         top, braking = _top_rate(rate, self.cruise, left, self.path.gentlest_brake, brake)
         now, s, rate = self._ramp(now, s, rate, top)

@@ -3,8 +3,7 @@
 Time is that of a clock: of the event loop for the body, of its own for a rehearsal.
 """
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import inf
 
 from msgspec.structs import replace
@@ -14,7 +13,7 @@ from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, NoPointZone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso import choreography, clearing, head, kinematics, tracks
+from engage_hri.services.control.torso import choreography, clearing, head, kinematics, reaching, tracks
 from engage_hri.services.control.torso.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.torso.course import Course, Impossible, Situation
 from engage_hri.services.control.torso.estimates import Added, going_home, infeasible, motion_estimate, poses
@@ -28,9 +27,7 @@ from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.waiting import Bell
-
-STEP: Seconds = 0.02
-"""Seconds between two looks at where the trunk will be."""
+from engage_hri.services.runtime.steps import Steps, finished
 
 
 class Torso:
@@ -62,7 +59,11 @@ class Torso:
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         """Estimate a movement by itself, from `pose` or from where its parts are."""
         try:
-            return self._estimate(behavior, self.situation(world, pose), moving=pose is None)
+            situation = self.situation(world, pose)
+            course = choreography.plan(behavior, situation)
+            is_moving = pose is None and not self.misbelieved
+            path = self.path(course, None if is_moving else situation)
+            return self.told(behavior, course, path, situation, moving=is_moving)
         except Impossible as impossible:
             return infeasible(behavior, impossible)
 
@@ -70,10 +71,11 @@ class Torso:
         """Pose of all joints: those of `pose`, and where the others are."""
         return kinematics.pose_message(self.situation(world, pose).pose)
 
-    def _estimate(self, behavior: BlockBehavior, situation: Situation, *, moving: bool) -> Estimate:
-        course = choreography.plan(behavior, situation)
-        path = self.path(course, None if moving and not self.misbelieved else situation)
-        added = self._added(course) if moving and not self.misbelieved else None
+    def told(
+        self, behavior: BlockBehavior, course: Course, path: Path, situation: Situation, *, moving: bool = True
+    ) -> Estimate:
+        """Estimate a movement along a path that was laid for it. moving: it begins now, from where its parts are."""
+        added = self._added(course) if moving else None
         estimate = motion_estimate(behavior, course, path, *poses(course, situation.pose), added)
         leaves = next((point.sync for point in course.points if is_last_on_target(behavior, point.sync)), "")
         if added is None or not leaves:
@@ -129,12 +131,16 @@ class Torso:
 
         situation: start at rest in its pose; None: start from where the parts are, as they move.
         """
+        return finished(self.laid(course, situation))
+
+    def laid(self, course: Course, situation: Situation | None = None) -> Steps[Path]:
+        """The same in steps, of a torso that stands still meanwhile."""
         start = self.start(course, situation)
         if situation is None and self.is_carried(course):
             return self._path_on_the_move(start, course)
         path = laid_path(start, course)
         if "torso" in course.parts:
-            clearing.check(self, course, path, None if situation is None else situation.pose)
+            yield from clearing.check(self, course, path, None if situation is None else situation.pose)
         return path
 
     def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
@@ -151,46 +157,28 @@ class Torso:
     def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
         path = laid_path(start, course, is_free=True)
-        arrival = _arrival(course)
-        if delay := self._delay(course.aim, self.clock.time() + path.marks[arrival]):
-            path = laid_path(start, replace(course, legs=_delayed(course.legs, arrival, delay)), is_free=True)
+        point = reaching.arrival(course)
+        if delay := reaching.delay(self, course.aim, self.clock.time() + path.marks[point]):
+            path = laid_path(start, replace(course, legs=reaching.delayed(course.legs, point, delay)), is_free=True)
         clearing.check_carried(self, course, path)
         return path
-
-    def _delay(self, aim: Aim | None, at: Seconds) -> Seconds:
-        """Seconds from that instant on until the target comes into reach as the trunk moves; 0: it is, or never."""
-        torso = self.tracks["torso"]
-        for step in range(1 + max(0, math.ceil((torso.motion.end - at) / STEP))):
-            if aim is None or aim.is_in_reach(torso.angles(at + step * STEP)):
-                return step * STEP
-        return 0.0
-
-    def _wait_for_reach(self) -> None:
-        """Delay what is on its way to a target that is not in reach by then, since the trunk moves otherwise."""
-        now = self.clock.time()
-        for run in dict.fromkeys(self.runs.values()):
-            arrival = _arrival(run.course)
-            if run.course.aim is None or run.is_over or not run.awaits(arrival):
-                continue
-            at = run.motion.crossing(run.motion.path.marks[arrival])
-            if at is not None and at > now and (delay := self._delay(run.course.aim, at)):
-                track = self.tracks[run.course.parts[0]]
-                left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
-                start, legs = track.start_at(now, run.course.aim), _delayed(left, arrival, delay)
-                path = Path(start, run.with_faults(legs), self.limits(run, run.course.aim, now))
-                self.play(run, path, run.course.aim)
-                run.bell.ring()
 
     def is_off_target(self, run: Run, sync: str) -> bool:
         """True if `sync` says that a behavior is on its target, which is out of reach."""
         aim, trunk = run.course.aim, self.tracks["torso"].angles(self.clock.time())
-        is_claim = sync == _arrival(run.course) or (isinstance(run.behavior, Pointing) and sync == "stroke_end")
+        is_claim = sync == reaching.arrival(run.course) or (
+            isinstance(run.behavior, Pointing) and sync == "stroke_end"
+        )
         return aim is not None and is_claim and (run.is_lost or not aim.is_in_reach(trunk))
 
     # -- motion -------------------------------------------------------------------------------------------------
 
     def take_over(self, run: Run, path: Path) -> None:
         """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
+        finished(self.taken_over(run, path))
+
+    def taken_over(self, run: Run, path: Path) -> Steps[None]:
+        """The same in steps, of a torso that stands still meanwhile."""
         run.began = self.clock.time()
         for joint in run.course.joints:
             self.misbelieved.pop(joint, None)
@@ -214,8 +202,8 @@ class Torso:
         self.play(run, path, run.course.aim)
         self.relax(tuple(left))
         if "torso" in run.course.parts:
-            self._wait_for_reach()
-            clearing.give_way(self)
+            reaching.wait_for_reach(self)
+            yield from clearing.give_way(self)
 
     def play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now, run.gate = self.clock.time(), inf
@@ -294,14 +282,22 @@ class Torso:
         return tracks.limits_of(run.course.parts, is_free=is_free)
 
     def extend(self, run: Run) -> None:
+        """Let a behavior go as far and as fast as its authority says now."""
+        finished(self.extended(run))
+
+    def extended(self, run: Run) -> Steps[None]:
+        """The same in steps, of a torso that stands still meanwhile."""
         now = self.clock.time()
-        if (path := run.hurry(now)) is not None:
+        if (path := (yield from run.hurry(now))) is not None:
             self.play(run, path, self.tracks[run.course.parts[0]].aim)
         limit = run.limit(run.motion.path)
         is_extended = limit > run.motion.limit
         run.motion.extend(limit, now)
         run.brake_for_hold(now)
-        if run.keep_pace(now) or is_extended:
+        is_paced = run.keep_pace(now)
+        if is_paced:
+            clearing.keep_clear(self, run)
+        if is_paced or is_extended:
             self.attention.follow_run(run, now)
 
     def deviate(self, deviations: Deviations) -> None:
@@ -350,8 +346,8 @@ class Torso:
             else:
                 track.return_to(track.base, now, trunks=clearing.places(self, now))
         if "torso" in parts:
-            self._wait_for_reach()
-            clearing.give_way(self)
+            reaching.wait_for_reach(self)
+            finished(clearing.give_way(self))
 
     # -- gaze ---------------------------------------------------------------------------------------------------
 
@@ -372,16 +368,6 @@ def is_last_on_target(behavior: BlockBehavior, sync: str) -> bool:
     return (isinstance(behavior, Gaze) and sync == "relax") or (
         isinstance(behavior, Pointing) and sync == "stroke_end"
     )
-
-
-def _arrival(course: Course) -> str:
-    """The sync point that says that a behavior has come to its target."""
-    return "stroke" if any(point.sync == "stroke" for point in course.points) else "end"
-
-
-def _delayed(legs: Sequence[Leg], arrival: str, by: Seconds) -> tuple[Leg, ...]:
-    """Legs whose arrival comes later."""
-    return tuple(replace(leg, seconds=leg.seconds + by) if arrival in dict(leg.marks) else leg for leg in legs)
 
 
 def _leg_home(run: Run, start: JointMotion, goal: tuple[float, ...]) -> Leg:

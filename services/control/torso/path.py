@@ -6,9 +6,9 @@ Speed and acceleration limits: q'' alone stays within `SHARE` of the acceleratio
 the rate: |q''| rate^2 + |q'| |rate'| <= limit.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from copy import copy
-from itertools import chain
+from functools import cached_property
 from math import sqrt
 from typing import Any
 
@@ -32,8 +32,12 @@ SAMPLES = np.linspace(0.0, 1.0, 33)
 STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 """Factors of a leg's natural duration, in the order in which they are tried."""
 
+FEW = 9
+"""Durations that are tried before all the others: most legs need few."""
 LEAST: Seconds = 0.02
 """Least time of a leg on which something moves."""
+RESTS = 8
+"""Places of which a path remembers whether anything moves there."""
 _NOTHINGS: tuple[Seconds, ...] = (0.0004, 0.001, 0.002, 0.005, 0.01)
 """Times to try for a leg that needs none: whoever is all but there, and all but at rest, is there at once."""
 
@@ -98,6 +102,7 @@ class Path:
         self._segments: list[_Segment] = []
         self._peaks: list[tuple[float, float]] = []
         self._leg_starts: list[Seconds] = []
+        self._rests: dict[Seconds, bool] = {}
         self.length = 0.0
         state = self._limits.softened(start)
         for leg in self.legs:
@@ -135,18 +140,35 @@ class Path:
         powers = np.power(min(max(s - segment.start, 0.0), segment.seconds), _POWERS)
         return np.asarray(np.dot(powers, segment.coefficients))
 
+    def rests_at(self, s: Seconds) -> bool:
+        """True if nothing moves at s. It is asked again and again of few places: where a motion starts or stops."""
+        if (is_resting := self._rests.get(s)) is None:
+            if len(self._rests) >= RESTS:
+                self._rests.clear()
+            is_resting = self._rests[s] = self.at(s).at_rest
+        return is_resting
+
     def positions(self, shares: Array) -> Array:
         """Positions q at these shares of the length, in order: an array of shares x joints."""
         if not self._segments:
             return np.tile(self.at(0.0).q, (len(shares), 1))
-        s, found, since = shares * self.length, [], 0
+        found = [np.power(passed, _POWERS) @ c for c, passed in self._passed(shares * self.length)]
+        return np.concatenate(found)
+
+    def _speeds(self, s: Array) -> Array:
+        """Derivatives q' at these s, in order: an array of s x joints."""
+        if not self._segments:
+            return np.zeros((len(s), len(self.start.q)))
+        return np.concatenate([_evaluated(c, passed)[1] for c, passed in self._passed(s)])
+
+    def _passed(self, s: Array) -> Iterator[tuple[Array, Array]]:
+        """Coefficients of each segment, and a column of those of these s that lie on it, counted from its start."""
+        since = 0
         for number, segment in enumerate(self._segments):
             is_last = number == len(self._segments) - 1
             until = len(s) if is_last else int(np.searchsorted(s, segment.start + segment.seconds))
-            passed = np.clip(s[since:until] - segment.start, 0.0, segment.seconds)
-            found.append(np.power(passed[:, None], _POWERS) @ segment.coefficients)
+            yield segment.coefficients, np.clip(s[since:until] - segment.start, 0.0, segment.seconds)[:, None]
             since = max(since, until)
-        return np.concatenate(found)
 
     def after(self, s: Seconds, unreported: Collection[str] = ()) -> tuple[Leg, ...]:
         """Legs that are left at s, with the sync points beyond s. Those in `unreported` that are not come at once."""
@@ -189,7 +211,7 @@ class Path:
         path.legs = unmarked(self.legs, sync)
         return path
 
-    @property
+    @cached_property
     def fastest(self) -> float:
         """The highest steady rate that the limits permit; at least 1."""
         speed = max((speed for speed, _ in self._peaks), default=0.0)
@@ -201,7 +223,7 @@ class Path:
         brake = 40.0
         while brake > 0.5:
             window = np.linspace(max(0.0, s - rate * rate / (2 * brake)), s, 9)
-            if all(self._limits.permits_brake(self.at(float(point)), brake) for point in window):
+            if self._limits.permits_brake(self._speeds(window), brake):
                 break
             brake *= 0.8
         return brake
@@ -233,28 +255,51 @@ class _Limits:
 
     def connect(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
-        best: _Connection | None = None
         least = _NOTHINGS if seconds <= 0.0 else ()
         natural = max(seconds, LEAST)
-        for each in chain(least, (natural * stretch for stretch in STRETCHES)):
-            connection = self._with_peaks(_quintic(start, end, each), each)
-            if connection.excess <= 0.0:
-                return connection
-            if best is None or connection.excess < best.excess:
-                best = connection
-        assert best is not None
-        return best
+        tried = [*least, *(natural * stretch for stretch in STRETCHES)]
+        first = self._connected(start, end, tried[0])
+        if first.excess <= 0.0:
+            return first
+        # Many at once are seen in one product, to the last bit as each by itself has it.
+        excesses = [first.excess]
+        for portion in (tried[1:FEW], tried[FEW:]):
+            excesses += self._excesses(start, end, portion).tolist()
+            if (kept := next((number for number, excess in enumerate(excesses) if excess <= 0.0), 0)) > 0:
+                return self._connected(start, end, tried[kept])
+        return self._connected(start, end, tried[excesses.index(min(excesses))])
 
-    def permits_brake(self, state: JointMotion, brake: float) -> bool:
-        return bool(np.all(np.abs(state.v) * brake <= (1 - SHARE) * self.acceleration))
+    def _connected(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
+        return self._with_peaks(_quintic(start, end, seconds), seconds)
+
+    def _excesses(self, start: JointMotion, end: JointMotion, seconds: Sequence[Seconds]) -> Array:
+        """The excess of the quintic for each of these times."""
+        c = _quintics(start, end, seconds)
+        powers = np.power(np.array(seconds)[:, None, None] * SAMPLES[:, None], _POWERS)
+        velocity, change = (powers[..., :5] * _FIRST) @ c[:, 1:], (powers[..., :4] * _SECOND) @ c[:, 2:]
+        speed, acceleration, outside = self._peaks((powers @ c, velocity, change))
+        excess = np.maximum(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0)
+        return np.maximum(excess, outside - OUTSIDE)
+
+    def permits_brake(self, speeds: Array, brake: float) -> bool:
+        """speeds: instants x joints."""
+        return bool(np.all(np.abs(speeds) * brake <= (1 - SHARE) * self.acceleration))
 
     def _with_peaks(self, coefficients: Array, seconds: Seconds) -> "_Connection":
-        position, velocity, change = _evaluated(coefficients, (SAMPLES * seconds)[:, None])
-        speed = float(np.max(np.abs(velocity) / self.speed))
-        acceleration = float(np.max(np.abs(change) / self.acceleration))
-        outside = float(np.max(np.maximum(self.low - position, position - self.high) / (self.high - self.low)))
+        speed, acceleration, outside = self._peaks(_evaluated(coefficients, (SAMPLES * seconds)[:, None]))
         excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - OUTSIDE)
-        return _Connection(coefficients, seconds, speed, acceleration, excess)
+        return _Connection(coefficients, seconds, float(speed), float(acceleration), float(excess))
+
+    def _peaks(self, states: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        """Highest speed and acceleration, and how far it is outside: shares of the joints' limits and ranges.
+
+        states: positions, speeds and accelerations, each of instants x joints, or of many such at once.
+        """
+        position, velocity, change = states
+        outside = np.maximum(self.low - position, position - self.high) / (self.high - self.low)
+        shares = (np.abs(velocity) / self.speed, np.abs(change) / self.acceleration, outside)
+        speed, acceleration, outside = (share.max(axis=(-2, -1)) for share in shares)
+        return speed, acceleration, outside
 
 
 class _Connection(Struct, frozen=True):
@@ -269,16 +314,26 @@ class _Connection(Struct, frozen=True):
 
 def _quintic(start: JointMotion, end: JointMotion, seconds: Seconds) -> Array:
     """Coefficients of the polynomial of degree five that joins two states in `seconds`."""
-    t, h = seconds, end.q - start.q
     return np.array(
-        [
-            start.q,
-            start.v,
-            start.a / 2,
-            (20 * h - (8 * end.v + 12 * start.v) * t - (3 * start.a - end.a) * t**2) / (2 * t**3),
-            (-30 * h + (14 * end.v + 16 * start.v) * t + (3 * start.a - 2 * end.a) * t**2) / (2 * t**4),
-            (12 * h - 6 * (end.v + start.v) * t + (end.a - start.a) * t**2) / (2 * t**5),
-        ]
+        [start.q, start.v, start.a / 2, *_upper(start, end, seconds, seconds**2, seconds**3, seconds**4, seconds**5)]
+    )
+
+
+def _quintics(start: JointMotion, end: JointMotion, seconds: Sequence[Seconds]) -> Array:
+    """The same for each of these times: times x 6 x joints."""
+    # Powers as Python has them: numpy's may differ in the last bit.
+    columns = (np.array([each**power for each in seconds])[:, None] for power in range(1, 6))
+    lower = (np.broadcast_to(each, (len(seconds), len(each))) for each in (start.q, start.v, start.a / 2))
+    return np.stack((*lower, *_upper(start, end, *columns)), axis=1)
+
+
+def _upper(start: JointMotion, end: JointMotion, t: Any, t2: Any, t3: Any, t4: Any, t5: Any) -> tuple[Array, ...]:
+    """Coefficients of the third, fourth and fifth power. t, t2 ...: the time and its powers, numbers or columns."""
+    h = end.q - start.q
+    return (
+        (20 * h - (8 * end.v + 12 * start.v) * t - (3 * start.a - end.a) * t2) / (2 * t3),
+        (-30 * h + (14 * end.v + 16 * start.v) * t + (3 * start.a - 2 * end.a) * t2) / (2 * t4),
+        (12 * h - 6 * (end.v + start.v) * t + (end.a - start.a) * t2) / (2 * t5),
     )
 
 

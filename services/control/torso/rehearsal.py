@@ -19,7 +19,7 @@ from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, following, head, tracks
 from engage_hri.services.control.torso.copied import Clock
 from engage_hri.services.control.torso.course import Course, Impossible
-from engage_hri.services.control.torso.estimates import beneath_a_look
+from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.path import Path, resting
@@ -36,8 +36,10 @@ HURRIED: Seconds = 0.0005
 """Seconds by which a point comes too early for a behavior that does not hurry."""
 SAME: Seconds = 0.1
 """Seconds by which a behavior may have begun at another time than who asks says."""
-ELEMENTS, ELEMENTS_OF_A_PART = 128, 16
-"""Elements that an event counts for (see `runtime.steps`), and each behavior under way at it."""
+ELEMENTS, TO_FORESEE, TO_SETTLE, A_WAY_HOME = 256, 16, 4, 384
+"""Elements that an event counts for (see `runtime.steps`), each behavior under way at it, and a way home of it."""
+PLANNING, LAYING, TELLING, SETTING_OUT = 256, 512, 256, 512
+"""Elements of the stages of a beginning, as many as where arms have to be kept clear. The copy stands still there."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
 
@@ -63,7 +65,7 @@ class _Part:
         self._most: dict[str, Seconds] = {}
         """Phases that took less, as slow as it could be without a stop."""
 
-    def settle(self, torso: Torso, clock: Clock, now: Seconds) -> None:
+    def settle(self, torso: Torso, clock: Clock, now: Seconds) -> Steps[None]:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
         run = self.run
         while run.pending and not run.is_over and not run.holding:
@@ -79,6 +81,7 @@ class _Part:
             if is_last_on_target(run.behavior, point.sync):
                 clock.at = due
                 torso.leave_target(run)
+                yield A_WAY_HOME
 
     def next_due(self) -> Seconds | None:
         """Instant at which a paced behavior passes its next point: then it is given the next one."""
@@ -93,7 +96,7 @@ class _Part:
         if not waited:
             self._phases |= dict.fromkeys(passed, 0.0)
 
-    def foresee(self, torso: Torso, now: Seconds) -> None:
+    def foresee(self, torso: Torso, now: Seconds) -> Steps[None]:
         """Take the times of the phases to come from the motion as it is now, if nothing stopped it."""
         if self.run.is_over:
             return
@@ -112,18 +115,20 @@ class _Part:
         pending = [point.sync for point in self.run.pending]
         last = next((sync for sync in pending if is_last_on_target(self.run.behavior, sync)), "")
         if last:
-            at |= {sync: at[last] + s for sync, s in self._way_home(torso, trial, at[last]).items()}
+            way_home = yield from self._way_home(torso, trial, at[last])
+            at |= {sync: at[last] + s for sync, s in way_home.items()}
         for since, to in pairwise([point.sync for point in self.run.course.points]):
             if to not in come:
                 self._phases[to] = at[to] - at[since]
 
-    def _way_home(self, torso: Torso, trial: Motion, at: Seconds) -> Mapping[str, Seconds]:
+    def _way_home(self, torso: Torso, trial: Motion, at: Seconds) -> Steps[Mapping[str, Seconds]]:
         """Seconds from its target to each point on its way home, if that has to be laid anew."""
         leaning, base = torso.tracks["torso"].motion, torso.attention.angles
         known = (at, trial.path, leaning, leaning.end, base)
         if known != self._known:
             self._known, back = known, torso.way_home(self.run, trial, at)
             self._marks = {} if back is None else back.marks
+            yield 0 if back is None else A_WAY_HOME
         return self._marks
 
     def _foresee_unpaced(self, now: Seconds) -> None:
@@ -194,18 +199,16 @@ def rehearsed(
     under_way = _under_way(torso, items, began)
     for number, item in enumerate(items):
         if (run := under_way.get(number)) is not None:
-            part = parts[number] = _go_on(torso, run, times[number], passing[number])
+            part = parts[number] = yield from _go_on(torso, run, times[number], passing[number])
             moved.update(run.course.parts)
             events += [(until, RELEASE, number, sync) for sync, until in part.waits.items()]
-        elif item.reached:
-            told[number] = Estimate(
-                behavior=item.behavior.id, feasible=True
-            )  # It moves nothing: a shift beneath a look.
+        elif item.reached:  # It moves nothing: a shift beneath a look.
+            told[number] = Estimate(behavior=item.behavior.id, feasible=True)
         else:
             events.append((times[number][START], BEGIN, number, ""))
     for number, part in parts.items():
         if number < count:
-            part.foresee(torso, clock.at)
+            yield from part.foresee(torso, clock.at)
     heapify(events)
     awaited: dict[int, Seconds] = {}
     """When each paced behavior passes its next point, by its number."""
@@ -214,28 +217,30 @@ def rehearsed(
         at, kind, number, hold = heappop(events)
         # Those who begin at one instant have all begun before any of them passes a point.
         for part in () if begun_at == at else parts.values():
-            part.settle(torso, clock, at)
+            yield from part.settle(torso, clock, at)
             if not part.run.pending:
                 torso.release(part.run)
+            yield TO_SETTLE
         begun_at = at if kind == BEGIN else begun_at
         clock.at = max(at + EARLY, clock.at)  # What ends then has ended.
         if kind == RELEASE:
-            _let_go(torso, parts[number], hold, clock.at)
+            yield from _let_go(torso, parts[number], hold, clock.at)
         else:
-            begun = _begin(torso, clock, items[number], times[number], passing[number], moved)
+            begun = yield from _begin(torso, clock, items[number], times[number], passing[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
             else:
                 parts[number] = begun
                 for sync, until in begun.waits.items():
                     heappush(events, (until, RELEASE, number, sync))
+        yield SETTING_OUT if kind == BEGIN else ELEMENTS
         for each, part in parts.items():
             if each < count:
-                part.foresee(torso, clock.at)
+                yield from part.foresee(torso, clock.at)
+                yield TO_FORESEE
             if (due := part.next_due()) is not None and due != awaited.get(each):
                 awaited[each] = due
                 heappush(events, (max(due, clock.at), RELEASE, each, ""))
-        yield ELEMENTS + ELEMENTS_OF_A_PART * len(parts)
     told |= {number: part.told() for number, part in parts.items() if number < count}
     return tuple([told[number] for number in range(count)])
 
@@ -260,13 +265,14 @@ def _under_way(torso: Torso, items: Sequence[EstimateItem], now: Seconds) -> dic
     return found
 
 
-def _go_on(torso: Torso, run: Run, times: Mapping[str, Seconds], passing: Container[str]) -> _Part:
+def _go_on(torso: Torso, run: Run, times: Mapping[str, Seconds], passing: Container[str]) -> Steps[_Part]:
     """Let a behavior that is under way go on up to the first point where it has to wait."""
     coming = [point for point in run.pending if point.sync in times]
     waits = {point.held_with: times[point.sync] for point in coming if point.held_with and point.sync not in passing}
     run.authority.extend(_through(run.behavior, list(waits)))
     if not run.holding:
-        torso.extend(run)
+        yield from torso.extended(run)
+    yield TELLING
     part = _Part(run, torso.estimate(run.behavior, None, torso.world), waits, ())
     pending = {point.sync for point in run.pending}
     now = torso.clock.time()
@@ -281,7 +287,7 @@ def _begin(
     times: Mapping[str, Seconds],
     passing: Container[str],
     moved: set[str],
-) -> _Part | Estimate:
+) -> Steps[_Part | Estimate]:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
     if head.is_shift(behavior) and torso.is_overlaid():
@@ -292,26 +298,29 @@ def _begin(
             following.follow(torso)
         # Nothing moves: it ends at once, or whenever it is asked to.
         return beneath_a_look(estimate)
+    situation = torso.situation(torso.world)
     try:
-        course = choreography.plan(behavior, torso.situation(torso.world))
+        course = choreography.plan(behavior, situation)
         if _place(torso, item.pose, [part for part in course.parts if part not in moved]):
-            course = choreography.plan(behavior, torso.situation(torso.world))
-    except Impossible:
-        return torso.estimate(behavior, None, torso.world)
-    estimate = torso.estimate(behavior, None, torso.world)
-    if not estimate.feasible:
-        return estimate
-    path = torso.path(course)
+            situation = torso.situation(torso.world)
+            course = choreography.plan(behavior, situation)
+        yield PLANNING
+        path = yield from torso.laid(course)
+        yield LAYING
+        estimate = torso.told(behavior, course, path, situation)
+        yield TELLING
+    except Impossible as impossible:
+        return infeasible(behavior, impossible)
     waits, forced = _told_apart(course, path, times, passing)
     paced = _paced(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Deviations(), 0)
     run.bell = clock
-    torso.take_over(run, path)
+    yield from torso.taken_over(run, path)
     moved.update(course.parts)
     part = _Part(run, estimate, waits, forced)
     if paced:
-        torso.extend(run)
+        yield from torso.extended(run)
     return part
 
 
@@ -363,7 +372,7 @@ def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> bool:
     return is_put
 
 
-def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> None:
+def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> Steps[None]:
     """Let a behavior pass the hold point at which it waits, or to which it is still on its way.
 
     hold: empty to let it go on at another pace.
@@ -378,7 +387,7 @@ def _let_go(torso: Torso, part: _Part, hold: str, now: Seconds) -> None:
         part.leave(torso.leave_hold(run, hold), now, waited=waited)
         hold, waited = run.pending[0].held_with, False
     if not run.holding:
-        torso.extend(run)
+        yield from torso.extended(run)
 
 
 def _through(behavior: BlockBehavior, waits: Sequence[str]) -> str:

@@ -1,5 +1,6 @@
 """A behavior in motion: how far it may go, which sync points are still to come, and the faults that are due."""
 
+from copy import copy
 from math import inf
 
 from msgspec.structs import replace
@@ -15,6 +16,7 @@ from engage_hri.services.control.torso.path import Leg, Path, unmarked
 from engage_hri.services.control.torso.sizing import hurried
 from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.waiting import Bell
+from engage_hri.services.runtime.steps import Steps
 
 STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")
 """Marks on a path where a fault happens; they are never reported."""
@@ -80,7 +82,7 @@ class Run:
         self.motion = motion
         self._aim = None
 
-    def hurry(self, now: Seconds) -> Path | None:
+    def hurry(self, now: Seconds) -> Steps[Path | None]:
         """Look for a smaller path if this one would miss the instants asked for; None: stay on this one."""
         aims, here = self._aims(now), self.motion.s(now)
         # The point that it is just passing is reported first: no other path has it.
@@ -89,7 +91,8 @@ class Run:
             return None
         self._tried_aims = aims
         stops = [point.sync for point in self.pending if point.held_with and not self.may_pass(point.held_with)]
-        if (reduced := hurried(self.course, self.motion, self.size, aims, now, self.cruise, stops)) is None:
+        reduced = yield from hurried(self.course, self.motion, self.size, aims, now, self.cruise, stops)
+        if reduced is None:
             return None
         self.size = reduced.size
         self._mark_faults(motion := Motion(reduced.path, now), now)
@@ -115,6 +118,18 @@ class Run:
                 self.motion.reach(marks[sync], at, now, self.cruise * self.motion.path.fastest)
         return True
 
+    def foreseen(self, path: Path, now: Seconds) -> Motion:
+        """Tell how it would move along another path from now on: as far and as fast as it may and is asked to."""
+        trial = copy(self)
+        trial.play(Motion(path, now, cruise=self.cruise, limit=self.limit(path)))
+        trial.keep_pace(now)
+        return trial.motion
+
+    def forget_pace(self, now: Seconds) -> None:
+        """Go on at its own rate, until it is next asked to keep its pace."""
+        self.motion.run_at(self.cruise, now)
+        self._aim = None
+
     def _aims(self, now: Seconds) -> list[tuple[str, Seconds]]:
         """Sync points ahead that are asked for at an instant, with that instant."""
         marks, here, planned = self.motion.path.marks, self.motion.s(now), self.authority.pace
@@ -129,7 +144,7 @@ class Run:
         mark = self.motion.path.marks[point.sync]
         crossing = self.motion.crossing(mark)
         waits = bool(point.held_with) and not self.may_pass(point.held_with)
-        if crossing is None or waits or not self.motion.path.at(mark).at_rest:
+        if crossing is None or waits or not self.motion.path.rests_at(mark):
             return crossing
         return max(crossing, self.authority.pace.get(point.sync, crossing))
 

@@ -12,9 +12,12 @@ from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.course import Course
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import Leg, Path, resting
+from engage_hri.services.runtime.steps import Steps
 
 SIZES = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Shares of the full amplitude, largest first. Anything smaller than the last would not be taken for a gesture."""
+OF_A_SIZE = 256
+"""Elements that a size counts for (see `runtime.steps`)."""
 LATE: Seconds = 0.001
 """A sync point counts as late if it comes more than this after the instant asked for."""
 
@@ -42,7 +45,7 @@ def hurried(
     now: Seconds,
     cruise: float,
     stops: Container[str] = (),
-) -> Reduced | None:
+) -> Steps[Reduced | None]:
     """Reduce a course to the largest size that is on time, or else to the least late; None: leave it at `size`.
 
     aims: sync points to come and the instants asked for. cruise: speed of its motors, 1 = as believed.
@@ -53,7 +56,8 @@ def hurried(
     for each in SIZES:
         if each < size and least > 0.0:
             path = _reduced(course, motion, now, each / size)
-            late = lateness(course, Motion(path, now, cruise=cruise), aims, now, cruise, stops)
+            yield OF_A_SIZE
+            late = lateness(course, Motion(path, now, cruise=cruise), aims, now, cruise, stops, enough=least)
             if late < least and not tracks.meets_table(path, course.joints, course.trunks):
                 least, best = late, Reduced(path, each)
     return best
@@ -61,9 +65,12 @@ def hurried(
 
 def lateness(
     course: Course, motion: Motion, aims: Sequence[tuple[str, Seconds]], now: Seconds, cruise: float,
-    stops: Container[str] = (),
+    stops: Container[str] = (), *, enough: Seconds = inf,
 ) -> Seconds:  # fmt: skip
-    """Seconds by which `motion` misses the worst of `aims` if nothing else stops it; 0: all are met."""
+    """Seconds by which `motion` misses the worst of `aims` if nothing else stops it; 0: all are met.
+
+    enough: lateness from which on it does not matter how much more it is.
+    """
     trial, worst = copy(motion), 0.0
     trial.extend(inf, now)
     for number, (sync, at) in enumerate(aims):
@@ -74,6 +81,8 @@ def lateness(
         crossing = trial.crossing(s)
         assert crossing is not None, "nothing limits the trial"
         worst, now = max(worst, crossing - at), max(now, crossing)
+        if worst >= enough:
+            break
         if sync in stops and now < at:
             left = trial.path.after(s, [later for later, _ in aims[number + 1 :]])
             now, start = at, resting(trial.path.at(s).q)

@@ -22,6 +22,8 @@ ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table."""
 FINELY = np.linspace(0.0, 1.0, 129)
 """The same where the trunk leans: there is less room."""
+COARSELY = 8
+"""Of the finer shares one in so many is looked at first."""
 UP = (0.2, 0.4, 0.6, 0.8)
 """Radians by which an arm is raised on its way home, in the order in which they are tried."""
 RAISING: Seconds = 0.4
@@ -170,7 +172,7 @@ class Track:
 
     def _above_table(self, motion: Motion, now: Seconds) -> Meters:
         """Least distance by which an arm that moves so stays out of the table as the trunk moves."""
-        at = np.linspace(now, max(motion.end, self.trunk.motion.end), MOMENTS).tolist()
+        at = np.linspace(now, max(motion.end, self.trunk.motion.end), MOMENTS)
         trunk = self.trunk.motion.positions(at)[:, self.trunk.columns]
         return above_table_along(motion.positions(at), self.joints, trunk)
 
@@ -227,7 +229,7 @@ def meets_table(
     """
     if not path.length:
         return False
-    is_upright = tuple(trunks) == (UPRIGHT,)
+    is_upright = tuple(trunks) == (UPRIGHT,) and TRUNK[0] not in joints
     shares = ALONG if is_upright else FINELY
     if since:
         shares = min(since / path.length, 1.0) + max(0.0, 1.0 - since / path.length) * shares
@@ -235,7 +237,10 @@ def meets_table(
     if TRUNK[0] in joints:
         columns = [list(joints).index(joint) for joint in TRUNK]
         return above_table_along(angles, joints, angles[:, columns]) < 0.0
-    return above_table(angles, joints, UPRIGHT if is_upright else np.array(trunks)) < 0.0
+    places: Trunk | Array = UPRIGHT if is_upright else np.array(trunks)
+    # Most paths that meet it do so at one of few poses.
+    coarse = () if is_upright else (angles[::COARSELY],)
+    return any(above_table(each, joints, places) < 0.0 for each in (*coarse, angles))
 
 
 def above_table(angles: Array, joints: Sequence[str], trunk: Trunk | Array) -> Meters:
@@ -247,18 +252,33 @@ def above_table(angles: Array, joints: Sequence[str], trunk: Trunk | Array) -> M
     return _least(angles[:, None, :].T if places is not None else angles.T, joints, places)
 
 
+def above_table_each(poses: Array, joints: Sequence[str], trunks: Sequence[Trunk]) -> Array:
+    """The same for many groups of poses: the least of each. poses: groups x poses x joints. trunks: count for all."""
+    places = np.array(trunks).T[:, None, None, :]
+    least = np.full(len(poses), math.inf)
+    for above in _by_side(np.moveaxis(poses, 2, 0)[..., None], joints, places):
+        least = np.minimum(least, above.min(axis=(1, 2)))
+    return least
+
+
 def above_table_along(angles: Array, joints: Sequence[str], trunks: Array) -> Meters:
-    """The same for arms and a trunk that move at once: trunks: the place for each pose, poses x 2."""
-    return _least(angles.T, joints, trunks.T)
+    """The same for arms and a trunk that move at once. trunks: the place for each pose, poses x 2.
+
+    angles: may have more axes before these two: of each pose many."""
+    return _least(np.moveaxis(angles, -1, 0), joints, trunks.T)
 
 
 def _least(angles: Array, joints: Sequence[str], trunks: Array | None) -> Meters:
-    least, row = math.inf, {joint: number for number, joint in enumerate(joints)}
+    return min((float(np.min(above)) for above in _by_side(angles, joints, trunks)), default=math.inf)
+
+
+def _by_side(angles: Array, joints: Sequence[str], trunks: Array | None) -> Iterator[Array]:
+    """Tell how far each arm of `joints` stays out of the table. angles: joints x any shape."""
+    row = {joint: number for number, joint in enumerate(joints)}
     for side in kinematics.SHOULDER:
         if f"{side}_elbow" in row:
             arm = angles[[row[joint] for joint in kinematics.joints_of(f"{side}_arm")]]
-            least = min(least, float(np.min(kinematics.above_table(side, arm, trunks))))
-    return least
+            yield kinematics.above_table(side, arm, trunks)
 
 
 def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:
