@@ -3,18 +3,17 @@
 The file is loaded when its command is called. The list of all commands needs only the table here.
 """
 
-import shutil
+import inspect
 import sys
-import textwrap
-from collections.abc import Sequence
-from functools import partial
 from importlib import import_module
 from io import TextIOWrapper
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
-from engage_hri.services.commandline import arguments
+import typer
+from typer.core import TyperGroup
+
+from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.ends import exit_code
-from engage_hri.services.commandline.process import DONE, REFUSED
 
 COMMANDS = {
     "demo": "Watch a robot and a person make a tangram: everything in this one process.",
@@ -48,68 +47,69 @@ COMMANDS = {
 
 
 def command(name: str) -> Any:
-    """Load a command from its file."""
-    return import_module(f"engage_hri.services.commandline.{name.replace('-', '_')}")
+    """Load a command from its file. Its own options come first, then the shared ones."""
+    module = import_module(f"engage_hri.services.commandline.{name.replace('-', '_')}")
+    taken = inspect.signature(module.Options).parameters
+    names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
+
+    def run(**given: Any) -> None:
+        logs.configure(given.get("log"), given.get("log_level") or ())
+        raise typer.Exit(module.main(module.Options(**given)))
+
+    run.__signature__ = inspect.Signature([taken[option] for option in names])  # type: ignore[attr-defined]
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    alone.command(name, help=COMMANDS[name])(run)
+    made = typer.main.get_command(alone)
+    for option in made.params:
+        if getattr(option, "is_flag", False):
+            option.metavar = ""  # else the help calls it `<bool>`
+    return made
 
 
-def run(words: Sequence[str]) -> int:
-    """Run what the words of a command line say. Returns the exit code. Raises InputRefused."""
-    match words:
-        case []:
-            print(commands())
-            return REFUSED
-        case ["--version", *_]:
-            from engage_hri.services.runtime.service import installed_version
+class Commands(TyperGroup):
+    """Group of commands that loads a command when it is called."""
 
-            print(f"engage {installed_version()}")
-            return DONE
-        case [("-h" | "--help"), *_]:
-            print(commands())
-            return DONE
-        case [name, *rest] if name in COMMANDS:
-            return _call(name, rest)
-        case [str() as option, *_] if option.startswith("-"):
-            raise arguments.misused("engage", f"there is no option {option!r}")
-        case _:
-            raise arguments.misused("engage", f"there is no command {words[0]!r}")
+    def resolve_command(self, context: Any, arguments: list[str]) -> Any:
+        name, listed, rest = super().resolve_command(context, arguments)
+        return name, listed and command(str(listed.name)), rest
 
 
-def commands() -> str:
-    """Write the list of all commands."""
-    indent = 2 + max(map(len, COMMANDS)) + 2
-    width = max(40, shutil.get_terminal_size().columns - 2)
-    listed = "\n".join(
-        textwrap.fill(does, width, initial_indent=f"  {name}".ljust(indent), subsequent_indent=" " * indent)
-        for name, does in COMMANDS.items()
-        if does
-    )
-    return f"""\
-usage: engage COMMAND ...
-
-The engagement layer for robots that talk with people.
-
-commands:
-{listed}
-
-`engage COMMAND --help` lists the options of one, `engage --version` tells which Engage this is."""
+def _listed() -> None:
+    """Stand for a command in the list of all commands."""
 
 
-def _call(name: str, words: Sequence[str]) -> int:
-    module = command(name)
-    reader = arguments.reader(module.Options, f"engage {name}", COMMANDS[name])
-    if arguments.is_asked_for_help(words):
-        print(reader.format_help(), end="")
-        return DONE
-    options = arguments.read(module.Options, reader, words)
-    from engage_hri.services.commandline import logs
+app = typer.Typer(
+    name="engage",
+    cls=Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for _name, _help in COMMANDS.items():
+    app.command(_name, help=_help, hidden=not _help)(_listed)
 
-    logs.configure(getattr(options, "log", None), getattr(options, "log_level", None) or ())
-    return int(module.main(options))
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from engage_hri.services.runtime.service import installed_version
+
+        print(f"engage {installed_version()}")
+        raise typer.Exit
 
 
-def main(words: Sequence[str] | None = None) -> NoReturn:
+@app.callback()
+def engage(
+    version: Annotated[
+        bool, typer.Option("--version", metavar="", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """The engagement layer for robots that talk with people."""
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
     """Run a command. Bad input is one line on standard error, never a traceback; a bug of ours is a traceback."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal that knows no arrows still gets the rest
-    sys.exit(exit_code(partial(run, sys.argv[1:] if words is None else words)))
+    sys.exit(exit_code(app, arguments))

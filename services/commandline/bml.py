@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import typer
+
 from engage_hri.schemas.blocks import Block, Dialect
 from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import encode_xml
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, WorldFile
 from engage_hri.services.commandline.process import DONE
@@ -22,12 +23,12 @@ _XML_NAME = re.compile(r"[^\W\d][\w.-]*")
 @dataclass(frozen=True, kw_only=True)
 class Options(Configured):
     file: Annotated[
-        Path, Argument(metavar="FILE", help="A turn fragment or a BML block (XML), or JSON of one or several.")
+        Path, typer.Argument(metavar="FILE", help="A turn fragment or a BML block (XML), or JSON of one or several.")
     ]
-    dialect: Annotated[Dialect, Option(help="How to spell it.")] = "bml-1.0"
-    core: Annotated[bool, Option("--core", help="Without connection events and all else that only Engage knows.")] = (
-        False
-    )
+    dialect: Annotated[Dialect, typer.Option(help="How to spell it.")] = "bml-1.0"
+    core: Annotated[
+        bool, typer.Option("--core", help="Without connection events and all else that only Engage knows.")
+    ] = False
     world: WorldFile = None
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
+import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.folder import ResultFile
 from engage_hri.services.commandline.options import Configured
@@ -27,26 +27,28 @@ FEWEST = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Configured):
-    what: Annotated[Literal["body"], Argument(metavar="body", help="What is calibrated.")]
-    out: Annotated[Path, Option(metavar="FILE", help="Where the calibration is written.")] = Path("calibration.toml")
+    what: Annotated[Literal["body"], typer.Argument(metavar="body", help="What is calibrated.")]
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the calibration is written.")] = Path(
+        "calibration.toml"
+    )
     part: Annotated[
         list[str] | None,
-        Option(metavar="PART", help="head, left_arm or right_arm; may be repeated.", show_default="all it has"),
+        typer.Option(metavar="PART", help="head, left_arm or right_arm; may be repeated.", show_default="all it has"),
     ] = None
-    ask: Annotated[bool, Option("--ask", help="Ask on standard input where it really looks or points.")] = False
+    ask: Annotated[bool, typer.Option("--ask", help="Ask on standard input where it really looks or points.")] = False
     measurements: Annotated[
-        Path | None, Option(metavar="FILE", help="Measurements made before; nothing moves.", show_default=False)
+        Path | None, typer.Option(metavar="FILE", help="Measurements made before; nothing moves.", show_default=False)
     ] = None
     record: Annotated[
-        Path | None, Option(metavar="FILE", help="Write the measurements as JSON lines.", show_default=False)
+        Path | None, typer.Option(metavar="FILE", help="Write the measurements as JSON lines.", show_default=False)
     ] = None
     world: Annotated[
         Path | None,
-        Option(metavar="FILE", help="JSON of what it looks and points at; without it marks on a table."),
+        typer.Option(metavar="FILE", help="JSON of what it looks and points at; without it marks on a table."),
     ] = None
-    spread: Annotated[float, Option(metavar="METRES", min=0.0, help="How well simulated eyes measure a place.")] = (
-        0.003
-    )
+    spread: Annotated[
+        float, typer.Option(metavar="METRES", min=0.0, help="How well simulated eyes measure a place.")
+    ] = 0.003
 
 
 class AskedEyes:

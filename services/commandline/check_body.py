@@ -11,10 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import typer
 from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.options import Configured
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, end_like_ctrl_c
@@ -32,27 +32,27 @@ NEEDED = ("pytest", "pytest_asyncio")
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Configured):
-    body: Annotated[str, Argument(metavar="BODY", help="FILE.py:CLASS, package.module:CLASS, or a name.")]
+    body: Annotated[str, typer.Argument(metavar="BODY", help="FILE.py:CLASS, package.module:CLASS, or a name.")]
     real_time: Annotated[
-        bool, Option("--real-time", help="The body has a clock of its own: hardware, or a daemon.")
+        bool, typer.Option("--real-time", help="The body has a clock of its own: hardware, or a daemon.")
     ] = False
     tolerance: Annotated[
-        float, Option(metavar="SECONDS", min=0.0, help="Stated error of its estimates, from point to point.")
+        float, typer.Option(metavar="SECONDS", min=0.0, help="Stated error of its estimates, from point to point.")
     ] = 0.1
     noise: Annotated[
-        float, Option(metavar="DEGREES", min=0.0, help="Stated scatter of its encoders, a standard deviation.")
+        float, typer.Option(metavar="DEGREES", min=0.0, help="Stated scatter of its encoders, a standard deviation.")
     ] = 0.0
     accuracy: Annotated[
-        float, Option(metavar="DEGREES", min=0.0, help="How near joints and eyes come to where they are to be.")
+        float, typer.Option(metavar="DEGREES", min=0.0, help="How near joints and eyes come to where they are to be.")
     ] = 1.0
     world: Annotated[
         Path | None,
-        Option(metavar="FILE", help="JSON of the entities that it looks at; without it a table and a person."),
+        typer.Option(metavar="FILE", help="JSON of the entities that it looks at; without it a table and a person."),
     ] = None
     law: Annotated[
-        str, Option(metavar="WORDS", help="Only laws with these words in their names.", show_default=False)
+        str, typer.Option(metavar="WORDS", help="Only laws with these words in their names.", show_default=False)
     ] = ""
-    json: Annotated[bool, Option("--json", help="The whole report as one JSON object.")] = False
+    json: Annotated[bool, typer.Option("--json", help="The whole report as one JSON object.")] = False
 
 
 def main(options: Options) -> int:

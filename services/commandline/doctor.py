@@ -4,8 +4,9 @@ import signal
 from dataclasses import dataclass
 from typing import Annotated
 
+import typer
+
 from engage_hri.services.bus.config import BusConfig
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, run
@@ -21,7 +22,7 @@ WRONG = 1
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Connected):
-    json: Annotated[bool, Option("--json", help="Facts, matrix and findings as one JSON object.")] = False
+    json: Annotated[bool, typer.Option("--json", help="Facts, matrix and findings as one JSON object.")] = False
 
 
 def main(options: Options) -> int:

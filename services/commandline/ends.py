@@ -2,20 +2,26 @@
 
 import errno
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
-from engage_hri.services.commandline.process import FAILED, REFUSED, UNREAD, interrupted, silence
+import typer
 
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
+from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, UNREAD, interrupted, silence
+
+UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
+"""Class of Typer's errors of usage, which it does not export."""
+TYPERS_OWN = 130
+"""Exit code that Typer gives after a KeyboardInterrupt, by whatever signal."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def exit_code(command: Callable[[], int]) -> int:
+def exit_code(app: typer.Typer, arguments: Sequence[str] | None) -> int:
     """Run a command and print its errors on standard error. An exception that is a bug of ours is raised."""
     try:
-        code = _run(command)
+        code = _run(app, arguments)
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
@@ -29,10 +35,17 @@ def exit_code(command: Callable[[], int]) -> int:
     return code
 
 
-def _run(command: Callable[[], int]) -> int:
+def _run(app: typer.Typer, arguments: Sequence[str] | None) -> int:
     """Run a command to its exit code. Raises BrokenPipeError if the reader of the output is gone."""
     try:
-        return command()
+        code = int(app(arguments, standalone_mode=False) or DONE)
+        return interrupted() if code == TYPERS_OWN else code
+    except SystemExit as exit:
+        if isinstance(exit.__context__, BrokenPipeError):
+            raise exit.__context__ from None  # Typer makes exit code 1 of it
+        raise
+    except UsageError as error:
+        return _misused(error)
     except EngageError as error:
         return _ended([error])
     except BaseExceptionGroup as group:
@@ -42,6 +55,14 @@ def _run(command: Callable[[], int]) -> int:
         return _ended(_leaves(expected))
     except KeyboardInterrupt:
         return interrupted()
+
+
+def _misused(error: Any) -> int:
+    """Print an error of usage in one line. The message is empty if Typer has printed the help."""
+    if message := error.format_message().replace("\n", " ").replace("Value error, ", ""):
+        command = error.ctx.command_path if error.ctx else "engage"
+        print(f"{command}: {message} (see {command} --help)", file=sys.stderr)
+    return REFUSED
 
 
 def readable(fault: Fault, source: Path | str = "") -> str:

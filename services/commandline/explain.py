@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
+import typer
 from msgspec.structs import asdict
 from rich.console import Console
 from rich.table import Table
@@ -14,7 +15,6 @@ from rich.text import Text
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.generating import Unplanned, generated
 from engage_hri.services.commandline.options import Embodied, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
@@ -33,10 +33,10 @@ NAMED = 4
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Embodied):
-    file: Annotated[Path, Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")]
-    format: Annotated[Literal["text", "json"], Option(help="A table for each reference, or a list of all pairs.")] = (
-        "text"
-    )
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")]
+    format: Annotated[
+        Literal["text", "json"], typer.Option(help="A table for each reference, or a list of all pairs.")
+    ] = "text"
     world: WorldFile = None
 
 

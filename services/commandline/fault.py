@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+import typer
+
 from engage_hri.schemas.body import Capabilities, FaultKind
 from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, words
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
@@ -19,14 +20,14 @@ NONE, LIST = "none", "list"
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Connected):
-    kind: Annotated[str, Argument(metavar="KIND|none|list", help="`list` tells what each kind does.")]
-    part: Annotated[str, Option(metavar="PART", help="A body part or a joint; without it all.")] = ""
+    kind: Annotated[str, typer.Argument(metavar="KIND|none|list", help="`list` tells what each kind does.")]
+    part: Annotated[str, typer.Option(metavar="PART", help="A body part or a joint; without it all.")] = ""
     amount: Annotated[
-        float | None, Option(metavar="X", help="How much, in the unit of the kind.", show_default=False)
+        float | None, typer.Option(metavar="X", help="How much, in the unit of the kind.", show_default=False)
     ] = None
-    before: Annotated[str, Option(metavar="SYNC", help="The sync point before which it happens.")] = ""
-    behavior: Annotated[str, Option(metavar="ID", help="The only behavior that it concerns.")] = ""
-    off: Annotated[bool, Option("--off", help="Switch it off; without options all of its kind.")] = False
+    before: Annotated[str, typer.Option(metavar="SYNC", help="The sync point before which it happens.")] = ""
+    behavior: Annotated[str, typer.Option(metavar="ID", help="The only behavior that it concerns.")] = ""
+    off: Annotated[bool, typer.Option("--off", help="Switch it off; without options all of its kind.")] = False
 
     @property
     def fault(self) -> BodyFault:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
@@ -13,7 +14,6 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Embodied, Quiet
 from engage_hri.services.commandline.process import DONE
@@ -34,11 +34,11 @@ BodyMaker = Callable[[], Body]
 class Options(Embodied):
     """Options of the command. Without `--body` a lying body takes the place of yours."""
 
-    runs: Annotated[int, Option(metavar="N", min=1, help="Attacks, each with the next seed.")] = 20
-    seed: Annotated[int, Option(metavar="S", help="Of the first.")] = 0
-    seconds: Annotated[Seconds, Option(min=1, max=3600, help="How long each lasts, in its own time.")] = 20.0
+    runs: Annotated[int, typer.Option(metavar="N", min=1, help="Attacks, each with the next seed.")] = 20
+    seed: Annotated[int, typer.Option(metavar="S", help="Of the first.")] = 0
+    seconds: Annotated[Seconds, typer.Option(min=1, max=3600, help="How long each lasts, in its own time.")] = 20.0
     only: Annotated[
-        list[str] | None, Option(metavar="messages|requests|body", help="Repeatable; else all three.")
+        list[str] | None, typer.Option(metavar="messages|requests|body", help="Repeatable; else all three.")
     ] = None
     quiet: Quiet = False
 

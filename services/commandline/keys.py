@@ -8,9 +8,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
+import typer
+
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import BusConfig
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.process import DONE, FAILED
 
 
@@ -18,20 +19,20 @@ from engage_hri.services.commandline.process import DONE, FAILED
 class Options:
     do: Annotated[
         Literal["init", "add", "renew", "revoke", "show", "acl"],
-        Argument(metavar="init|add|renew|revoke|show|acl", show_default=False),
+        typer.Argument(metavar="init|add|renew|revoke|show|acl", show_default=False),
     ]
-    folder: Annotated[Path, Argument(help="Folder of the keys.", show_default=False)]
+    folder: Annotated[Path, typer.Argument(help="Folder of the keys.", show_default=False)]
     holders: Annotated[
         list[str] | None,
-        Argument(metavar="HOLDER", help="init, add: ROLE=NAME; renew, revoke: NAME.", show_default=False),
+        typer.Argument(metavar="[HOLDER]...", help="init, add: ROLE=NAME; renew, revoke: NAME.", show_default=False),
     ] = None
-    robot: Annotated[str, Option(metavar="NAME", help="init: the robot's namespace on the bus.")] = "robot"
+    robot: Annotated[str, typer.Option(metavar="NAME", help="init: the robot's namespace on the bus.")] = "robot"
     host: Annotated[
         list[str] | None,
-        Option(metavar="HOST", help="init: name or address of the router; may be repeated.",
+        typer.Option(metavar="HOST", help="init: name or address of the router; may be repeated.",
                      show_default="this machine only"),
     ] = None  # fmt: skip
-    days: Annotated[int, Option(min=1, max=3650, help="Days for which certificates are valid.")] = 365
+    days: Annotated[int, typer.Option(min=1, max=3650, help="Days for which certificates are valid.")] = 365
 
 
 def main(options: Options) -> int:

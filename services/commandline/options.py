@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import typer
 from msgspec import json
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.utf8 import is_utf8
-from engage_hri.services.commandline.arguments import Option
 
 if TYPE_CHECKING:
     from engage_hri.services.bus.config import BusConfig
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from engage_hri.services.runtime.configuration import Kind
 
 Resolution = Annotated[
-    Literal["table", "object"] | None, Option(help="How finely perception tells what people look at.")
+    Literal["table", "object"] | None, typer.Option(help="How finely perception tells what people look at.")
 ]
-Strict = Annotated[bool, Option("--strict", help="Exit 2 if there was any warning.")]
-VirtualTime = Annotated[bool, Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
-Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing but errors.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit 2 if there was any warning.")]
+VirtualTime = Annotated[bool, typer.Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 WorldFile = Annotated[
-    Path | None, Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
+    Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
 ]
 HUMANS = {"appendix-b": "scripted"}
 """Simulated humans with another name in the configuration."""
@@ -51,19 +51,19 @@ class Configured:
 
     config: Annotated[
         Path | None,
-        Option("--config", metavar="FILE", help="TOML; see docs/configuration.md.", show_default=False),
+        typer.Option("--config", metavar="FILE", help="TOML; see docs/configuration.md.", show_default=False),
     ] = None
     settings: Annotated[
         list[str] | None,
-        Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.late=1."),
+        typer.Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.late=1."),
     ] = None
     log: Annotated[
         Path | None,
-        Option(metavar="FILE", help="Add a line for each block, fragment, connection event and peer to FILE."),
+        typer.Option(metavar="FILE", help="Add a line for each block, fragment, connection event and peer to FILE."),
     ] = None
     log_level: Annotated[
         list[str] | None,
-        Option(metavar="[SOURCE=]LEVEL", help="debug, info, warning or error; of one service: realizer=debug."),
+        typer.Option(metavar="[SOURCE=]LEVEL", help="debug, info, warning or error; of one service: realizer=debug."),
     ] = None
 
     @property
@@ -93,7 +93,7 @@ class Embodied(Configured):
 
     body: Annotated[
         list[str] | None,
-        Option(
+        typer.Option(
             metavar="[PARTS=]BODY",
             help="The robot's body: a name, FILE.py:CLASS or package.module:CLASS; head,face=BODY takes only these "
             "parts of it. May be repeated. See docs/control.md.",
@@ -101,7 +101,7 @@ class Embodied(Configured):
         ),
     ] = None
     voice: Annotated[
-        str | None, Option(metavar="BODY", help="The robot's voice, in place of the one of its body.")
+        str | None, typer.Option(metavar="BODY", help="The robot's voice, in place of the one of its body.")
     ] = None
 
     @property
@@ -118,20 +118,20 @@ class Connected(Configured):
 
     mode: Annotated[
         Literal["auto", "peer", "client"] | None,
-        Option(help="client of a router, or peer; auto: client if an endpoint is on another machine.",
+        typer.Option(help="client of a router, or peer; auto: client if an endpoint is on another machine.",
                      show_default="auto"),
     ] = None  # fmt: skip
 
     robot: Annotated[
-        str | None, Option(metavar="NAME", help="The robot's namespace on the bus.", show_default="robot")
+        str | None, typer.Option(metavar="NAME", help="The robot's namespace on the bus.", show_default="robot")
     ] = None
     connect: Annotated[
-        list[str] | None, Option(metavar="ENDPOINT", help="Zenoh endpoint to connect to; may be repeated.")
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to connect to; may be repeated.")
     ] = None
 
-    keys: Annotated[Path | None, Option(metavar="FOLDER", help="Keys made by `engage keys`.", show_default=False)] = (
-        None
-    )
+    keys: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Keys made by `engage keys`.", show_default=False)
+    ] = None
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -161,7 +161,7 @@ class Listening(Connected):
     """Options for a process to which others may connect."""
 
     listen: Annotated[
-        list[str] | None, Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Zenoh endpoint to listen on; may be repeated.")
     ] = None
 
 
@@ -169,10 +169,10 @@ class Listening(Connected):
 class Simulated(Configured):
     """Options for the simulation."""
 
-    seed: Annotated[int | None, Option(metavar="N", min=0, help="Of all chance in the simulation.")] = None
+    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Of all chance in the simulation.")] = None
     human: Annotated[
         Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive"] | None,
-        Option(help="How the simulated human behaves: docs/commands.md tells of each.", show_default=False),
+        typer.Option(help="How the simulated human behaves: docs/commands.md tells of each.", show_default=False),
     ] = None
     resolution: Resolution = None
 
@@ -188,11 +188,11 @@ class Written:
 
     events: Annotated[
         Path | None,
-        Option(metavar="FILE", help="Write connection events as JSON lines; - for standard output."),
+        typer.Option(metavar="FILE", help="Write connection events as JSON lines; - for standard output."),
     ] = None
     feedback: Annotated[
         Path | None,
-        Option(
+        typer.Option(
             metavar="FILE",
             help="Write the blocks' feedback as JSON lines, into FILE.xml as XML; - for standard output.",
         ),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
+import typer
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -14,7 +15,6 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
@@ -34,8 +34,8 @@ HIGHEST = 40
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Embodied):
-    file: Annotated[Path, Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)]
-    format: Annotated[Literal["text", "json", "dot", "pnml"], Option(help="How to print the net.")] = "text"
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)]
+    format: Annotated[Literal["text", "json", "dot", "pnml"], typer.Option(help="How to print the net.")] = "text"
     world: WorldFile = None
     strict: Strict = False
 

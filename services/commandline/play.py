@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
+import typer
 from rich.console import Console
 
 from engage_hri.schemas import keys
@@ -22,7 +23,6 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import checking, roster
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
@@ -46,33 +46,33 @@ PATIENCE: Seconds = 5.0
 class Options(Written, Embodied, Connected):
     files: Annotated[
         list[Path],
-        Argument(metavar="FILE", help="EBML turn fragments or BML blocks (XML), or JSON of either."),
+        typer.Argument(metavar="FILE...", help="EBML turn fragments or BML blocks (XML), or JSON of either."),
     ]
     embedded: Annotated[
-        bool, Option("--embedded", help="In a private system with a simulated body, instead of a running one.")
+        bool, typer.Option("--embedded", help="In a private system with a simulated body, instead of a running one.")
     ] = False
     world: WorldFile = None
     virtual_time: VirtualTime = False
     at: Annotated[
         str | None,
-        Option(metavar="S,S,...", help="When to submit each file, seconds; else one after the other."),
+        typer.Option(metavar="S,S,...", help="When to submit each file, seconds; else one after the other."),
     ] = None
     feedback_format: Annotated[
-        FeedbackFormat | None, Option(help="Form of the feedback, whatever its file is called.")
+        FeedbackFormat | None, typer.Option(help="Form of the feedback, whatever its file is called.")
     ] = None
     outcomes: Annotated[
         Path | None,
-        Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
+        typer.Option(metavar="FILE", help="Write what became of each fragment, for a language model; - as above."),
     ] = None
     human: Annotated[
         Literal["attentive", "none"] | None,
-        Option(
+        typer.Option(
             help="With --embedded: one who follows the robot's gaze and answers, or nobody who does.",
             show_default="attentive",
         ),
     ] = None
     strict: Strict = False
-    verbose: Annotated[bool, Option("--verbose", "-v", help="Print each sync point, too.")] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print each sync point, too.")] = False
 
 
 class Job(NamedTuple):

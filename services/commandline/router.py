@@ -9,11 +9,12 @@ from pathlib import Path
 from select import PIPE_BUF, select
 from typing import Annotated
 
+import typer
+
 from engage_hri.schemas.access import ROUTER
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import is_encrypted
 from engage_hri.services.bus.keyring import Keys, read_keys
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.patient import LOG, Patient, beneath, complain
 from engage_hri.services.commandline.process import FAILED, run_until_signal, until_closed
 from engage_hri.services.commandline.watched import EVERY, SIGN, watched
@@ -28,19 +29,21 @@ cut off, and while all are, the router hears nobody, of no robot."""
 class Options:
     listen: Annotated[
         list[str],
-        Option(
+        typer.Option(
             metavar="ENDPOINT", help="Where others connect: tcp/0.0.0.0:7447; may be repeated.", show_default=False
         ),
     ]
-    connect: Annotated[list[str] | None, Option(metavar="ENDPOINT", help="Another router; may be repeated.")] = None
+    connect: Annotated[
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Another router; may be repeated.")
+    ] = None
     keys: Annotated[
         Path | None,
-        Option(
+        typer.Option(
             metavar="FOLDER", help="Keys made by `engage keys`: strangers are refused, and all have a role.",
             show_default="open to all",
         ),
     ] = None  # fmt: skip
-    attended: Annotated[bool, Option("--attended", hidden=True)] = False
+    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
 
 def main(options: Options) -> int:

@@ -5,9 +5,10 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import Annotated
 
+import typer
+
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.arguments import Argument, Option
 from engage_hri.services.commandline.options import Embodied, Listening
 from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name, until_closed
@@ -20,8 +21,8 @@ from engage_hri.services.runtime.service import serve
 class Options(Embodied, Listening):
     """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
 
-    service: Annotated[roster.ServiceName, Argument(help="Which service.", show_default=False)]
-    attended: Annotated[bool, Option("--attended", hidden=True)] = False
+    service: Annotated[roster.ServiceName, typer.Argument(help="Which service.", show_default=False)]
+    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
 
 def ready_line(name: str) -> str:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
+import typer
 from msgspec import Struct
 from rich import box
 from rich.console import Group, RenderableType
@@ -18,7 +19,6 @@ from rich.text import Text
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS
 from engage_hri.services.commandline.folder import Folder
@@ -59,29 +59,29 @@ Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, byte
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Configured):
-    out: Annotated[Path, Option(metavar="DIR", help="Where the results go.", show_default=False)]
-    sessions: Annotated[int, Option(metavar="N", min=1, help="In each condition.")] = 20
-    seed: Annotated[int, Option(metavar="S", help="Session k has the seed S + k, in each condition.")] = 0
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the results go.", show_default=False)]
+    sessions: Annotated[int, typer.Option(metavar="N", min=1, help="In each condition.")] = 20
+    seed: Annotated[int, typer.Option(metavar="S", help="Session k has the seed S + k, in each condition.")] = 0
     condition: Annotated[
         list[str] | None,
-        Option(
+        typer.Option(
             metavar="operational|degraded-generation|degraded-recognition",
             help="Repeatable; else all three.",
         ),
     ] = None
     human: Annotated[
         Literal["stochastic", "listening", "appendix-b", "misplacing", "table-2-1"],
-        Option(help="How the simulated human behaves; table-2-1: two people and no robot."),
+        typer.Option(help="How the simulated human behaves; table-2-1: two people and no robot."),
     ] = "stochastic"
     resolution: Resolution = None
     jobs: Annotated[
-        int | None, Option(metavar="J", min=1, help="Processes; as many as processors.", show_default=False)
+        int | None, typer.Option(metavar="J", min=1, help="Processes; as many as processors.", show_default=False)
     ] = None
     limit: Annotated[
         Seconds,
-        Option(metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."),
+        typer.Option(metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."),
     ] = 3600.0
-    overwrite: Annotated[bool, Option("--overwrite", help="Replace the results that are there.")] = False
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False
     quiet: Quiet = False
 
 

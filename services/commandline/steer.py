@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import typer
+
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.arguments import Argument
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name
@@ -17,9 +18,9 @@ VERBS = {"hold": "held", "continue": "continued", "stop": "stopped"}
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Connected):
-    to: Annotated[Literal["hold", "continue", "stop"], Argument(metavar="hold|continue|stop")]
-    block: Annotated[str, Argument(metavar="BLOCK", help="Id of a live block; without it everything.")] = ""
-    behavior: Annotated[str, Argument(metavar="BEHAVIOR", help="Id of one of its behaviors.")] = ""
+    to: Annotated[Literal["hold", "continue", "stop"], typer.Argument(metavar="hold|continue|stop")]
+    block: Annotated[str, typer.Argument(metavar="[BLOCK]", help="Id of a live block; without it everything.")] = ""
+    behavior: Annotated[str, typer.Argument(metavar="[BEHAVIOR]", help="Id of one of its behaviors.")] = ""
 
 
 def main(options: Options) -> int:

@@ -5,18 +5,18 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
+import typer
 
 from engage_hri.schemas.tool import Format, tool_definition
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_world
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    format: Annotated[Format, Option(help="Of the Messages, Responses, or Chat Completions API.")] = "anthropic"
+    format: Annotated[Format, typer.Option(help="Of the Messages, Responses, or Chat Completions API.")] = "anthropic"
     world: Annotated[
-        Path | None, Option(metavar="FILE", help="JSON of the entities: only their ids are allowed.")
+        Path | None, typer.Option(metavar="FILE", help="JSON of the entities: only their ids are allowed.")
     ] = None
 
 

@@ -7,13 +7,13 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
+import typer
 from rich.console import Console
 from rich.text import Text
 
 from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, scene_view
@@ -38,10 +38,10 @@ STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Written, Simulated, Embodied, Listening):
-    task: Annotated[bool, Option("--task", help="Also run the tangram task, and end when it ends.")] = False
+    task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False
     in_one: Annotated[
         bool,
-        Option("--in-one", help="All services in this process: lighter, but one that crashes ends all."),
+        typer.Option("--in-one", help="All services in this process: lighter, but one that crashes ends all."),
     ] = False
 
 

@@ -5,6 +5,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple, get_args
 
+import typer
+
 from engage_hri.schemas import keys, lines
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import EventKind
@@ -15,7 +17,6 @@ from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.arguments import Option
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
@@ -38,15 +39,15 @@ SUBJECTS: dict[str, tuple[type[Message], ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Connected):
-    json: Annotated[bool, Option("--json", help="JSON lines instead of text.")] = False
+    json: Annotated[bool, typer.Option("--json", help="JSON lines instead of text.")] = False
     only: Annotated[
         list[str] | None,
-        Option(metavar="WHAT", help="events, statistics, feedback, head, holds or faults; may be repeated."),
+        typer.Option(metavar="WHAT", help="events, statistics, feedback, head, holds or faults; may be repeated."),
     ] = None
-    net: Annotated[bool, Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
-    actor: Annotated[str, Option(metavar="ID", help="Only what goes on with this person.")] = ""
+    net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
+    actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
     kind: Annotated[
-        list[str] | None, Option(metavar="KIND", help="Only these connection events; may be repeated.")
+        list[str] | None, typer.Option(metavar="KIND", help="Only these connection events; may be repeated.")
     ] = None
 
 

@@ -96,7 +96,7 @@ async def test_a_running_demo_has_one_thread() -> None:
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 async def test_a_signal_while_it_still_loads_ends_it_without_a_word(how: signal.Signals, tmp_path: Path) -> None:
-    (tmp_path / "rich.py").write_text("import sys\nprint('loading', flush=True)\nsys.stdin.read()\n")
+    (tmp_path / "typer.py").write_text("import sys\nprint('loading', flush=True)\nsys.stdin.read()\n")
     demo = await start("demo", PYTHONPATH=str(tmp_path))
     try:
         await line(demo, "loading", log=False)

@@ -165,9 +165,9 @@ def test_a_bad_configuration_is_refused_with_file_and_key(
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["fly"], "there is no command 'fly'"),
-        (["run", "nobody"], "invalid choice: 'nobody'"),
-        (["plan"], "required: FILE"),
+        (["fly"], "No such command 'fly'"),
+        (["run", "nobody"], "'nobody' is not one of"),
+        (["plan"], "Missing argument 'FILE'"),
         (["demo", "--events", "no/such/folder/x"], "no/such/folder/x: cannot write"),
         (["demo", "--config", "missing.toml"], "missing.toml: No such file"),
         (["play", "missing.xml"], "missing.xml: No such file"),

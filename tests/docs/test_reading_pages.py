@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import pytest
 
 from engage_hri.services.commandline.app import COMMANDS, command
-from engage_hri.services.commandline.arguments import names
 from tests.docs.clone import ROOT
 from tests.docs.pages import (
     Shown,
@@ -106,7 +105,7 @@ def test_what_a_page_calls_is_there_with_these_options(where: str, words: list[s
     if words[0] in ("--version", "COMMAND"):
         return
 
-    known = names(command(words[0]).Options)
+    known = {option for param in command(words[0]).params for option in (*param.opts, *param.secondary_opts)}
     assert {word for word in words if word.startswith("-") and len(word) > 1} <= known
 
 
@@ -117,7 +116,7 @@ def test_every_option_of_the_page_on_commands_is_there():
     public = [name for name, does in COMMANDS.items() if does]
     assert set(public) <= set(sections)
     for name in public:
-        known = names(command(name).Options)
+        known = {option for param in command(name).params for option in param.opts}
         heads = re.findall(r"^- (`--.*?):? *", sections[name], re.MULTILINE)
         assert {option for head in heads for option in re.findall(r"--[\w-]+", head)} <= known, name
 
