@@ -19,6 +19,7 @@ from engage_hri.schemas.documents.prosody import Prosody
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.voice.espeak_voices import variants, voices
+from engage_hri.services.control.voice.scripts import told, unread
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.synthesis import (
     Heard,
@@ -131,6 +132,11 @@ class EspeakSynthesizer(Synthesizer):
             if len(places)
         ]
         return Said(bytes(self._sound), words, [Phone(name, self._seconds(at)) for name, at in self._phones])
+
+    @classmethod
+    def warnings(cls, phrase: Phrase) -> tuple[str, ...]:
+        found = unread(phrase.text, phrase.language or EspeakSettings().language, phrase.prosody)
+        return tuple(map(told, found))
 
     def _seconds(self, sample: int) -> Seconds:
         return sample / self.rate
