@@ -118,8 +118,11 @@ class ReachyMini(Body):
         if now - self._last_frame > GAP:
             self._moves.stand(self._last_frame, now)
         self._last_frame = now
+        was_slow = self._rate.is_slow
         if (rate := self._rate.fallen(now)) is not None:
             self.on_fault(_slow(rate))
+        elif was_slow and not self._rate.is_slow:
+            self.on_recovery("reachy_mini: the daemon sends enough measurements again")
         for bell in list(self._bells):
             bell.ring()
         if not self._moves.correct(now) and self._rests_since == self._moves.end:
@@ -138,6 +141,8 @@ class ReachyMini(Body):
 
     def _be_back(self, measured: Measured) -> None:
         """Begin anew from where the joints are, and go home from there."""
+        if self._link is not None:
+            self.on_recovery("reachy_mini: it can be moved again, and goes home")
         now = self._loop.time()
         self._moves.measured = measured.pose
         self._last_frame, self._sent, self._rests_since = now, "", -inf

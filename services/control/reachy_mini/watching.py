@@ -56,6 +56,11 @@ class Rate:
         self._last: Seconds | None = None
         self._is_slow = False
 
+    @property
+    def is_slow(self) -> bool:
+        """True from when they have become too few until there are enough."""
+        return self._is_slow
+
     def fallen(self, now: Seconds) -> float | None:
         """Note a measurement. Returns how many come in a second once these have become too few, and then no more.
 
