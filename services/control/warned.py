@@ -1,4 +1,4 @@
-"""What a person has to see to: told on the bus, in the log, and by the command that serves."""
+"""Warnings of what a person has to see to: on the bus, in the log, and from the command that serves."""
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
