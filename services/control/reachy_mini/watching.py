@@ -2,6 +2,7 @@
 
 import math
 
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 
 WAY: Radians = math.radians(0.3)
@@ -45,6 +46,13 @@ class Watch:
             self._best, self._since, self._seen = left, measured, 0
         if measured > self._last:
             self._last, self._seen = measured, self._seen + 1
+
+
+def slow(rate: float, longest: Seconds) -> Fault:
+    """Say that measurements come too seldom. rate: in a second. longest: from one to the next with which it moves."""
+    reason = f"the daemon sends {rate:.1f} measurements a second: the robot moves by fits and starts, and late"
+    advice = f"it takes {1.0 / longest:.0f}; is the network slow, or the daemon's machine busy?"
+    return Fault(reason=reason, where="reachy_mini", advice=advice, service="control")
 
 
 class Rate:
