@@ -93,6 +93,6 @@ def together(pose: dict[str, Radians], added: Angles) -> dict[str, Radians]:
 
 
 def _within(joint: str, planned: Radians, by: Radians) -> Radians:
-    """As much as the range of a joint leaves; nothing for one that is out of it."""
+    """Cut what is added to what the range of a joint leaves; nothing is left for one that is out of it."""
     low, high = _RANGES[joint].low, _RANGES[joint].high
     return max(min(0.0, low - planned), min(max(0.0, high - planned), by))
