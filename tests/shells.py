@@ -8,6 +8,7 @@ SHELLS = {
     "services/control/performing.py",  # breaks off what a body does not end
     "services/control/questions.py",  # answers what behaviors would take
     "services/control/estimates.py",  # publishes mistakes of the body
+    "services/control/warned.py",  # publishes what a person has to see to
     "services/control/switching.py",  # publishes the faults that are on
     "services/control/guarded.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/perform/feedback.py",  # publishes feedback

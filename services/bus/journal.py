@@ -39,6 +39,15 @@ def logger(name: str, role: str) -> logging.Logger:
     return logging.getLogger(f"engage.{name if name in NAMED else role}")
 
 
+ALERT = "alert"
+"""Attribute of a record that says what a person has to see to, or that it is over: commands that serve print it."""
+
+
+def alert(log: logging.Logger, text: str, *arguments: object) -> None:
+    """Write what a person has to see to, or that it is over. text: as of `Logger.warning`."""
+    log.warning(text, *arguments, extra={ALERT: True})
+
+
 def entry(message: Message) -> Entry:
     """Return the line for a message that is published."""
     tell = _TOLD.get(type(message))

@@ -53,7 +53,8 @@ def command(name: str) -> Any:
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
 
     def run(**given: Any) -> None:
-        logs.configure(given.get("log"), given.get("log_level") or ())
+        # Other commands show faults themselves, as they come on the bus.
+        logs.configure(given.get("log"), given.get("log_level") or (), alerts=name in ("run", "up"))
         raise typer.Exit(module.main(module.Options(**given)))
 
     run.__signature__ = inspect.Signature([taken[option] for option in names])  # type: ignore[attr-defined]

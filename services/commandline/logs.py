@@ -1,10 +1,12 @@
-"""Setup of the log: bugs go to standard error; with `--log FILE` each event is a line of a file.
+"""Setup of the log: bugs, and what a person has to see to, go to standard error.
 
-Each line is appended whole, so that the services of one machine may share a file.
+With `--log FILE` each event is a line of a file. It is appended whole, so that the services of one machine may share
+a file.
 """
 
 import logging
 import sys
+from collections import OrderedDict
 from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime
@@ -13,6 +15,7 @@ from pathlib import Path
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus import journal
 from engage_hri.services.commandline.patient import Patient
@@ -21,6 +24,8 @@ LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WA
 SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "peers", "up")))
 """Sources with a level of their own: services, the roles of others, `peers` (who comes and goes), and `engage up`."""
 
+LINES = 200
+"""Lines of which it is known how often they were told."""
 HANDLER = "engage"
 """Name of the handlers made here."""
 
@@ -51,10 +56,45 @@ class StandardError(logging.Handler):
     What cannot be printed there ends nobody.
     """
 
+    def __init__(self, *, alerts: bool = False) -> None:
+        """alerts: print also what of services a person has to see to (`journal.alert`)."""
+        super().__init__()
+        self._alerts = alerts
+        self._repeats = Repeats()
+
     def emit(self, record: logging.LogRecord) -> None:
         if record.levelno >= (logging.WARNING if record.name == "engage" else logging.ERROR):
+            self._print(self.format(record))
+        elif self._alerts and getattr(record, journal.ALERT, False):
+            self._print(self._repeats.told(self.format(record), record.created))
+
+    def _print(self, text: str) -> None:
+        if text:
             with suppress(OSError):
-                print(self.format(record), file=sys.stderr)
+                print(text, file=sys.stderr)
+
+
+class Repeats:
+    """Limit for lines that come again and again, as of a device that is lost and found each second."""
+
+    MOST = 3
+    """So many times within `WITHIN` a line is told."""
+    WITHIN: Seconds = 60.0
+
+    def __init__(self) -> None:
+        self._told: OrderedDict[str, list[Seconds]] = OrderedDict()
+
+    def told(self, text: str, at: Seconds) -> str:
+        """Return what to tell of a line; empty: nothing, it was told often enough. at: by the clock."""
+        times = [each for each in self._told.pop(text, []) if at - each < self.WITHIN]
+        is_told = len(times) < self.MOST
+        self._told[text] = [*times, at] if is_told else times
+        if len(self._told) > LINES:
+            self._told.popitem(last=False)
+        if not is_told:
+            return ""
+        is_last = len(times) + 1 == self.MOST
+        return f"{text} (again and again: told {self.MOST} times a minute)" if is_last else text
 
 
 class LogFile(logging.Handler):
@@ -82,8 +122,8 @@ class LogFile(logging.Handler):
             print(line, file=sys.stderr)
 
 
-def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
-    """Set up the log of this process. path: file to append to; None: no file.
+def configure(path: Path | None = None, levels: Sequence[str] = (), *, alerts: bool = False) -> None:
+    """Set up the log of this process. path: file to append to; None: no file. alerts: see `StandardError`.
 
     levels: `debug` for all, or `realizer=debug` for one source. Raises InputRefused for an unknown level or source,
     levels without a file, and a file that cannot be written.
@@ -99,7 +139,7 @@ def configure(path: Path | None = None, levels: Sequence[str] = ()) -> None:
             advice = f"LEVEL or SOURCE=LEVEL; levels: {', '.join(LEVELS)}; sources: {', '.join(SOURCES)}"
             bad = name if name not in LEVELS else source
             raise InputRefused(Fault(reason=f"unknown {bad!r}", where="--log-level", advice=advice))
-    handlers: list[logging.Handler] = [StandardError()]
+    handlers: list[logging.Handler] = [StandardError(alerts=alerts)]
     handlers[0].setFormatter(Escaped())
     if path is not None:
         try:

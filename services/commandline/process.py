@@ -13,6 +13,7 @@ from types import FrameType
 from typing import Any, TypeVar
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline import last_resort
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
@@ -21,6 +22,8 @@ DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE
 SHOW_CURSOR = b"\x1b[?25h"
 AT_ONCE: Seconds = 1.0
 """Time within which two SIGTERM are one: `timeout` tells a process and its group, systemd and `up` tell services."""
+left: set[str] = set()
+"""Names of our child processes that run."""
 _terminated: Seconds | None = None
 """When SIGTERM came last, by time.monotonic."""
 _stopping = [signal.SIGINT]
@@ -66,6 +69,7 @@ async def _interruptible(main: Coroutine[Any, Any, T]) -> T:
         cancel(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)
+    last_resort.end_at_the_second(signal.SIGINT)
     return await main
 
 
@@ -76,6 +80,9 @@ def _leave(number: int, frame: FrameType | None) -> None:
     """
     guarded = sys.modules.get("engage_hri.services.control.guarded")
     if guarded is not None and sys.stderr is not None and (told := guarded.held_up(frame)):
+        os.write(sys.stderr.fileno(), f"{told}\n".encode(errors="backslashreplace"))
+    if left and sys.stderr is not None:
+        told = f"not waited for: {', '.join(sorted(left))}; what does not end by itself is killed"
         os.write(sys.stderr.fileno(), f"{told}\n".encode(errors="backslashreplace"))
     if sys.stdout is not None and sys.stdout.isatty():
         os.write(sys.stdout.fileno(), SHOW_CURSOR)

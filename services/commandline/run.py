@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline import roster
+from engage_hri.services.commandline import last_resort, roster
 from engage_hri.services.commandline.options import Embodied, Listening
 from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name, until_closed
@@ -34,6 +34,8 @@ def main(options: Options) -> int:
     """Serve until a signal."""
     if (options.body or options.voice) and options.service != "control":
         raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
+    if options.attended:
+        last_resort.end_after_the_parent()
     on_robot = options.service in ROBOT
     config = options.read(RobotConfig, elsewhere=ELSEWHERE) if on_robot else options.load()
     run_until_signal(_serve(options, config))

@@ -14,6 +14,7 @@ from typing import Any
 
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.process import left
 
 LOG = logging.getLogger("engage.up")
 Tell = Callable[[str, str], None]
@@ -156,10 +157,12 @@ class Child:
             async with spawned(self._end, *self._arguments, stderr=STDOUT) as process:
                 self.starts += 1
                 self.pid = process.pid
+                left.add(self.name)
                 await self._pass_on(process)
                 return await process.wait()
         finally:
             self.pid = None
+            left.discard(self.name)
 
     async def _pass_on(self, process: Process) -> None:
         assert process.stdout is not None

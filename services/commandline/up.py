@@ -11,6 +11,9 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline import roster
@@ -25,7 +28,7 @@ from engage_hri.services.commandline.run import ready_line
 from engage_hri.services.commandline.supervisor import Child, supervised
 from engage_hri.services.commandline.tangram import ending
 from engage_hri.services.console import tally
-from engage_hri.services.console.follow import following
+from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.control import drivers
 from engage_hri.services.runtime.service import Service, running
 
@@ -66,7 +69,7 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
         tallying = Tallying(bus.now())
         live = options.task and console.is_terminal and not options.quiet
         with scene_view(console, config.robot, bus.now(), live) as show:
-            sinks = (show, tallying, outputs) if options.task else (outputs,)
+            sinks = (without_faults(show), tallying, outputs) if options.task else (outputs,)
             async with AsyncExitStack() as stack:
                 await stack.enter_async_context(following(bus, sinks))
                 hubs = await _hubs(options, config, services, hub, stack)
@@ -78,6 +81,16 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
                 holding.cancel()
     if options.task:
         console.print(tally.render(tallying.tally, config.robot, console.width))
+
+
+def without_faults(show: Sink) -> Sink:
+    """Show all but faults: the services print theirs on standard error."""
+
+    def told(message: Message, at: Seconds) -> None:
+        if not isinstance(message, Fault):
+            show(message, at)
+
+    return told
 
 
 def _names(options: Options) -> tuple[str, ...]:

@@ -273,6 +273,8 @@ class Body(Extras, ABC):
     default. `control.drivers.NAME` of the configuration is read into it.
     on_fault: called with what goes wrong outside of any behavior, such as a lost connection. Whoever runs the body
     replaces it.
+    on_recovery: called with a sentence when something of which `on_fault` has told is over. Whoever runs the body
+    replaces it.
     on_lips: called by a voice with all the mouth shapes of what it begins to say, in time order, and with none when
     it falls silent early. Whoever runs the body replaces it.
     """
@@ -280,6 +282,7 @@ class Body(Extras, ABC):
     Settings: ClassVar[type[Struct] | None] = None
     capabilities: Capabilities
     on_fault: Callable[[Fault], None] = staticmethod(lambda fault: None)
+    on_recovery: Callable[[str], None] = staticmethod(lambda text: None)
     on_lips: Callable[[Sequence[MouthShape]], None] = staticmethod(lambda shapes: None)
 
     @classmethod

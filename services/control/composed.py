@@ -60,6 +60,7 @@ class ComposedBody(Body):
         self._world = World(entities=())
         for member in self._members:
             member.body.on_fault = self._tell_fault
+            member.body.on_recovery = lambda text: self.on_recovery(text)
             member.body.on_lips = self.move_lips
             member.body.others_say = self._saying
 

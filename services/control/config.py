@@ -99,8 +99,8 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     variability: deviations of the simulated body.
     calibration: file with the offsets of joints, and how well looks and points are known, as `engage calibrate body`
         makes it. Empty: the body is as it measures.
-    alive: true if the simulated body blinks, breathes and stirs while it does nothing, as seen on the stream of its
-        state only.
+    alive: true if a body of ours blinks, breathes and stirs while it does nothing, as far as it can; seen on the
+        stream of its state only.
     repertoire: files with lexemes of the simulated body, one name or a list; see docs/control.md.
     """
 

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.control.warned import warn
 
 ADVICE = "phases lead from `start` to `end`, each from where the one before it ends (docs/control.md)"
 MOST_TOLD = 100
@@ -50,8 +50,7 @@ class IncomingEstimates:
     def _tell(self, type: str, fault: Fault) -> None:
         if (type, fault.reason) not in self._told and len(self._told) < MOST_TOLD:
             self._told.add((type, fault.reason))
-            self._bus.log.warning("control: %s", fault)
-            self._bus.publish(keys.fault("control"), fault)
+            warn(self._bus, fault)
 
 
 def flaw(behavior: BlockBehavior, estimate: Estimate) -> str:

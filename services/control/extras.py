@@ -99,10 +99,10 @@ class Extras:
 class Gate:
     """Share of the idle motion that is let through: it goes to 0 when something begins, and comes back after it."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_open: bool = True) -> None:
         self._since: Seconds = -inf
-        self._from = 1.0
-        self._is_open = True
+        self._from = float(is_open)
+        self._is_open = is_open
 
     def share(self, t: Seconds, *, is_open: bool) -> float:
         """The share at t, of a gate that is open or closed from now on."""

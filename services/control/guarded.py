@@ -67,6 +67,7 @@ class GuardedBody(Body):
         self._slow: set[str] = set()
         """Calls that have held everything up."""
         body.on_fault = lambda fault: self.on_fault(fault)
+        body.on_recovery = lambda text: self.on_recovery(text)
         body.on_lips = lambda shapes: self.on_lips(shapes)
         body.others_say = lambda: self.others_say()
 

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from contextlib import aclosing, nullcontext
+from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift
@@ -50,6 +51,7 @@ from engage_hri.services.control.shown import Shown
 from engage_hri.services.control.switching import FaultSwitch
 from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.control.variability import Deviations, is_lost
+from engage_hri.services.control.warned import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
 
@@ -114,7 +116,10 @@ class _Control:
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the id of the request that asked for it."""
         self._sent = 0
+        self._has_not_come_home = False
+        """A way home has failed, and none of the whole body has come to its end since."""
         body.on_fault = self._tell_fault
+        body.on_recovery = partial(recovered, bus)
         calibration = calibrated(body, config.calibration)
         self.questions = Questions(bus, config, body, calibration, lambda: self._world)
         self.shown = Shown(bus, body, self._actions, config.state_rate, calibration)
@@ -287,7 +292,11 @@ class _Control:
         except BodyFailed as error:
             if not isinstance(error, TakenOver):
                 self._tell_fault(error.fault)
+                self._has_not_come_home = True
             return error.fault
+        if self._has_not_come_home and not parts:
+            self._has_not_come_home = False
+            recovered(self._bus, "the body is at home")
         return None
 
     def _take_home(self, name: str) -> None:
@@ -341,8 +350,7 @@ class _Control:
 
     def _tell_fault(self, fault: Fault) -> None:
         """Publish what went wrong with the body outside of any behavior."""
-        self._bus.log.warning("control: %s", fault)
-        self._bus.publish(keys.fault("control"), fault)
+        warn(self._bus, fault)
         self.shown.look_soon()
 
     # -- dead man -----------------------------------------------------------------------------------------------
@@ -370,8 +378,7 @@ class _Control:
         others = (each for each in self._live.values() if each.request.requester == cancel.requester)
         if all(each.authority.revoked for each in others):
             reason = f"{cancel.requester}: {cancel.reason}; the body goes home"
-            self._bus.log.warning("control: %s", reason)
-            self._bus.publish(keys.fault("control"), Fault(reason=reason, service="control"))
+            warn(self._bus, Fault(reason=reason, service="control"))
             self._take_home(f"after {cancel.requester}")
 
     def close(self) -> None:

@@ -18,6 +18,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
 
 Ready = Callable[[], None]
@@ -86,7 +87,8 @@ async def _rival(bus: Bus, presence: Subscription) -> None:
                 if run < bus.run:
                     reason = f"robot {bus.robot!r} has this on the bus twice; the other one stays"
                     raise InputRefused(Fault(reason=reason, where=where, advice=advice))
-                bus.log.warning("robot %r has %s on the bus twice; this one stays (%s)", bus.robot, where, advice)
+                told = "robot %r has %s on the bus twice; this one stays (%s)"
+                journal.alert(bus.log, told, bus.robot, where, advice)
 
 
 @cache

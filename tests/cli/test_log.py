@@ -1,14 +1,29 @@
 """`--log FILE`: what of a run is in the file, at which level, and what is not."""
 
+import asyncio
 import logging
 import re
+import signal
 from pathlib import Path
 
 import pytest
 
+from engage_hri.services.bus import journal
 from engage_hri.services.commandline import logs
-from tests.cli.command import FRAGMENT, Engage
+from tests.bus.places import free_endpoint
+from tests.cli.command import FRAGMENT, Engage, start
 
+LOSING = """
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.control.torso.body import SimulatedBody
+
+class Losing(SimulatedBody):
+    async def perform(self, behavior, authority):
+        self.on_fault(Fault(reason="the daemon is gone", advice="start it", service="control"))
+        async for progress in super().perform(behavior, authority):
+            yield progress
+        self.on_recovery("it is back")
+"""
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d (DEBUG|INFO|WARNING|ERROR) ([a-z]+): .+")
 
 
@@ -90,6 +105,56 @@ def test_what_cannot_be_done_is_refused(engage: Engage, tmp_path: Path, options:
 
     assert result.code == 2
     assert result.err.startswith(told)
+
+
+@pytest.mark.parametrize("alerts", [True, False])
+def test_what_a_person_has_to_see_to_is_printed_by_commands_that_serve(
+    capsys: pytest.CaptureFixture[str], alerts: bool
+) -> None:
+    logs.configure(alerts=alerts)
+    log = logging.getLogger("engage.control")
+    journal.alert(log, "control: %s", "the daemon is gone (start it)")
+    log.warning("refused perform_behavior of realizer")
+    logs.configure()
+
+    assert capsys.readouterr().err == ("control: the daemon is gone (start it)\n" if alerts else "")
+
+
+def test_what_comes_again_and_again_is_printed_three_times_a_minute() -> None:
+    repeats = logs.Repeats()
+    told = [repeats.told("lost", second) for second in range(120)]
+    printed = [second for second, text in enumerate(told) if text]
+
+    assert printed == [0, 1, 2, 60, 61, 62]
+    assert told[2] == "lost (again and again: told 3 times a minute)"
+    assert repeats.told("found", 5.0) == "found"
+
+
+@pytest.mark.real_time
+async def test_a_fault_of_the_body_and_its_end_are_once_in_the_terminal_of_up(tmp_path: Path) -> None:
+    (tmp_path / "losing.py").write_text(LOSING)
+    (tmp_path / "nod.xml").write_text('<bml id="b"><head id="n" lexeme="NOD"/></bml>')
+    where = free_endpoint()
+    up = await start("up", "--robot", "losing", "--listen", where, "--body", tmp_path / "losing.py")
+    assert up.stdout is not None
+    try:
+        async with asyncio.timeout(60):
+            lines = []
+            while not lines or "all services are up" not in lines[-1]:
+                lines.append((await up.stdout.readline()).decode())
+            play = await start("play", tmp_path / "nod.xml", "--robot", "losing", "--connect", where)
+            await play.communicate()
+            while "back" not in lines[-1]:
+                lines.append((await up.stdout.readline()).decode())
+            up.send_signal(signal.SIGINT)
+            lines += (await up.communicate())[0].decode().splitlines()
+    finally:
+        if up.returncode is None:
+            up.kill()
+
+    told = "\n".join(lines)
+    assert told.count("the daemon is gone (start it)") == 1
+    assert told.count("it is back") == 1
 
 
 @pytest.mark.contained

@@ -237,9 +237,13 @@ async def test_the_lips_move_with_the_voice_of_another_driver_and_faults_of_each
     voice.on_lips((MouthShape(1.0, 0.5),))
     voice.on_fault(Fault(reason="no sound"))
     face.on_fault(Fault(reason="no screen"))
+    over: list[str] = []
+    body.on_recovery = over.append
+    voice.on_recovery("it sounds again")
 
     assert face.shapes == (MouthShape(1.0, 0.5),)
     assert [fault.reason for fault in told] == ["no sound", "no screen"]
+    assert over == ["it sounds again"]
 
 
 def _told(estimate: Estimate) -> tuple[object, ...]:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Mark, Speech
 from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
@@ -163,6 +164,31 @@ async def test_what_it_cannot_say_is_refused_with_advice():
     assert not estimate.feasible
     assert estimate.fault is not None
     assert "does not have the language 'xx'" in estimate.fault.reason
+
+
+@pytest.mark.parametrize(
+    ("setting", "reason", "advice"),
+    [
+        ({"variant": "zzz"}, "does not have the variant 'zzz'", "known: "),
+        ({"variant": "adm"}, "does not have the variant 'adm'", "did you mean 'adam'?"),
+        ({"language": "germn"}, "does not have the language 'germn'", "did you mean 'german'?"),
+        ({"language": "qqq"}, "does not have the language 'qqq'", "known: "),
+    ],
+)
+async def test_a_language_or_variant_that_is_not_there_is_refused_at_the_start(setting, reason, advice):
+    voice = EspeakVoice(EspeakSettings(**setting))
+
+    with pytest.raises(InputRefused) as refused:
+        async with voice.connected():
+            pass
+    assert refused.value.fault.where == f"control.drivers.espeak.{next(iter(setting))}"
+    assert reason in refused.value.fault.reason
+    assert advice in refused.value.fault.advice
+
+
+@pytest.mark.parametrize("language", ["en-gb", "EN_GB", "fr-fr", "de-AT", "hbs", "german"])
+def test_a_language_by_any_of_its_names_is_taken(language: str):
+    assert len(EspeakSynthesizer(EspeakSettings(language=language, variant="f2")).say(Phrase("Tram")).samples) > 1000
 
 
 @pytest.mark.real_time

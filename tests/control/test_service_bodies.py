@@ -17,11 +17,14 @@ from engage_hri.schemas.body import (
     EstimateBehaviors,
     EstimateItem,
     Estimates,
+    GoHome,
     NoPointZone,
 )
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.world import World
+from engage_hri.services.bus import journal
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.body import BodyFailed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.testing.asked import WORLD
@@ -56,6 +59,11 @@ class Plugged(SimulatedBody):
     def __init__(self, *, is_gone: bool = False) -> None:
         super().__init__()
         self.is_gone, self.told = is_gone, list[str]()
+        self.is_stuck = False
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        if self.is_stuck:
+            raise BodyFailed(Fault(reason="its arm is stuck", service="control"))
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
@@ -110,6 +118,28 @@ async def test_a_fault_outside_of_any_behavior_is_told(hub: MemoryHub) -> None:
 
     assert [str(fault) for fault in told] == ["the daemon is gone (start it)"]
     assert body.told == ["open", "closed"]
+
+
+async def test_a_fault_of_the_body_its_end_and_a_way_home_that_failed_are_what_a_person_has_to_see_to(
+    hub: MemoryHub, caplog: pytest.LogCaptureFixture
+) -> None:
+    body = Plugged()
+    async with robot(hub, body=body) as client:
+        body.on_fault(Fault(reason="the daemon is gone", advice="start it", service="control"))
+        body.on_recovery("the daemon is back")
+        body.is_stuck = True
+        for id in ("first", "second"):
+            with pytest.raises(RunFailed):
+                await client.requests.send(keys.BEHAVIOR, GoHome(id=id, requester="realizer")).outcome
+        body.is_stuck = False
+        for id in ("third", "fourth"):
+            await client.requests.send(keys.BEHAVIOR, GoHome(id=id, requester="realizer")).outcome
+    alerts = [record.getMessage() for record in caplog.records if getattr(record, journal.ALERT, False)]
+
+    assert alerts == [
+        "control: the daemon is gone (start it)", "control: the daemon is back", "control: its arm is stuck",
+        "control: its arm is stuck", "control: the body is at home",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("connects", [True, False])

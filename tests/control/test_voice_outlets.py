@@ -14,7 +14,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     BehaviorRefused,
@@ -314,6 +314,35 @@ async def test_a_player_that_stops_on_purpose_fails_the_speech_and_the_next_one_
         assert await said(voice, "one two") == ["one", "two"]
 
     assert [each.where for each in faults] == ["sound device"]
+
+
+@pytest.mark.real_time
+async def test_the_last_words_of_a_player_are_in_the_fault_and_not_on_the_terminal(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    noise = "for n in 1 2 3 4 5 6 7 8 9; do echo underrun $n >&2; done; echo audio open error >&2; exit 1"
+    voice = Voice(VoiceSettings(player=("sh", "-c", noise)))
+    with pytest.raises(RunFailed) as failed:
+        async with voice.connected():
+            pass
+
+    assert failed.value.fault.reason.endswith("underrun 1 ... audio open error")
+    assert "underrun" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("is_new", [True, False])
+def test_a_pw_cat_without_raw_sound_is_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_new: bool
+) -> None:
+    program = tmp_path / "pw-cat"
+    program.write_text(f"#!/bin/sh\necho '--playback {'--raw' if is_new else ''}'\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    if is_new:
+        assert player.found(VoiceSettings()) == player.PLAYERS["pw-cat"]
+    else:
+        with pytest.raises(InputRefused, match="no option --raw, it is too old"):
+            player.found(VoiceSettings())
 
 
 async def test_a_voice_that_is_made_mute_says_no_more_and_fails() -> None:

@@ -23,7 +23,7 @@ from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.extras import Seen
+from engage_hri.services.control.extras import Idle, Seen
 from engage_hri.services.control.mujoco import along
 from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
@@ -57,12 +57,16 @@ class MujocoBody(SimulatedBody):
         deviations: Variability | None = None,
         repertoire: Repertoire = BUILT_IN,
         settings: MujocoSettings | None = None,
+        *,
+        alive: bool = False,
     ) -> None:
-        """deviations: of these, joints that are displaced and a mute voice; motors deviate by `switch_faults`.
+        """alive: its face, which is a screen, blinks and stirs.
+
+        deviations: of these, joints that are displaced and a mute voice; motors deviate by `switch_faults`.
 
         Raises InputRefused: a deviation, a fault or a film that cannot be had.
         """
-        super().__init__(zones, deviations, repertoire)
+        super().__init__(zones, deviations, repertoire, alive=alive)
         self._settings = settings or MujocoSettings()
         self.capabilities = msgspec.structs.replace(
             self.capabilities, body="mujoco", joints=tuple(map(_as_measured, self.capabilities.joints)),
@@ -83,7 +87,7 @@ class MujocoBody(SimulatedBody):
         settings = settings or MujocoSettings()
         if settings.robot:
             return DescribedBody(Path(settings.robot), settings)
-        return cls(config.no_point_zones, config.variability, repertoire_of(config), settings)
+        return cls(config.no_point_zones, config.variability, repertoire_of(config), settings, alive=config.alive)
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
@@ -114,7 +118,7 @@ class MujocoBody(SimulatedBody):
             if isinstance(run.behavior, Pointing) and run.awaits("stroke_end") and not run.awaits("stroke_start")
         }
         now, data = self._loop.time(), self.bench.physics.data
-        return framed(now, data, self.state(), self.others_say(), self._torso.world, pointing, self._plan())
+        return framed(now, data, self.state(), self.others_say(), self._torso.world, pointing, self._face())
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -163,6 +167,17 @@ class MujocoBody(SimulatedBody):
         self.pulse.wake()
 
     # -- what it does not measure -------------------------------------------------------------------------------
+
+    def idle(self) -> Idle:
+        """Tell what the screen shows by itself. No motor breathes: none of that would be in the physics."""
+        idle = super().idle()
+        shown = {joint: by for joint, by in idle.added.items() if joint not in self.bench.measured}
+        return Idle(added=shown, quick_at=idle.quick_at)
+
+    def _face(self) -> dict[str, float]:
+        """The planned angle of each joint, and what the face does by itself: as a film shows it."""
+        plan, added = self._plan(), self.idle().added
+        return {joint: angle + added.get(joint, 0.0) for joint, angle in plan.items()}
 
     def seen(self) -> Seen | None:
         self.pulse.step()

@@ -5,10 +5,10 @@ plan has come there *and* the daemon measures the joints there: never because a 
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping
-from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager, contextmanager
 from math import degrees, inf
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -17,7 +17,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import (
     Arrived,
@@ -31,16 +31,19 @@ from engage_hri.services.control.body import (
     Revoked,
     TakenOver,
 )
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.extras import Idle
 from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
 from engage_hri.services.control.reachy_mini.courses import Instant
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
+from engage_hri.services.control.reachy_mini.idling import Idling, together
 from engage_hri.services.control.reachy_mini.link import Daemon, Link
 from engage_hri.services.control.reachy_mini.messages import Measured
 from engage_hri.services.control.reachy_mini.moving import GAP, Moves
 from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
-from engage_hri.services.control.reachy_mini.tracks import Off
-from engage_hri.services.control.reachy_mini.watching import Rate, Watch
+from engage_hri.services.control.reachy_mini.tracks import Off, busy
+from engage_hri.services.control.reachy_mini.watching import Rate, Watch, slow
 from engage_hri.services.control.torso.course import Impossible
 from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
 from engage_hri.services.control.voice import speaking
@@ -60,10 +63,13 @@ class ReachyMini(Body):
     Settings: ClassVar[type[Struct]] = ReachyMiniSettings
     carries: ClassVar[Mapping[str, tuple[str, ...]]] = {"torso": ("head",)}
 
-    def __init__(self, settings: ReachyMiniSettings | None = None, connect: Connect | None = None) -> None:
+    def __init__(
+        self, settings: ReachyMiniSettings | None = None, connect: Connect | None = None, *, alive: bool = False
+    ) -> None:
         """Make the body; `connected()` then finds the robot.
 
         settings: of `control.drivers.reachy_mini`. connect: opens a connection; by default to `settings.url`.
+        alive: it breathes, and its antennas sway.
         """
         self._settings = settings or ReachyMiniSettings()
         self._connect = connect
@@ -74,6 +80,9 @@ class ReachyMini(Body):
         )  # fmt: skip
         self._loop = asyncio.get_running_loop()
         self._moves = Moves(self._settings)
+        self._idling = Idling(self._settings.lag, is_alive=alive)
+        self._idle: dict[str, Radians] = {}
+        """What is added to the joints by themselves, as it was sent last."""
         self._link: Link | None = None
         self._bells: set[Bell] = set()
         """Of everything that waits for measurements."""
@@ -82,6 +91,10 @@ class ReachyMini(Body):
         self._rate = Rate(GAP)
         self._rests_since: Seconds = -inf
         """End of the plan whose last command has been sent; -inf: it is under way."""
+
+    @classmethod
+    def configured(cls, config: ControlConfig, settings: ReachyMiniSettings | None) -> Self:
+        return cls(settings, alive=config.alive)
 
     # -- connection ---------------------------------------------------------------------------------------------
 
@@ -114,19 +127,27 @@ class ReachyMini(Body):
     def _answer(self, measured: Measured) -> str | None:
         """Take a measurement, and answer it with where the joints are to be now; None: where they were sent."""
         now = self._loop.time()
-        self._moves.measured = measured.pose
+        self._moves.measured = self._idling.off(measured.pose, now)
         if now - self._last_frame > GAP:
             self._moves.stand(self._last_frame, now)
         self._last_frame = now
+        was_slow = self._rate.is_slow
         if (rate := self._rate.fallen(now)) is not None:
-            self.on_fault(_slow(rate))
+            self.on_fault(slow(rate, GAP))
+        elif was_slow and not self._rate.is_slow:
+            self.on_recovery("reachy_mini: the daemon sends enough measurements again")
         for bell in list(self._bells):
             bell.ring()
-        if not self._moves.correct(now) and self._rests_since == self._moves.end:
+        is_corrected, commanded = self._moves.correct(now), self._moves.commanded(now)
+        idle, self._idle = (
+            self._idle,
+            self._idling.added(now, commanded, busy(self._moves.tracks, self._moves.runs, now)),
+        )
+        if not is_corrected and self._rests_since == self._moves.end and idle == self._idle:
             return None
         end = self._moves.end
         self._rests_since = end if now >= end else -inf
-        text = messages.target(self._moves.commanded(now))
+        text = messages.target(together(commanded, self._idle))
         self._sent, before = text, self._sent
         return text if text != before else None
 
@@ -138,8 +159,11 @@ class ReachyMini(Body):
 
     def _be_back(self, measured: Measured) -> None:
         """Begin anew from where the joints are, and go home from there."""
+        if self._link is not None:
+            self.on_recovery("reachy_mini: it can be moved again, and goes home")
         now = self._loop.time()
-        self._moves.measured = measured.pose
+        self._idling.stop()
+        self._moves.measured, self._idle = measured.pose, {}
         self._last_frame, self._sent, self._rests_since = now, "", -inf
         self._rate = Rate(GAP)
         for run in list(self._moves.runs.values()):  # it has failed, and is just about to say so
@@ -198,6 +222,9 @@ class ReachyMini(Body):
             pose=joints.message(pose), gaze=geometry.gaze(pose, self._moves.mounting), moving=self._is_moving(),
             looking_at=self._looking_at(),
         )  # fmt: skip
+
+    def idle(self) -> Idle:
+        return Idle(added=self._idling.shown)
 
     def see(self, world: World) -> None:
         self._moves.see(world, self._loop.time())
@@ -350,34 +377,21 @@ class ReachyMini(Body):
             return ""
         return entity if moves.off_target(look, now).share <= RESTS_ON else ""
 
-    def _bell(self) -> "_Listening":
-        return _Listening(self._bells)
-
-
-class _Listening:
-    """A bell that measurements ring, for the body of `with`."""
-
-    def __init__(self, bells: set[Bell]) -> None:
-        self._bells, self._bell = bells, Bell()
-
-    def __enter__(self) -> Bell:
-        self._bells.add(self._bell)
-        return self._bell
-
-    def __exit__(self, *_: object) -> None:
-        self._bells.discard(self._bell)
+    @contextmanager
+    def _bell(self) -> Iterator[Bell]:
+        """A bell that measurements ring, for the body of `with`."""
+        bell = Bell()
+        self._bells.add(bell)
+        try:
+            yield bell
+        finally:
+            self._bells.discard(bell)
 
 
 def _over_the_network(settings: ReachyMiniSettings) -> AbstractAsyncContextManager[Daemon]:
     from engage_hri.services.control.reachy_mini.connection import connected
 
     return connected(settings)
-
-
-def _slow(rate: float) -> Fault:
-    reason = f"the daemon sends {rate:.1f} measurements a second: the robot moves by fits and starts, and late"
-    advice = f"it takes {1.0 / GAP:.0f}; is the network slow, or the daemon's machine busy?"
-    return Fault(reason=reason, where="reachy_mini", advice=advice, service="control")
 
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:

@@ -1,11 +1,11 @@
 """A track of Reachy Mini: joints that move along one path, and how near to it they have to be measured. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from math import inf, radians
 
 from msgspec import Struct
 
-from engage_hri.schemas.units import Radians
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.reachy_mini import courses, joints
 from engage_hri.services.control.reachy_mini.geometry import Angles
 from engage_hri.services.control.torso.motion import Motion
@@ -56,6 +56,11 @@ class Track:
     def going(self) -> tuple[float, ...]:
         """Angles at which it comes to rest."""
         return tuple(self.motion.at(inf).q.tolist())
+
+
+def busy(tracks: Mapping[str, Track], runs: Container[str], now: Seconds) -> set[str]:
+    """Names of the tracks that move, or that a behavior has."""
+    return {name for name, track in tracks.items() if name in runs or now < track.motion.end}
 
 
 def farthest(name: str, here: Sequence[float], there: Sequence[float], near: Angles) -> Off:

@@ -2,6 +2,7 @@
 
 import math
 
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 
 WAY: Radians = math.radians(0.3)
@@ -47,6 +48,13 @@ class Watch:
             self._last, self._seen = measured, self._seen + 1
 
 
+def slow(rate: float, longest: Seconds) -> Fault:
+    """Say that measurements come too seldom. rate: in a second. longest: from one to the next with which it moves."""
+    reason = f"the daemon sends {rate:.1f} measurements a second: the robot moves by fits and starts, and late"
+    advice = f"it takes {1.0 / longest:.0f}; is the network slow, or the daemon's machine busy?"
+    return Fault(reason=reason, where="reachy_mini", advice=advice, service="control")
+
+
 class Rate:
     """Watches how often measurements come. longest: mean seconds from one to the next with which one can move."""
 
@@ -55,6 +63,11 @@ class Rate:
         self._mean: Seconds = 0.0
         self._last: Seconds | None = None
         self._is_slow = False
+
+    @property
+    def is_slow(self) -> bool:
+        """True from when they have become too few until there are enough."""
+        return self._is_slow
 
     def fallen(self, now: Seconds) -> float | None:
         """Note a measurement. Returns how many come in a second once these have become too few, and then no more.

@@ -13,10 +13,23 @@ from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.documents.prosody import Prosody
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.voice.espeak_voices import variants, voices
+from engage_hri.services.control.voice.scripts import told, unread
 from engage_hri.services.control.voice.settings import VoiceSettings
-from engage_hri.services.control.voice.synthesis import Heard, Phone, Phrase, Said, Synthesizer, refused
+from engage_hri.services.control.voice.synthesis import (
+    Heard,
+    Phone,
+    Phrase,
+    Said,
+    SynthesisFailed,
+    Synthesizer,
+    refused,
+)
 
 ADVICE = (
     "pip install 'engage-hri[voice]' (eSpeak NG is under the GPL, version 3), or Debian: apt install libespeak-ng1"
@@ -82,19 +95,26 @@ class EspeakSynthesizer(Synthesizer):
     Settings = EspeakSettings
 
     def __init__(self, settings: EspeakSettings) -> None:
-        """Load the library. Raises SynthesisFailed: there is none, or it has no data."""
+        """Load the library. Raises SynthesisFailed: there is none, it has no data, no such language or no variant."""
         self._settings = settings
         self._library, data = _loaded(settings)
         flags = _PHONES_IN_IPA | _DO_NOT_EXIT
         self.rate = self._library.espeak_Initialize(_SYNCHRONOUS, _BUFFER, data, flags)
         if self.rate <= 0:
             raise refused("eSpeak NG does not find its data", "`data` is the folder that holds espeak-ng-data")
+        if settings.variant and settings.variant not in (known := variants(self._library)):
+            advice = suggestion(settings.variant, known)
+            raise _of_setting("variant", refused(f"eSpeak NG does not have the variant {settings.variant!r}", advice))
+        self._voices = voices(self._library)
         self._sound = bytearray()
         self._words: list[tuple[int, int]] = []
         self._phones: list[tuple[str, int]] = []
         self._callback = _Callback(self._take)
         self._language = ""
-        self._speak_as(settings.language)
+        try:
+            self._speak_as(settings.language)
+        except SynthesisFailed as error:
+            raise _of_setting("language", error) from error
 
     def say(self, phrase: Phrase) -> Said:
         self._speak_as(phrase.language or self._settings.language)
@@ -112,6 +132,11 @@ class EspeakSynthesizer(Synthesizer):
             if len(places)
         ]
         return Said(bytes(self._sound), words, [Phone(name, self._seconds(at)) for name, at in self._phones])
+
+    @classmethod
+    def warnings(cls, phrase: Phrase) -> tuple[str, ...]:
+        found = unread(phrase.text, phrase.language or EspeakSettings().language, phrase.prosody)
+        return tuple(map(told, found))
 
     def _seconds(self, sample: int) -> Seconds:
         return sample / self.rate
@@ -135,8 +160,8 @@ class EspeakSynthesizer(Synthesizer):
         """Change the language. Raises SynthesisFailed: the engine does not have it."""
         if language != self._language:
             self._language = ""
-            if not any(self._has(name) for name in _names(language, self._settings.variant)):
-                advice = "`espeak-ng --voices` lists those it has"
+            if not any(self._has(name) for name in _names(language)):
+                advice = suggestion(language.strip().lower(), self._voices)
                 raise refused(f"eSpeak NG does not have the language {language!r}", advice)
             settings = self._settings
             for parameter, value in (
@@ -149,10 +174,19 @@ class EspeakSynthesizer(Synthesizer):
             self._language = language
 
     def _has(self, name: str) -> bool:
-        return bool(self._library.espeak_SetVoiceByName(name.encode("ascii", "replace")) == 0)
+        """Take a voice, by its name, its language, or a language that it has besides, as `en-gb`: if it is there."""
+        variant = f"+{self._settings.variant}" if self._settings.variant else ""
+        asked = [name, *([self._voices[name]] if name in self._voices else [])]
+        return any(
+            self._library.espeak_SetVoiceByName(f"{each}{variant}".encode("ascii", "replace")) == 0 for each in asked
+        )
 
 
-def _names(language: str, variant: str) -> Iterator[str]:
+def _of_setting(name: str, error: SynthesisFailed) -> SynthesisFailed:
+    return SynthesisFailed(replace(error.fault, where=f"control.drivers.espeak.{name}"))
+
+
+def _names(language: str) -> Iterator[str]:
     """Names by which the engine may know the language of a tag, the closest first."""
     tag = language.strip().replace("_", "-").lower()
     parts = tag.split("-")
@@ -160,7 +194,7 @@ def _names(language: str, variant: str) -> Iterator[str]:
         name = "-".join(parts[:count])
         for each in (name, _BY_NAME.get(name, "")):
             if each:
-                yield f"{each}+{variant}" if variant else each
+                yield each
 
 
 def _loaded(settings: EspeakSettings) -> tuple[Any, bytes | None]:
@@ -213,7 +247,7 @@ def ssml(phrase: Phrase) -> tuple[str, Sequence[int]]:
 
 def _tags(span: Prosody) -> Iterator[tuple[str, str]]:
     if span.language:
-        name = next(iter(_names(span.language, "")))
+        name = next(iter(_names(span.language)))
         yield f'<voice xml:lang="{escape(_BY_NAME.get(name, name))}">', "</voice>"
     factors = {"rate": span.rate, "pitch": span.pitch, "volume": span.volume}
     asked = "".join(f' {name}="{_percent(name, factor)}"' for name, factor in factors.items() if factor != 1.0)

@@ -8,11 +8,17 @@ import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+from engage_hri.schemas.utf8 import printable
+
 try:
     import fcntl
     import termios
 except ImportError:  # on Windows the pipe keeps its size, and does not say what is in it
     fcntl = termios = None  # type: ignore[assignment]
+
+
+WORDS = 1000
+"""Bytes that are kept of the beginning and of the end of what it says."""
 
 
 class FedProcess:
@@ -31,8 +37,16 @@ class FedProcess:
         self._unsent = bytearray()
         self._is_open = True
         # Not asyncio's own: it starts a thread for each child in Python 3.11. A group: to end its children, too.
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, process_group=0)
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, process_group=0
+        )
         assert self.process.stdin is not None
+        assert self.process.stderr is not None
+        self._said = b""
+        """The first and the last that it has said on standard error, where players tell of every pause."""
+        self._errors = self.process.stderr.fileno()
+        os.set_blocking(self._errors, False)
+        self._loop.add_reader(self._errors, self._hear)
         self._pipe = self.process.stdin.fileno()
         os.set_blocking(self._pipe, False)
         if fcntl is not None and hasattr(fcntl, "F_SETPIPE_SZ"):
@@ -49,6 +63,12 @@ class FedProcess:
         with suppress(OSError):
             fcntl.ioctl(self._pipe, termios.FIONREAD, count)
         return len(self._unsent) + int(struct.unpack("i", count)[0])
+
+    @property
+    def words(self) -> str:
+        """What it has said on standard error: the first line, and the last one."""
+        lines = [line.strip() for line in self._said.decode(errors="replace").splitlines() if line.strip()]
+        return " ... ".join(dict.fromkeys(printable(line)[:200] for line in (*lines[:1], *lines[-1:])))
 
     def write(self, content: bytes) -> None:
         """Let it have some bytes, after those before; once it is gone they are lost."""
@@ -80,7 +100,19 @@ class FedProcess:
         else:
             self._loop.remove_writer(self._pipe)
 
+    def _hear(self) -> None:
+        try:
+            more = os.read(self._errors, 4096)
+        except BlockingIOError:
+            return
+        if not more:
+            self._loop.remove_reader(self._errors)
+        self._said += more
+        if len(self._said) > 2 * WORDS:
+            self._said = self._said[:WORDS] + b"\n" + self._said[-WORDS:]
+
     def _closed(self) -> None:
+        self._hear()
         self._close()
         self._on_end()
 
@@ -92,3 +124,6 @@ class FedProcess:
             assert self.process.stdin is not None
             with suppress(OSError):
                 self.process.stdin.close()
+            self._loop.remove_reader(self._errors)
+            assert self.process.stderr is not None
+            self.process.stderr.close()

@@ -145,7 +145,8 @@ class SoundingVoice(Speaker):
             parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
         except SynthesisFailed as error:
             return unspeakable(behavior, error.fault)
-        return speech_estimate(behavior, joined(parts, len(behavior.text)), pose or BodyPose())
+        warnings = [each for piece in found for each in self.synthesizer.warnings(piece.phrase)]
+        return speech_estimate(behavior, joined(parts, len(behavior.text)), pose or BodyPose(), warnings)
 
     def _part(self, piece: Piece) -> Part | None:
         """The part of a phrase, if it is synthesized. Raises SynthesisFailed."""

@@ -28,6 +28,15 @@ class TestReachyMini(BodyContract):
         }
 
 
+class TestLivingReachyMini(TestReachyMini):
+    """It breathes and sways all the while."""
+
+    seeds = 3
+
+    def make(self) -> Body:
+        return ReachyMini(connect=FakeDaemon(), alive=True)
+
+
 class TestNoisyReachyMini(BodyContract):
     tolerance = 0.06
     noise = math.radians(0.3)

@@ -13,10 +13,11 @@ from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 
 
+@pytest.mark.parametrize("alive", [False, True])
 @pytest.mark.parametrize("seed", range(4))
-async def test_no_target_is_beyond_what_the_joints_are_trusted_with(seed: int):
+async def test_no_target_is_beyond_what_the_joints_are_trusted_with(seed: int, alive: bool):
     chance, daemon = Random(seed), FakeDaemon()
-    body = ReachyMini(connect=daemon)
+    body = ReachyMini(connect=daemon, alive=alive)
     body.see(WORLD)
     able = [behavior for behavior in BEHAVIORS if type_name(behavior) in body.capabilities.types]
     async with body.connected():

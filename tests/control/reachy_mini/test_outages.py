@@ -28,7 +28,9 @@ class Robot:
         self.body = ReachyMini(settings, self.daemon)
         self.body.see(WORLD)
         self.faults: list[Fault] = []
+        self.recoveries: list[str] = []
         self.body.on_fault = self.faults.append
+        self.body.on_recovery = self.recoveries.append
 
     def angle(self, joint: str) -> float:
         return {each.joint: each.angle for each in self.body.state().pose.joints}[joint]
@@ -106,6 +108,7 @@ async def test_an_outage_fails_what_is_under_way_by_name_and_once(outage):
         assert asyncio.get_running_loop().time() - began < 1.1
         await asyncio.sleep(20.0)
         assert [OUTAGES[outage] in fault.reason for fault in made.faults] == [True]
+        assert made.recoveries == []
         assert made.faults[0].where == "reachy_mini"
         assert not made.body.estimate(GAZE, None, WORLD).feasible
         with pytest.raises(BehaviorRefused, match=OUTAGES[outage]):
@@ -130,6 +133,7 @@ async def test_after_an_outage_it_goes_home_within_its_limits_and_works_again(ou
         progress = await performed(made.body, GAZE)
         assert progress[-1].sync == "end"  # type: ignore[union-attr]
         assert len(made.faults) == 1
+        assert made.recoveries == ["reachy_mini: it can be moved again, and goes home"]
         assert too_much(made.daemon.commands[before:], made.body.capabilities.joints) == []
 
 

@@ -69,6 +69,7 @@ async def test_measurements_that_are_too_few_are_told_once_until_there_are_enoug
         await asyncio.sleep(5.0)
         await performed(made.body, GAZE)
         assert len(made.faults) == 1
+        assert made.recoveries == ["reachy_mini: the daemon sends enough measurements again"]
         made.daemon.periods = repeat(0.25)
         await asyncio.sleep(8.0)
         assert len(made.faults) == 2

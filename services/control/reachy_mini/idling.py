@@ -1,0 +1,98 @@
+"""Idle motion of Reachy Mini: a breath of its body, and antennas that are never quite still. Pure.
+
+It is added to what the plan has the daemon told, and taken off again from what the daemon measures: so no estimate,
+no sync point, no pose and no correction knows of it. The breath gives way to anything that head or body do or wait
+in, the antennas to any behavior of the face. Its own time goes on with the measurements: after a gap nothing jumps.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from math import inf, radians, sin, tau
+
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.extras import Gate
+from engage_hri.services.control.reachy_mini import joints
+from engage_hri.services.control.reachy_mini.geometry import Angles
+from engage_hri.services.control.torso.alive import BREATH
+
+LEAN: Radians = radians(0.5)
+"""Amplitude of the breath: 1.5 mm of the head, which looks on where it looks."""
+SWAY: Radians = radians(2.5)
+"""Greatest angle of an antenna."""
+PERIODS: dict[str, tuple[Seconds, Seconds]] = {"right_antenna": (7.3, 4.1), "left_antenna": (8.7, 4.7)}
+LONGEST: Seconds = 0.05
+"""Its time goes on by so much at most from one measurement to the next: breath is a motion of 0.04 degrees then."""
+_RANGES = {limit.joint: limit for limit in joints.LIMITS}
+
+
+class Idling:
+    """Idle motion of one robot. lag: seconds by which what is measured follows what was sent.
+
+    shown: what of it was in the last reading, by joint.
+    """
+
+    def __init__(self, lag: Seconds, *, is_alive: bool) -> None:
+        """is_alive: False: it never moves."""
+        self._is_alive, self._lag = is_alive, lag
+        self._time: Seconds = 0.0
+        self._seen: Seconds | None = None
+        self.stop()
+
+    def stop(self) -> None:
+        """Begin anew: nobody knows where the joints are."""
+        self._face, self._body = Gate(is_open=False), Gate(is_open=False)
+        self._sent: deque[tuple[Seconds, dict[str, Radians]]] = deque([(-inf, {})])
+        self._read: dict[str, Radians] = {}
+        self.shown: dict[str, Radians] = {}
+
+    def added(self, now: Seconds, planned: Angles, busy: Iterable[str]) -> dict[str, Radians]:
+        """Tell what to add to the joints now, and take it as sent.
+
+        planned: angles that they are sent to without it. busy: tracks that move, or that a behavior has.
+        """
+        if not self._is_alive:
+            return {}
+        self._time += min(LONGEST, now - self._seen) if self._seen is not None else 0.0
+        self._seen = now
+        tracks = set(busy)
+        of_face = self._face.share(self._time, is_open="face" not in tracks)
+        of_body = self._body.share(self._time, is_open=not tracks - {"face"})
+        angle = tau * self._time / BREATH
+        found = {"body_lean": of_body * LEAN * sin(angle + 0.4 * sin(angle))}  # in is quicker than out
+        for joint, (one, other) in PERIODS.items():
+            found[joint] = of_face * SWAY * (sin(tau * self._time / one) + sin(tau * self._time / other)) / 2
+        kept = {joint: _within(joint, planned[joint], by) for joint, by in found.items()}
+        kept = {joint: by for joint, by in kept.items() if by}
+        self._sent.append((now, kept))
+        return kept
+
+    def off(self, pose: dict[str, Radians], now: Seconds) -> dict[str, Radians]:
+        """Take it off what is measured now. A reading that comes again is old, and as it was."""
+        if pose != self._read:
+            self._read, self.shown = pose, self._measured(now)
+        return {**pose, **{joint: pose[joint] - by for joint, by in self.shown.items()}} if self.shown else pose
+
+    def _measured(self, now: Seconds) -> dict[str, Radians]:
+        """Tell what of it is in what is measured now: joints go evenly from one target to the next."""
+        at = now - self._lag
+        while len(self._sent) > 1 and self._sent[1][0] <= at:
+            self._sent.popleft()
+        (since, before), (until, after) = self._sent[0], self._sent[min(1, len(self._sent) - 1)]
+        share = (at - since) / (until - since) if since < at < until < since + LONGEST else 0.0
+        if not share:
+            return before
+        return {
+            joint: (1.0 - share) * before.get(joint, 0.0) + share * after.get(joint, 0.0)
+            for joint in {**before, **after}
+        }
+
+
+def together(pose: dict[str, Radians], added: Angles) -> dict[str, Radians]:
+    """Add idle motion to a pose that is to be sent."""
+    return {**pose, **{joint: pose[joint] + by for joint, by in added.items()}} if added else pose
+
+
+def _within(joint: str, planned: Radians, by: Radians) -> Radians:
+    """Cut what is added to what the range of a joint leaves; nothing is left for one that is out of it."""
+    low, high = _RANGES[joint].low, _RANGES[joint].high
+    return max(min(0.0, low - planned), min(max(0.0, high - planned), by))
