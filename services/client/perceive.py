@@ -83,6 +83,8 @@ async def perceive(
         finally:
             listening.cancel()
             await asyncio.gather(listening, return_exceptions=True)
+            while len(inbox):  # what others have said of the world is not to be said again as it was
+                told.take(await inbox.next())
             told.leaves()
 
 
@@ -122,9 +124,7 @@ async def _listen(bus: Bus, inbox: Subscription, told: PerceivedPerson) -> None:
     while not inbox.is_over:
         received = await inbox.next(told.deadline)
         with bus.containing(received or "what is due by now"):
-            if received is not None:
-                told.take(received)
-            told.advance()
+            told.take(received)
 
 
 def _check_id(person: str, other: str) -> None:

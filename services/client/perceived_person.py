@@ -18,15 +18,13 @@ from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.client.person_actions import PersonActions
 from engage_hri.services.client.shared_world import SharedWorld
-from engage_hri.services.client.utterances import Utterances, partial_texts, speaking_time
+from engage_hri.services.client.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 
 GESTURE: Seconds = 0.5
 MANIPULATION: Seconds = 1.5
 FRAME: Seconds = 0.1
 """Time between two reports of the world while a hand moves."""
-RECOGNIZING: Seconds = 0.3
-"""Time from the end of speech until a recognizer knows its words for good."""
 SEAT: Vector = (1.2, 0.0, 1.2)
 """Place of the face of a person opposite the robot; a second one sits beside."""
 BESIDE = 0.6
@@ -267,24 +265,15 @@ class PerceivedPerson:
         entities = self._world.tell(self._own.values())
         self._bus.publish(keys.WORLD, World(entities=entities, at=self._bus.stamp()))
 
-    def take(self, received: Received) -> None:
-        """Take a message about the world or about who is there; `perceive` calls this."""
-        match received.message:
-            case World():
-                must_tell = self._world.see(received.message, received.source)
-            case _:
-                must_tell = self._world.feed(received.message, self._bus.now())
-        if must_tell and not self._has_left and self._own:
-            self._show()
-
-    def advance(self) -> None:
-        """Take what is due by now; `perceive` calls this."""
-        if self._world.advance(self._bus.now()) and not self._has_left and self._own:
+    def take(self, received: Received | None) -> None:
+        """Take a message about the world or about who is there, or none by `deadline`; `perceive` calls this."""
+        message, source = (received.message, received.source) if received else (None, "")
+        if self._world.take(message, source, self._bus.now()) and not self._has_left and self._own:
             self._show()
 
     @property
     def deadline(self) -> Seconds | None:
-        """Loop time at which `advance` has something to do."""
+        """Loop time at which `take` has something to do without a message."""
         return self._world.deadline
 
     def enter(self, position: Vector | None) -> None:

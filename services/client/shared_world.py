@@ -71,6 +71,19 @@ class SharedWorld:
         self._last = self._name
         return self.entities
 
+    def take(self, message: Message | None, source: str, now: Seconds) -> bool:
+        """Take a message of `source` about the world, or about who is there, or that there is none by `now`.
+
+        True if the world has to be told again.
+        """
+        again = self.advance(now)
+        match message:
+            case None:
+                return again
+            case World():
+                return self.see(message, source) or again
+        return self.feed(message, now) or again
+
     def see(self, world: World, source: str) -> bool:
         """Take a world that another has published. True if it lacks something of ours, and has to be told again."""
         if source == self._name:

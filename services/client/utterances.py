@@ -8,6 +8,8 @@ from engage_hri.schemas.units import Seconds, Stamp
 
 WORD: Seconds = 0.35
 """Time for which a word is spoken, by and large."""
+RECOGNIZING: Seconds = 0.3
+"""Time from the end of speech until a recognizer knows its words for good."""
 
 
 class Utterances:
@@ -27,9 +29,7 @@ class Utterances:
 
     def begun(self, began: Stamp, to: tuple[str, ...] = ()) -> Utterance:
         """Make the first message of an utterance: somebody speaks, and the words will come."""
-        return Utterance(
-            actor=self._person, id=self._id(), text="", began=began, at=began, final=False, to=to
-        )  # fmt: skip
+        return Utterance(actor=self._person, id=self._id(), text="", began=began, at=began, final=False, to=to)
 
     def _id(self) -> str:
         return f"{self._life}-{next(self._numbers)}"
