@@ -12,6 +12,7 @@ from msgspec import Struct
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
+from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.scene import Worded
 
 SPEECHES_KEPT = 64
@@ -76,11 +77,11 @@ class _Person:
 
     def speech_with(self, words: HeardWords, margin: Seconds) -> Seconds | None:
         """Start of the speech that these words belong to; None if there is none."""
-        least = 0.0 if words.is_line else -margin
+        least = -ROUNDING if words.is_line else -margin - ROUNDING
         found: tuple[Seconds, Seconds] | None = None
         for speech in self.speeches:
             overlap = min(words.ended, speech.until) - max(words.began, speech.since)
-            if overlap >= least and (found is None or overlap >= found[0]):
+            if overlap >= least and (found is None or overlap >= found[0] - ROUNDING):
                 found = (overlap, speech.since)
         return None if found is None else found[1]
 
