@@ -57,16 +57,16 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """Time that the responder has, when `started`."""
     response: Action | None = None
     """Adjacency pair: the action that answered."""
-    words: str = ""
-    """Words of the person that opened or answered the event, as far as they are known."""
-    retold: bool = False
-    """True: the event itself was told before; only `words` have become known since then, or were corrected."""
     confidence: Probability = 1.0
     """Least confidence of the observations by which it began and was answered; so far, when `started`."""
     block: str = ""
     behavior: str = ""
     """The event behavior of that block."""
     turn: str = ""
+    words: str = ""
+    """Words of the person that opened or answered the event, as far as they are known."""
+    retold: bool = False
+    """True: the event itself was told before; only `words` have become known since then, or were corrected."""
 
     def person(self, robot: str) -> str:
         """Actor id of the person who takes part in it. robot: the robot's own actor id."""

@@ -53,7 +53,7 @@ class _Known(Struct):
 
 
 class _Person:
-    """What one person has said."""
+    """Speech and words of one person."""
 
     def __init__(self) -> None:
         self.speeches: list[_Speech] = []
