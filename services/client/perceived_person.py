@@ -161,8 +161,8 @@ class PerceivedPerson:
         duration = speaking_time(text) if seconds is None else seconds
         said = self._utterances.begun(self._bus.stamp(), _ids(to))
         try:
+            self.tell(said)  # first, so that whoever waits for the speech knows that its words will come
             with self._doing("speak"):
-                self.tell(said)
                 pieces = [*partial_texts(text)] if partial else [text]
                 for piece in pieces:
                     await asyncio.sleep(duration / len(pieces))
@@ -262,7 +262,7 @@ class PerceivedPerson:
             self.bring(hand)
 
     def _show(self) -> None:
-        entities = self._world.tell(self._own.values())
+        entities = self._world.tell(self._own.values(), self._bus.now())
         self._bus.publish(keys.WORLD, World(entities=entities, at=self._bus.stamp()))
 
     def take(self, received: Received | None) -> None:

@@ -72,7 +72,7 @@ class HeardWords:
         self._since = {turn: since for turn, since in self._since.items() if turn in turns}
 
     def of_turn(self, turn: str) -> tuple[HeardText, ...]:
-        """What people have said for good since the turn before, in the order in which they began to say it."""
+        """Words of all people since the turn before, known for good, in the order in which they began to say them."""
         since = self._since.get(turn, float("inf"))
         heard = [each.utterance for each in self._said.values() if each.utterance.final and each.known >= since]
         heard.sort(key=lambda each: (each.began.seconds, each.actor, each.id))
