@@ -38,6 +38,8 @@ class SharedWorld:
         """What was last given to `tell`, by id."""
         self._told: dict[str, deque[Entity]] = {}
         """Our own entities as they were told, the newest last."""
+        self._had: dict[str, frozenset[str]] = {}
+        """Ids in the last world of each other participant: what it had and has no more, somebody has taken away."""
         self._taken_away: dict[str, tuple[str, Seconds]] = {}
         """Entities that are not there any more: by whom they were taken away, and when."""
         self._gone: dict[str, Seconds] = {}
@@ -95,12 +97,13 @@ class SharedWorld:
         self._last = source
         self._gone.pop(source, None)
         seen = {entity.id: entity for entity in world.entities}
-        lacks = False
+        lacks, had = False, self._had.get(source, frozenset())
+        self._had[source] = frozenset(seen)
         for id, entity in tuple(self._entities.items()):
             theirs = seen.get(id)
             if self._owner[id] == self._name:
                 lacks |= theirs is None or (theirs != entity and theirs in self._told.get(id, ()))
-            elif theirs is None and self._owner[id] == source:
+            elif theirs is None and (self._owner[id] == source or id in had):
                 lacks |= self._let_go(id, now)
         self._taken_away = {id: taken for id, taken in self._taken_away.items() if now <= taken[1] + ECHO}
         for id, entity in seen.items():
@@ -134,6 +137,7 @@ class SharedWorld:
         dropped = False
         for name in [name for name, since in self._gone.items() if now >= since + GRACE]:
             del self._gone[name]
+            self._had.pop(name, None)
             for id in [id for id, owner in self._owner.items() if owner == name]:
                 self._let_go(id, now)
                 dropped = True
@@ -150,4 +154,4 @@ class SharedWorld:
 
     def _drop(self, id: str, now: Seconds) -> None:
         self._taken_away[id] = (self._owner.pop(id), now)
-        self._entities.pop(id)
+        del self._entities[id]
