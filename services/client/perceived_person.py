@@ -53,6 +53,11 @@ class PerceivedPerson:
     # -- presence -----------------------------------------------------------------------------------------------
 
     @property
+    def robot(self) -> str:
+        """The robot's actor id: its face, as a target."""
+        return self._bus.robot
+
+    @property
     def world(self) -> tuple[Entity, ...]:
         """All entities that are known now, of whoever told of them."""
         return self._world.entities
@@ -65,11 +70,11 @@ class PerceivedPerson:
         """Leave; `perceive` calls this at its end."""
         if self._has_left:
             return
-        self._tell(self._actions.leaves(self._bus.stamp()))
         self._has_left = True
         if self._own:
             self._own.clear()
             self._show()
+        self._tell(self._actions.leaves(self._bus.stamp()))
 
     async def move_to(self, position: Vector) -> None:
         """Move the face to another place.

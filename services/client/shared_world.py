@@ -95,7 +95,6 @@ class SharedWorld:
         if source == self._name:
             return False
         self._last = source
-        self._gone.pop(source, None)
         seen = {entity.id: entity for entity in world.entities}
         lacks, had = False, self._had.get(source, frozenset())
         self._had[source] = frozenset(seen)

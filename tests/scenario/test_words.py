@@ -193,6 +193,20 @@ async def test_utterances_can_be_followed_as_they_come(hub: MemoryHub) -> None:
     ]  # fmt: skip
 
 
+async def test_what_a_person_does_ends_when_its_program_is_killed(hub: MemoryHub) -> None:
+    async with robot_in(hub) as robot, perceive("ann", hub=hub, name="camera") as ann:
+        with robot.connection_events("ann", "adjacency_pair") as events:
+            ann.begin("speak")
+            await events.next(1.0)
+            await asyncio.sleep(2.0)
+            hub.kill("camera")
+            gone = asyncio.get_running_loop().time()
+            ended = await events.next(60.0)
+
+    assert ended is not None
+    assert (ended.state, ended.at.seconds - gone) == ("withdrawn", pytest.approx(0.5, abs=0.01))
+
+
 # -- perceive() and the simulated person -----------------------------------------------------------------------
 
 STORY = (
