@@ -23,7 +23,8 @@ from engage_hri.services.client.perceive import perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.config import Config, load
+from engage_hri.services.commandline.tangram import play_tangram
 from engage_hri.services.console.follow import following
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.runtime.service import running
@@ -205,6 +206,19 @@ async def test_what_a_person_does_ends_when_its_program_is_killed(hub: MemoryHub
 
     assert ended is not None
     assert (ended.state, ended.at.seconds - gone) == ("withdrawn", pytest.approx(0.5, abs=0.01))
+
+
+@pytest.mark.parametrize("perception", ["symbolic", "raw"])
+async def test_all_that_the_simulated_person_says_are_words_of_events(perception: str) -> None:
+    """Told as actions, or only as levels of a voice."""
+    settings = ["simulation.human=stochastic", f"simulation.perception={perception}", "simulation.seed=2"]
+    told: list[Message] = []
+    await play_tangram(load(settings=settings), (lambda message, at: told.append(message),))
+
+    last = {each.id: each for each in told if isinstance(each, ConnectionEvent)}
+    said = [each.text for each in told if isinstance(each, Utterance) and each.final]
+    assert len(said) >= 3
+    assert sorted(each.words for each in last.values() if each.words) == sorted(said)
 
 
 # -- perceive() and the simulated person -----------------------------------------------------------------------
