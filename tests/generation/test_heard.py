@@ -36,13 +36,17 @@ def test_it_tells_whether_words_will_come() -> None:
     assert not heard.expects("ann")
     heard.feed(said("ann", "1", "", 1.0, 1.0, final=False), 1.0)
     assert heard.expects("ann")
-    assert heard.is_saying("ann")
+    assert heard.is_saying("ann", 0.5)
+    assert not heard.is_saying("ann", 1.5)
     assert not heard.expects("bob")
 
     heard.feed(said("ann", "1", "yes", 1.0, 2.0), 2.0)
     heard.feed(said("ann", "1", "ye", 1.0, 1.5, final=False), 2.1)  # late
-    assert not heard.is_saying("ann")
+    assert not heard.is_saying("ann", 0.0)
     assert heard.expects("ann")
+
+    heard.missed("ann")
+    assert not heard.expects("ann")
 
 
 def test_a_correction_is_told_with_the_turn_in_which_it_comes() -> None:

@@ -97,6 +97,28 @@ async def test_words_that_never_come_are_waited_for_only_so_long(hub: MemoryHub)
     assert waited == pytest.approx(patience, abs=0.05)
 
 
+async def test_who_has_lost_the_microphone_is_waited_for_once(hub: MemoryHub) -> None:
+    patience = GenerationConfig().words_patience
+    async with robot_in(hub) as robot, perceive("ann", hub=hub) as ann:
+        await ann.look_at("robot")
+        await ann.say("hello")
+        waited: list[float] = []
+        for number in range(2):
+            ended: list[float] = []
+
+            async def answer(ended: list[float] = ended) -> None:
+                ann.begin("speak")
+                await asyncio.sleep(1.0)
+                ann.end("speak")
+                ended.append(asyncio.get_running_loop().time())
+
+            await answered(robot, ann, asks(f"q{number}"), answer)
+            waited.append(asyncio.get_running_loop().time() - ended[0])
+            await asyncio.sleep(5.0)
+
+    assert waited == [pytest.approx(patience, abs=0.05), 0.0]  # the second time it has not waited for the end
+
+
 async def test_nobody_waits_for_words_where_nobody_tells_any(hub: MemoryHub) -> None:
     async with robot_in(hub) as robot, perceive("ann", hub=hub) as ann:
         await ann.look_at("robot")

@@ -150,12 +150,18 @@ class TurnOutcomes:
         if pair.response == "speak" and self._heard.expects(person):
             if pair.state == "succeeded":
                 return self._events.changed(pair) + self._config.longest_answer
-            if pair.state == "completed" and (not pair.words or self._heard.is_saying(person)):
-                return self._events.changed(pair) + self._config.words_patience
+            ended = self._events.changed(pair)
+            if pair.state == "completed" and (
+                not pair.words or self._heard.is_saying(person, ended - self._config.longest_answer)
+            ):
+                return ended + self._config.words_patience
         return float("-inf")
 
     def _close(self, turn: str) -> TurnClosed:
         record = self._records.pop(turn)
+        for pair in self._events.pairs(turn):
+            if pair.state == "completed" and pair.response == "speak" and not pair.words:
+                self._heard.missed(pair.responder)
         return TurnClosed(
             turn=turn,
             addressee=record.addressee,

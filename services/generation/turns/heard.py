@@ -53,9 +53,16 @@ class HeardWords:
         """Tell whether somebody tells the words of this person: then those of an answer will come."""
         return person in self._told_of
 
-    def is_saying(self, person: str) -> bool:
-        """Tell whether an utterance of the person has begun, and is not known for good."""
-        return any(each.utterance.actor == person and not each.utterance.final for each in self._said.values())
+    def is_saying(self, person: str, since: Seconds) -> bool:
+        """Tell whether an utterance of the person has begun, or grown, since then and is not known for good."""
+        return any(
+            each.utterance.actor == person and not each.utterance.final and each.known >= since
+            for each in self._said.values()
+        )
+
+    def missed(self, person: str) -> None:
+        """Note that the words of an answer have not come: nobody waits for those of this person until more come."""
+        self._told_of.pop(person, None)
 
     # -- turns --------------------------------------------------------------------------------------------------
 

@@ -104,13 +104,13 @@ class Words:
         if action.action != "speak":
             return
         if isinstance(action, ActionBegan):
-            self._person(action.actor).begins(at)
+            self._people.setdefault(action.actor, _Person()).begins(at)
         elif (person := self._people.get(action.actor)) is not None:
             person.ends(at)
 
     def hear(self, words: HeardWords, at: Seconds) -> Worded | None:
         """Take words that are known at `at`. Returns what a speech consists of now; None if they say nothing new."""
-        person = self._person(words.actor)
+        person = self._people.get(words.actor) or _Person()
         known = person.utterances.get(words.id)
         text = " ".join(words.text.split())
         if not words.final or (known is not None and at <= known.at):
@@ -122,6 +122,7 @@ class Words:
                 return None
             speech = words.began
             person.said_alone(words.began, max(words.began, words.ended))
+        self._people[words.actor] = person  # not before: of who has said nothing there is nothing to remember
         person.utterances[words.id] = _Known(at, words.began, text, speech)
         return Worded(
             actor=words.actor, since=speech, text=person.text_of(speech), is_alone=is_alone,
@@ -138,9 +139,6 @@ class Words:
 
     def forget(self, actor: str) -> None:
         self._people.pop(actor, None)
-
-    def _person(self, actor: str) -> _Person:
-        return self._people.setdefault(actor, _Person())
 
 
 def _since(speech: _Speech) -> Seconds:
