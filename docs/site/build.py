@@ -23,6 +23,7 @@ CONTENTS = {
     "Using it": ("commands", "configuration", "deploy", "security", "faults", "scenario", "study", "language-models"),
     "From other programs": (
         "reference",
+        "people",
         "connection-events",
         "protocol",
         "other-languages",

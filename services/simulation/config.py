@@ -122,7 +122,7 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     human: `scripted` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
     piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `stochastic` too, with
     the habits, pace and mistakes of `stochastic`; `attentive` looks where the robot looks, meets its eyes, and nods
-    when it has spoken or does what it asks for; `none` leaves the table alone.
+    when it has spoken, says yes to a question, or does what it asks for; `none` leaves the table alone.
     """
 
     human: HumanKind = "scripted"
