@@ -2,6 +2,8 @@
 
 import asyncio
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +20,8 @@ from engage_hri.services.control.drivers import made
 from engage_hri.services.control.guarded import GuardedBody
 from engage_hri.services.control.voice import studio
 from engage_hri.services.control.voice.sounding import SoundingVoice
+from engage_hri.services.control.voice.synthesis import Phrase
+from engage_hri.services.control.voice.worker import Order, packed
 
 ILL = """
 import os, time
@@ -148,3 +152,28 @@ async def test_words_of_which_nothing_is_heard_are_not_told_as_spoken(text: str,
         assert await said(voice, "… 😊 …") == []  # nothing that could be heard
 
     assert not estimate.feasible
+
+
+def test_a_synthesizer_whose_voice_is_gone_ends_without_a_word(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text(
+        "import time\n"
+        "from engage_hri.services.control.voice.synthesis import Said, Synthesizer\n"
+        "class Slow(Synthesizer):\n"
+        "    def say(self, phrase):\n"
+        "        time.sleep(0.2)\n"
+        "        return Said([0.5, -0.5] * 4000)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-m", "engage_hri.services.control.voice.worker"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdin is not None
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdin.write(packed(Order("slow", "Slow", str(tmp_path / "slow.py"))) + packed(Phrase("one two")))
+    process.stdin.flush()
+    process.stdout.close()
+    process.stdin.close()
+
+    assert (process.wait(30), process.stderr.read()) == (0, b"")
+    process.stderr.close()

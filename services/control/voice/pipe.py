@@ -66,7 +66,7 @@ class FedProcess:
 
     @property
     def words(self) -> str:
-        """What it has said on standard error: the first line, and the last one."""
+        """Return what it has said on standard error: the first line, and the last one."""
         lines = [line.strip() for line in self._said.decode(errors="replace").splitlines() if line.strip()]
         return " ... ".join(dict.fromkeys(printable(line)[:200] for line in (*lines[:1], *lines[-1:])))
 

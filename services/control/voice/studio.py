@@ -377,10 +377,10 @@ def _bytes(result: Clause | _Refused) -> int:
 
 
 def _ended(process: "subprocess.Popen[bytes]") -> None:
-    """End a process: it holds nothing that is worth waiting for."""
+    """End a process: it holds nothing that is worth waiting for, and is to say nothing of a pipe that is closed."""
+    process.kill()
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             with suppress(OSError):
                 pipe.close()
-    process.kill()
     process.wait()

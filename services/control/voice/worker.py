@@ -79,6 +79,8 @@ def main() -> None:
                 answer(Made(synthesizer.rate))
             else:
                 answer(Spoken(clause(synthesizer, msgspec.msgpack.decode(content, type=Phrase))))
+        except BrokenPipeError:  # whoever asks is gone
+            os._exit(0)
         except EngageError as error:
             answer(Failed(error.fault))
         except Exception as error:
