@@ -81,7 +81,7 @@ SERVICES: dict[str, Service] = {
 }
 PARTS = (
     ("codec", "engage_hri.services.bus.memory", ("encode", "decode", "published")),
-    ("estimates", "engage_hri.services.control.service", ("_Control.estimate", "_Control._estimated")),
+    ("estimates", "engage_hri.services.control.questions", ("Questions.estimate", "Questions._estimated")),
     ("choice", "engage_hri.services.generation.pipeline", ("choose", "weigh", "unasked", "choice")),
     ("phrases", "engage_hri.services.generation.pipeline", ("proposed",)),
     ("block", "engage_hri.services.generation.pipeline", ("Emission.plan", "Emission.__init__")),

@@ -325,7 +325,8 @@ class FaultKind(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Capabilities(Struct, frozen=True, kw_only=True, tag="capabilities", omit_defaults=True):
     """Abilities of a body. Answer to `DescribeBody`.
 
-    body: its name. types: the behavior types that it performs, by their BML names. reach: of the arms.
+    body: its name. types: the behavior types that it performs, by their BML names. reach: from the shoulder to the
+    farthest thing that it points at; 0: it does not say, or does not point.
     """
 
     body: str

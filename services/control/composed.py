@@ -316,7 +316,7 @@ def _joined(members: Sequence[Member]) -> Capabilities:
         types=tuple(dict.fromkeys(name for member in members for name in member.types)),
         parts=tuple(part for member in members for part in member.parts),
         joints=tuple(limit for member in members for limit in member.limits),
-        reach=max((one.reach for one in each), default=0.0),
+        reach=max((member.body.capabilities.reach for member in members if "pointing" in member.types), default=0.0),
         no_point_zones=tuple(dict.fromkeys(zone for one in each for zone in one.no_point_zones)),
         gaze_half_angle=max((one.gaze_half_angle for one in each), default=none.gaze_half_angle),
         pointing_radius=max((one.pointing_radius for one in each), default=none.pointing_radius),

@@ -102,6 +102,22 @@ class Aside(Wide):
         return replace(state, **arms)
 
 
+class Centimetres(SimulatedBody):
+    """States its reach in centimetres."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.capabilities = replace(self.capabilities, reach=100.0 * self.capabilities.reach)
+
+
+class Modest(SimulatedBody):
+    """States a reach of 90 cm, and points farther."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.capabilities = replace(self.capabilities, reach=0.9)
+
+
 class Squinting(SimulatedBody):
     """Has a cone of gaze half as wide as the room."""
 

@@ -54,7 +54,10 @@ class Partial(SimulatedBody):
     def __init__(self) -> None:
         super().__init__()
         joints = tuple(each for each in self.capabilities.joints if each.part in self.parts)
-        self.capabilities = replace(self.capabilities, types=self.types, parts=self.parts, joints=joints)
+        reach = self.capabilities.reach if "pointing" in self.types else 0.0
+        self.capabilities = replace(
+            self.capabilities, types=self.types, parts=self.parts, joints=joints, reach=reach
+        )  # fmt: skip
 
     def state(self) -> BodyState:
         state, has_arms = super().state(), "right_arm" in self.parts

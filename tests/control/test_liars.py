@@ -65,6 +65,8 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars_by_claim.Rayless, "is_along_the_ray_that_it_said", "None"),
     (liars_by_claim.Wide, "states_what_people_can_tell_apart", "900 cm"),
     (liars_by_claim.Squinting, "states_what_people_can_tell_apart", "172 degrees"),
+    (liars_by_claim.Centimetres, "points_as_far_as_its_reach_and_no_farther", "farther than 1.5 m"),
+    (liars_by_claim.Modest, "points_as_far_as_its_reach_and_no_farther", "since its `reach` is 0.90 m"),
     (liars_by_claim.Effortless, "counts_the_degrees_that_its_joints_turn", "gaze at near-right, stroke"),
     (liars_by_claim.Effortless, "counts_the_degrees_that_its_joints_turn", "pointing at far-left, stroke"),
     (liars_by_claim.Laborious, "counts_the_degrees_that_its_joints_turn", "gazeShift to far-left, end"),

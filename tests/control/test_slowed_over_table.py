@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Posture, PostureShift
+from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Pointing, Posture, PostureShift
 from engage_hri.schemas.units import Meters
-from engage_hri.services.control.body import BehaviorRefused, Body
+from engage_hri.services.control.body import BehaviorRefused, Body, Reached
 from engage_hri.services.control.testing import WORLD, Stage
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.kinematics import TABLE_EDGE, TABLE_TOP
@@ -134,6 +134,27 @@ async def test_a_gesture_that_is_slow_already_stays_out_of_the_table_as_the_trun
     at = chance.uniform(0.2, 0.97) * pace[1]
 
     assert await scene(LOW[seed % 2], gesture, pace, PostureShift(id="lean", lexeme="LEAN"), at) > 0.0
+
+
+@pytest.mark.parametrize("at", [0.0, 0.1, 0.3])
+async def test_an_arm_on_its_way_home_from_a_target_takes_a_pace_while_the_trunk_leans(at: float) -> None:
+    body = SimulatedBody()
+    body.see(WORLD)
+    witness, stage = Witness(body), Stage(body, Pointing(id="point", target="far-left"), "stroke")
+    await stage.holding(2)
+    leaning = Stage(body, Posture(id="lean", lexeme="LEAN_FORWARD"), "end")
+    await asyncio.sleep(at)
+    stage.authority.extend("end")
+    await stage.until(lambda: "stroke_end" in stage.passed)
+    due = asyncio.get_running_loop().time() + 3.0
+    stage.authority.set_pace({"end": due})
+    told = await stage.over()
+    await leaning.over()
+    witness.end()
+
+    assert isinstance(told[-1], Reached)
+    assert told[-1].at == pytest.approx(due)
+    assert witness.lowest > 0.0
 
 
 @pytest.mark.parametrize(("gesture", "pace", "kind", "at"), OPENED)

@@ -160,7 +160,9 @@ def _limbs(described: Description, stage: Stage) -> list[Limb]:
     for part, arm in described.parts.items():
         if isinstance(arm, ArmDescription):
             chain = Chain(model, arm.joints, arm.elbow, arm.hand, prefix=PREFIX)
-            found.append(ArmLimb(stage, part, stage.limits[part], chain, ("pointing",), described.name))
+            limb = ArmLimb(stage, part, stage.limits[part], chain, ("pointing",), described.name)
+            limb.reach = described.reach  # type: ignore[misc]
+            found.append(limb)
     return found
 
 
@@ -178,7 +180,7 @@ def _capabilities(described: Description, stage: Stage, of_parts: Capabilities) 
         body=described.name,
         types=(*of_parts.types, "wait"),
         joints=joints,
-        reach=described.reach,
+        reach=described.reach if "pointing" in of_parts.types else 0.0,
         faults=FAULTS,
         fault_kinds=told(FAULTS),
     )

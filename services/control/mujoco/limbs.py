@@ -249,6 +249,8 @@ class ArmLimb(Limb):
             f"{self.part.removesuffix('_arm').upper()}_HAND",
         ):
             raise self.refused(behavior, f"it is to be done with {behavior.mode!r}")
+        if (away := math.dist(self.axis(self.rest).origin, target)) > self.reach:
+            raise self.refused(behavior, f"it is {away:.2f} m away, farther than its reach of {self.reach:g} m")
         distance = HAND_TO_TARGET + (entity.radius if entity is not None else 0.0)
         return self.solve(behavior, target, floor=TABLE_TOP + OVER_THE_TABLE, distance=distance)
 

@@ -8,12 +8,13 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase, PlannedTime, Ray
-from engage_hri.schemas.units import Degrees, Radians, Seconds
+from engage_hri.schemas.units import Degrees, Meters, Radians, Seconds
+from engage_hri.schemas.world import World
 from engage_hri.services.control.body import Arrived, Body, BodyState, Progress, Reached
 from engage_hri.services.control.testing.laws import angles, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.predictions import has_joints
-from engage_hri.services.control.testing.rays import angle
+from engage_hri.services.control.testing.rays import angle, aside
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, done, target_point, times
 from engage_hri.services.control.testing.suite import Suite, does_not_apply, pose_angles
 from engage_hri.services.control.testing.witness import arms
@@ -25,6 +26,10 @@ ORIGIN = 0.05
 """Metres by which eyes or an elbow may be elsewhere than the ray of an estimate begins."""
 WIDEST_CYLINDER, WIDEST_CONE = 0.2, math.radians(20.0)
 """A pointing or a look that is wider tells nobody one thing on a table from the next."""
+UNSURE: Meters = 0.15
+"""Least distance from its `reach` at which a body is asked to point, or to refuse it."""
+UPPER_ARM = 1.5
+"""Lengths of a forearm that the way from the elbow may be another than that from the shoulder."""
 SAME: Degrees = 2.0
 """Degrees by which a way may be counted otherwise, for each behavior; for each joint its accuracy is added."""
 LONGER, SHORTER = 1.4, 0.75
@@ -86,6 +91,58 @@ class ClaimLaws(Suite):
             broken(
                 expected=f"a `gaze_half_angle` up to {degrees(WIDEST_CONE)}", measured=degrees(able.gaze_half_angle)
             )
+
+    async def test_points_as_far_as_its_reach_and_no_farther(self, body: Body) -> None:
+        """A body points at a thing somewhat within its `reach`, and refuses one as much beyond it.
+
+        Usually it is in centimetres, or it is the length of the arm. One that states none (0) is not judged by it,
+        and one that does not point has none. Nobody says where its shoulder is: the way counts from its elbow.
+        """
+        reach = body.capabilities.reach
+        if "pointing" not in body.capabilities.types and reach:
+            broken(expected="no `reach` where it does not point", measured=f"{reach:g} m")
+        if not reach:
+            does_not_apply("it states no `reach`")
+        for case in self.cases(body, lambda each: isinstance(each, Pointing), "no pointing"):
+            async with case as behavior:
+                assert isinstance(behavior, Pointing)
+                ray = body.estimate(behavior, None, self.world).ray
+                if ray is None:
+                    continue  # another law says so
+                slack = max(UNSURE, UPPER_ARM * math.dist(ray.origin, ray.tip or ray.origin))
+                within, beyond = (self._along(behavior, ray, reach + by) for by in (-slack, slack))
+                await self._check_points(body, behavior, within, f"that it points {reach - slack:.2f} m far")
+                body.see(beyond)
+                if body.estimate(behavior, None, beyond).feasible:
+                    limit = f"a refusal of what is {reach + slack:.2f} m away, since its `reach` is {reach:.2f} m"
+                    broken(behavior, expected=limit, measured="it is feasible")
+                body.see(self.world)
+
+    def _along(self, behavior: Pointing, ray: Ray, distance: Meters) -> World:
+        """The world with the target of a pointing farther away, or nearer, in the direction in which it is."""
+        target = self.position(behavior.target)
+        share = distance / math.dist(ray.origin, target)
+        there = [here + share * (to - here) for here, to in zip(ray.origin, target, strict=True)]
+        place = (there[0], there[1], there[2])
+        return World(
+            entities=tuple(
+                replace(each, position=place) if each.id == behavior.target else each for each in self.world.entities
+            )
+        )
+
+    async def _check_points(self, body: Body, behavior: Pointing, world: World, expected: str) -> None:
+        body.see(world)
+        if (told := body.estimate(behavior, None, world)).fault is not None or not told.feasible:
+            reason = told.fault.reason if told.fault is not None else "it is infeasible"
+            broken(behavior, expected=expected, measured=f"it is refused: {reason}")
+        stage, entity = _OnTarget(self, body, behavior), world.entity(behavior.target)
+        await stage.over()
+        assert stage.state is not None
+        assert entity is not None
+        seen = [ray for ray in _rays(stage.state, behavior) if ray is not None]
+        off = min((aside(ray, entity.position) for ray in seen), default=0.0)
+        if off > (near := 3.0 * self.accuracy + self.gaze_slack):
+            broken(behavior, "stroke", expected=f"{expected}, within {degrees(near)}", measured=degrees(off))
 
     async def test_counts_the_degrees_that_its_joints_turn(self, body: Body) -> None:
         """`head_degrees` and `arm_degrees` are the way of the joints to the target, from home and from another pose.

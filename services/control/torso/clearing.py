@@ -225,7 +225,7 @@ def keep_clear(torso: Parts, run: Run) -> None:
     own.run_at(run.cruise, now)
     columns, every = range(trunk.columns.start, trunk.columns.stop), range(len(run.course.joints))
     asked_for, free = (
-        _least_above(motion, every, run.course.joints, run.course.aim, trunk.motion, columns, now)
+        _least_above(motion, every, run.course.joints, torso.tracks[parts[0]].aim, trunk.motion, columns, now)
         for motion in (run.motion, own)
     )
     if asked_for < 0.0 and asked_for < free:
@@ -257,7 +257,7 @@ def _least_above(
     """Least distance by which arms stay out of the table as both move at once. which: joints of their motion."""
     until = max(arms.end, trunk.end)
     if aim is not None:  # Its way home is laid when it leaves its target.
-        until = arms.crossing(arms.path.marks["stroke_end"]) or until
+        until = arms.crossing(arms.path.marks.get("stroke_end", inf)) or until
     at = np.linspace(now, until, tracks.MOMENTS)
     leaning, angles = trunk.positions(at)[:, list(columns)], arms.positions(at)[:, which]
     if aim is not None:
