@@ -1,0 +1,96 @@
+"""The window: follows the bus, keeps the picture, and shows it to browsers.
+
+Each browser gets a frame, draws it, says so, and gets the next one: a slow one misses frames and slows nothing.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import Capabilities, DescribeBody
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.console.follow import FOLLOWED, following
+from engage_hri.services.console.web.health import NOTABLE
+from engage_hri.services.console.web.picture import Picture
+
+PATTERNS = (
+    *FOLLOWED, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
+    keys.ANY_PERCEIVED_ONGOING,
+)  # fmt: skip
+"""Expressions for all that the window shows."""
+ASKED_EVERY: Seconds = 3.0
+"""Time between two questions for the status of all services, while somebody looks."""
+PATIENCE: Seconds = 1.0
+"""Time that they have to answer."""
+
+
+class Window:
+    """The picture of a robot's bus, kept up to date. watched: while it is above 0, services are asked how they are."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self.picture = Picture(bus.robot, bus.now())
+        self.viewers = 0
+        self._here: set[str] = set()
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        """Take a message. at: its local instant."""
+        match message:
+            case PeerAlive(participant=name):
+                self._here.add(name)
+            case PeerGone(participant=name):
+                self._here.discard(name)
+        self.picture.feed(message, at, self.bus.now())
+
+    async def look_after(self) -> None:
+        """Ask the services how they are, again and again, and the body once what it is; until cancelled."""
+        described = False
+        while True:
+            if self.viewers:
+                await self._ask()
+            if not described and "control" in self._here:
+                described = await self._describe()
+            await asyncio.sleep(ASKED_EVERY if described or "control" not in self._here else PATIENCE)
+
+    async def _ask(self) -> None:
+        there = [name for name in NOTABLE if name in self._here]
+        answers = await asyncio.gather(
+            *(self.bus.query(keys.status(name), AskStatus(), PATIENCE) for name in there), return_exceptions=True
+        )
+        silent = set()
+        for name, answer in zip(there, answers, strict=True):
+            if isinstance(answer, Status):
+                self.picture.feed(answer, self.bus.now(), self.bus.now())
+            elif isinstance(answer, EngageError):
+                silent.add(name)
+            elif isinstance(answer, BaseException):
+                raise answer
+        self.picture.silence(frozenset(silent), self.bus.now())
+
+    async def _describe(self) -> bool:
+        try:
+            body = await self.bus.query(keys.DESCRIBE, DescribeBody(), PATIENCE)
+        except EngageError:
+            return False
+        if isinstance(body, Capabilities):
+            self.picture.feed(body, self.bus.now(), self.bus.now())
+        return True
+
+
+@asynccontextmanager
+async def window(bus: Bus) -> AsyncIterator[Window]:
+    """Follow the bus while the body of `async with` runs."""
+    shown = Window(bus)
+    async with following(bus, (shown,), patterns=PATTERNS):
+        looking = asyncio.create_task(shown.look_after(), name="status")
+        try:
+            yield shown
+        finally:
+            looking.cancel()
+            await asyncio.wait([looking])
