@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from engage_hri.schemas.faults import RunFailed as RunFailed
     from engage_hri.schemas.fragments import FragmentOutcome as FragmentOutcome
     from engage_hri.schemas.fragments import TurnFragment as TurnFragment
+    from engage_hri.schemas.perception import Utterance as Utterance
     from engage_hri.schemas.recognition import ConnectionEvent as ConnectionEvent
     from engage_hri.schemas.recognition import Statistics as Statistics
     from engage_hri.schemas.summary import Summary as Summary
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from engage_hri.schemas.world import World as World
     from engage_hri.services.client.language_models import perform_call as perform_call
     from engage_hri.services.client.language_models import stream as stream
+    from engage_hri.services.client.perceive import perceive as perceive
+    from engage_hri.services.client.perceived_person import PerceivedPerson as PerceivedPerson
     from engage_hri.services.client.results import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
@@ -57,10 +60,13 @@ _PLACES = {
     "engage_hri.schemas.body": ("JointLimit", "Ray"),
     "engage_hri.schemas.faults": ("EngageError", "Fault", "InputRefused", "RequestRefused", "RunFailed"),
     "engage_hri.schemas.fragments": ("FragmentOutcome", "TurnFragment"),
+    "engage_hri.schemas.perception": ("Utterance",),
     "engage_hri.schemas.recognition": ("ConnectionEvent", "Statistics"),
     "engage_hri.schemas.summary": ("Summary", "summary"),
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
+    "engage_hri.services.client.perceive": ("perceive",),
+    "engage_hri.services.client.perceived_person": ("PerceivedPerson",),
     "engage_hri.services.client.results": ("PerformFailed",),
     "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.control.body": ("Arrived", "MovementAuthority", "BehaviorRefused", "Body", "Reached"),
@@ -85,6 +91,7 @@ __all__ = [
     "JointLimit",
     "MovementAuthority",
     "OrdinaryBody",
+    "PerceivedPerson",
     "PerformFailed",
     "Pointing",
     "Ray",
@@ -98,8 +105,10 @@ __all__ = [
     "Statistics",
     "Summary",
     "TurnFragment",
+    "Utterance",
     "World",
     "connect",
+    "perceive",
     "perform_call",
     "stream",
     "summary",

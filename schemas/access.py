@@ -57,9 +57,9 @@ SERVED = {
 }  # fmt: skip
 """Commands by their subject."""
 WATCHED = (
-    keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_CONNECTION_EVENT,
-    keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS, keys.ANY_OPEN_EVENTS,
-    keys.ANY_STATISTICS, keys.ANY_ALIVE,
+    keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.UTTERANCE,
+    keys.ANY_CONNECTION_EVENT, keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS,
+    keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
@@ -111,7 +111,7 @@ TABLE: tuple[Row, ...] = (
     *_service(
         "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER,
         heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.ANY_ACTION,
-               keys.ROBOT_STATE, keys.ANY_STATISTICS),
+               keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS),
     ),
     *_commands("generation", "block", "behavior", "turn"),
     Row("generation", "asks", keys.DESCRIBE),
@@ -121,7 +121,8 @@ TABLE: tuple[Row, ...] = (
     Row("realizer", "asks", keys.ESTIMATE),
     *_service(
         "recognition", keys.ANY_CONNECTION_EVENT, keys.RECOGNIZED_ACTION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
-        heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
+        heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING,
+               keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
     ),
     *_service(
@@ -129,12 +130,15 @@ TABLE: tuple[Row, ...] = (
         keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD,),
         served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
-    *(Row("perception", "publishes", key) for key in (keys.WORLD, keys.PERCEIVED_ACTION, _OWN_ONGOING, *_RAW)),
+    *(
+        Row("perception", "publishes", key)
+        for key in (keys.WORLD, keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, *_RAW)
+    ),
     Row("perception", "publishes", _OWN_FAULT, _RARELY),
     *(
         Row("perception", "subscribes", key)
-        for key in (keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
-                    keys.ROBOT_MOTION, keys.ROBOT_SEEN, keys.BODY_FAULTS)
+        for key in (keys.ANY_ALIVE, keys.WORLD, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION,
+                    keys.ANY_CONNECTION_EVENT, keys.ROBOT_MOTION, keys.ROBOT_SEEN, keys.BODY_FAULTS)
     ),
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
@@ -154,7 +158,7 @@ TABLE: tuple[Row, ...] = (
     *_manages("wizard", "robot", "faults", why=f"drives the robot by hand; {_NO_PROGRAM}"),
     *(
         Row("wizard", "publishes", key, f"says what perception does not see; {_NO_PROGRAM}")
-        for key in (keys.PERCEIVED_ACTION, _OWN_ONGOING)
+        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING)
     ),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""

@@ -7,7 +7,7 @@ how a message travels:
 | class  | for | how |
 |--------|-----|-----|
 | cmd    | requests to a server | each, in order; late subscribers get the last 2 s; idempotent by id |
-| evt    | request states, feedback, sync points, actions, connection events, faults | as cmd |
+| evt    | request states, feedback, sync points, actions, words, connection events, faults | as cmd |
 | state  | world, ongoing actions, statistics, open events, claims | last value, also for a late subscriber |
 | stream | joints, raw perception | newest only, may be dropped |
 | rpc    | short reads | query, short timeout, no reply = failure |
@@ -41,6 +41,8 @@ TURN_CLOSED = f"{PREFIX}/evt/generation/turn"
 SYNC_POINT = f"{PREFIX}/evt/control/sync_point"
 ROBOT_ACTION = f"{PREFIX}/evt/control/action"
 PERCEIVED_ACTION = f"{PREFIX}/evt/perception/action"
+UTTERANCE = f"{PREFIX}/evt/perception/utterance"
+"""`Utterance`: the words of people."""
 RECOGNIZED_ACTION = f"{PREFIX}/evt/recognition/action"
 """Actions that recognition finds in raw perception; the same messages as on `PERCEIVED_ACTION`."""
 ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"

@@ -42,7 +42,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnC
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.limits import LARGEST
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
@@ -68,7 +68,8 @@ Message = (
     | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
     | SyncPointArrived | SyncPointReached | WordSpoken | RobotState | RobotSeen
     | SwitchFaults | FaultsSwitched | BodyFaults | DescribeBody | Capabilities | EstimateBehaviors | Estimates
-    | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | HeadPose | VoiceActivity
+    | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | Utterance
+    | World | HeadPose | VoiceActivity
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip
@@ -86,7 +87,7 @@ COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
 }
 """Commands on each key; besides, `keys.cancel` takes `Cancel`, and `keys.keep_alive` takes `KeepAlive`."""
 
-OUTWARD = (ConnectionEvent, OpenEvents, Statistics)
+OUTWARD = (ConnectionEvent, OpenEvents, Statistics, Utterance)
 """Messages for programs of others, a few a second at most: published as JSON, which every language reads. All others
 are MessagePack."""
 

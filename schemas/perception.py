@@ -1,12 +1,19 @@
-"""Raw perception, from cameras and microphones that do not themselves report looks and speech.
+"""Raw perception, from cameras and microphones that do not themselves report looks and speech; and people's words.
 
-Sent several times a second; only the newest counts, so a lost one costs nothing. Hands come with `World`, as
-entities.
+Raw perception is sent several times a second; only the newest counts, so a lost one costs nothing. Hands come with
+`World`, as entities.
 """
 
-from msgspec import Struct
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from engage_hri.schemas.units import Probability, Stamp, Vector
+
+LONGEST_TEXT = 4000
+"""Letters of one utterance. A minute of speech has some 900."""
+MOST_ADDRESSEES = 64
+UtteranceId = Annotated[str, Meta(min_length=1, max_length=200)]
 
 
 class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults=True):
@@ -29,4 +36,27 @@ class VoiceActivity(Struct, frozen=True, kw_only=True, tag="voice_activity", omi
     actor: str
     active: bool
     at: Stamp
+    confidence: Probability = 1.0
+
+
+class Utterance(Struct, frozen=True, kw_only=True, tag="utterance", omit_defaults=True):
+    """evt: perception. Words of a person: spoken ones as a recognizer understands them, or a line that was typed.
+
+    Told anew whenever more of the words is known: of the messages with one id the one with the latest `at` counts,
+    and a final one before those that are not.
+
+    actor: who says it. id: the same for all results of one utterance of this person, and never used again.
+    text: all of it so far; empty: words will follow. final: False: a partial result, which the next may change.
+    began: when they began to say it; of a typed line the same as `at`. ended: when they had said it; None: by `at`.
+    at: when this much was known. to: ids of those to whom it was said, if perception knows.
+    """
+
+    actor: str
+    id: UtteranceId
+    text: Annotated[str, Meta(max_length=LONGEST_TEXT)]
+    began: Stamp
+    at: Stamp
+    ended: Stamp | None = None
+    final: bool = True
+    to: Annotated[tuple[str, ...], Meta(max_length=MOST_ADDRESSEES)] = ()
     confidence: Probability = 1.0

@@ -34,7 +34,8 @@ PURE_MACHINERY = {
     "services/requests/transitions.py",
     "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
     "services/client/chunking.py",
-    "services/client/event_stream.py",
+    "services/client/event_stream.py", "services/client/person_actions.py", "services/client/shared_world.py",
+    "services/client/utterances.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"

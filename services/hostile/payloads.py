@@ -16,7 +16,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import COMMANDS, MAJOR, Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
 from engage_hri.schemas.units import Seconds
@@ -41,7 +41,7 @@ FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((ActorFound, ActorLost), keys.PERCEIVED_ACTION),
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
     NetPlanned: keys.NET, NetMarked: keys.NET, NetWaiting: keys.NET, Held: keys.HELD,
-    BodyHeld: keys.BODY_HELD, BodyFaults: keys.BODY_FAULTS, RobotSeen: keys.ROBOT_SEEN,
+    BodyHeld: keys.BODY_HELD, BodyFaults: keys.BODY_FAULTS, RobotSeen: keys.ROBOT_SEEN, Utterance: keys.UTTERANCE,
 }  # fmt: skip
 """Key of each type of message that always has the same."""
 

@@ -1,4 +1,4 @@
-"""An attentive person: looks where the robot looks and points, meets its eyes, and nods when it has spoken.
+"""An attentive person: looks where the robot looks and points, meets its eyes, and answers with a nod or a yes.
 
 Pure. This person is for first meetings: the only task it knows is to place tangram pieces; the rest needs no table.
 """
@@ -11,6 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.simulation.hearing import THINKING, HeardSpeech
 from engage_hri.services.simulation.human import FACE, Act, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.listening import ListeningHuman
+from engage_hri.services.simulation.speaking import speech
 from engage_hri.services.tangram.table import TangramTable
 
 
@@ -20,6 +21,8 @@ class AttentiveHuman(ListeningHuman):
     ANSWERS: Seconds = 0.4
     FOLLOWS: Seconds = 0.3
     ACKNOWLEDGES: tuple[Act, ...] = (Start("nod"), Pause(0.5), Stop("nod"), LookAt(FACE))
+    AGREES: tuple[Act, ...] = (*speech("Yes."), LookAt(FACE))
+    """Answer to a question."""
 
     def __init__(
         self,
@@ -43,4 +46,7 @@ class AttentiveHuman(ListeningHuman):
         self._listen(message, now)
 
     def _answer(self, utterance: HeardSpeech) -> tuple[Act, ...]:
-        return () if utterance.words == THINKING else super()._answer(utterance)
+        if utterance.words == THINKING:
+            return ()
+        answer = super()._answer(utterance)
+        return self.AGREES if answer == self.ACKNOWLEDGES and utterance.is_question else answer

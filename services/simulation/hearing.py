@@ -29,6 +29,7 @@ class HeardSpeech(Struct, frozen=True):
 
     words: str
     pointed: str = ""
+    is_question: bool = False
 
     @property
     def is_request(self) -> bool:
@@ -69,8 +70,9 @@ class Hearing:
             case ActionEnded(actor=self._robot, action="point"):
                 self._pointing_at = ""
             case BlockProgress(block=str(block), progress="end") if block in self._words:
-                words = re.sub(r"[^a-z' ]", "", " ".join(self._words.pop(block)).lower()).split()
-                return HeardSpeech(" ".join(words), self._pointed.pop(block, ""))
+                said = " ".join(self._words.pop(block))
+                words = re.sub(r"[^a-z' ]", "", said.lower()).split()
+                return HeardSpeech(" ".join(words), self._pointed.pop(block, ""), said.rstrip().endswith("?"))
         return None
 
 

@@ -74,10 +74,11 @@ class Pause(Struct, frozen=True):
 
 
 class Start(Struct, frozen=True):
-    """Begin to speak, nod, shake the head, or point at `target`."""
+    """Begin to speak, nod, shake the head, or point at `target`. words: of speech."""
 
     action: Action
     target: str = ""
+    words: str = ""
 
 
 class Stop(Struct, frozen=True):
@@ -87,7 +88,11 @@ class Stop(Struct, frozen=True):
     target: str = ""
 
 
-Act = LookAt | Sit | Leave | Grab | Lay | Withdraw | Pause | Start | Stop
+class Understood(Struct, frozen=True):
+    """A recognizer knows for good what the person said last."""
+
+
+Act = LookAt | Sit | Leave | Grab | Lay | Withdraw | Pause | Start | Stop | Understood
 
 
 # -- triggers of acts --------------------------------------------------------------------------------------------

@@ -6,12 +6,11 @@ into messages of perception.
 
 from collections.abc import Callable, Iterator
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import RobotSeen
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.client.person_actions import PersonActions
 from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import (
     FACE,
@@ -25,9 +24,11 @@ from engage_hri.services.simulation.human import (
     Sit,
     Start,
     Stop,
+    Understood,
     Withdraw,
 )
 from engage_hri.services.simulation.seen_arms import SeenArms
+from engage_hri.services.simulation.speaking import SpokenWords
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import PiecePose, overlap, poses_touching
 
@@ -37,18 +38,21 @@ Stamper = Callable[[Seconds], Stamp]
 class PersonAtTable:
     """A person at the table. `feed` takes messages about the robot; `advance` yields what has happened by `now`.
 
-    frame: seconds between two reports of the world while something moves.
+    frame: seconds between two reports of the world while something moves. life: of the program that tells of the
+    person.
     """
 
-    def __init__(self, human: Human, table: Table, *, robot: str, frame: Seconds, stamp: Stamper) -> None:
+    def __init__(
+        self, human: Human, table: Table, *, robot: str, frame: Seconds, stamp: Stamper, life: str = ""
+    ) -> None:
         self._human = human
         self._table = table
         self._robot = robot
         self._frame = frame
         self._stamp = stamp
-        self._actor = table.layout.person.id
+        self._actions = PersonActions(table.layout.person.id)
+        self._words = SpokenWords(table.layout.person.id, life)
         self._arms, self._ears = SeenArms(), Ears()
-        self._look: str | None = None
         self._last_world: Seconds | None = None
 
     @property
@@ -77,9 +81,9 @@ class PersonAtTable:
         changed = self._table.moving and self._last_world is not None and now >= self._last_world + self._frame
         for rested in self._table.settle(now):
             changed = True
-            yield self._does(ActionEnded, "act", rested.piece, rested.at)
+            yield from self._actions.ends("act", (rested.piece,), self._stamp(rested.at))
         while acts := self._human.due(now):
-            changed = changed or not isinstance(acts[0], LookAt | Pause | Start | Stop)
+            changed = changed or not isinstance(acts[0], LookAt | Pause | Start | Stop | Understood)
             yield from self._do(acts[0], acts[1:], now)
         if changed:
             yield self.world(now)
@@ -96,14 +100,10 @@ class PersonAtTable:
                 yield from self._looks_at(self._robot if target == FACE else target, now)
             case Sit():
                 self._table.seated = True
-                yield ActorFound(actor=self._actor, at=self._stamp(now))
-                if self._look is not None:
-                    yield self._does(ActionBegan, "look", self._look, now)
+                yield from self._actions.comes(self._stamp(now))
             case Leave():
-                if self._look is not None:
-                    yield self._does(ActionEnded, "look", self._look, now)
-                self._table.seated, self._look = False, None
-                yield ActorLost(actor=self._actor, at=self._stamp(now))
+                self._table.seated = False
+                yield from self._actions.leaves(self._stamp(now))
             case Grab() | Lay() if self._table.carrying:
                 # The hands are busy with another piece: this act comes after it.
                 self._human.schedule((act, *then), self._table.deadline or now)
@@ -113,28 +113,20 @@ class PersonAtTable:
             case Lay(piece=piece) as lay:
                 if pose := self._place_for(lay, now):
                     following = self._table.carry(piece, pose, now)
-                    yield self._does(ActionBegan, "act", piece, now)
+                    yield from self._actions.begins("act", (piece,), self._stamp(now))
             case Withdraw():
                 self._table.withdraw(now)
             case Pause(seconds=seconds):
                 following = now + seconds
             case Start(action=action, target=target):
-                yield self._does(ActionBegan, action, target, now)
+                yield from self._actions.begins(action, (target,) if target else (), self._stamp(now))
             case Stop(action=action, target=target):
-                yield self._does(ActionEnded, action, target, now)
+                yield from self._actions.ends(action, (target,) if target else (), self._stamp(now))
+        yield from self._words.does(act, self._stamp(now))
         self._human.schedule(then, following)
 
     def _looks_at(self, target: str, now: Seconds) -> Iterator[Message]:
-        if target == self._look:
-            return
-        if self._table.seated:
-            if self._look is not None:
-                yield self._does(ActionEnded, "look", self._look, now)
-            yield self._does(ActionBegan, "look", target, now)
-        self._look = target
-
-    def _does(self, kind: type[ActionBegan] | type[ActionEnded], action: Action, target: str, at: Seconds) -> Message:
-        return kind(actor=self._actor, action=action, targets=(target,) if target else (), at=self._stamp(at))
+        yield from self._actions.looks((target,) if target else (), self._stamp(now))
 
     def _place_for(self, lay: Lay, now: Seconds) -> PiecePose | None:
         """First pose with room, or simply the first if none has room; None if no edges fit."""

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.simulation.config import PerceptionFaults
 from engage_hri.services.simulation.faults import Chances, deviated
@@ -32,17 +32,20 @@ class Reports(Protocol):
 
 
 class Ear:
-    """Hearing of utterances, some of which are missed. heard: True while one is heard."""
+    """Hearing of utterances, some of which are missed.
+
+    heard: True while one is heard. understood: the last one was heard, so its words are known.
+    """
 
     def __init__(self, faults: PerceptionFaults, chances: Chances) -> None:
         self._dropped = faults.dropped_speech
         self._chance = chances("speech")
-        self.heard = False
+        self.heard = self.understood = False
 
     def hear(self, message: ActionBegan | ActionEnded) -> bool:
         """Take the beginning or end of an utterance. True if that is heard."""
         if isinstance(message, ActionBegan):
-            self.heard = self._chance.random() >= self._dropped
+            self.heard = self.understood = self._chance.random() >= self._dropped
             return self.heard
         was, self.heard = self.heard, False
         return was
@@ -81,6 +84,8 @@ class SymbolicReports:
             case (ActionBegan(action="speak") | ActionEnded(action="speak")) as speech:
                 if self._ear.hear(speech):
                     yield speech
+            case Utterance() if not self._ear.understood:
+                pass
             case _:
                 yield message
 
@@ -134,6 +139,8 @@ class RawReports:
                 self._target = targets[0] if targets else ""
             case (ActionBegan(action="speak") | ActionEnded(action="speak")) as speech:
                 self._ear.hear(speech)
+            case Utterance() if self._ear.understood:
+                yield message
             case ActionBegan(action="nod" | "shake" | "point") | ActionEnded(action="nod" | "shake" | "point"):
                 yield message
 

@@ -5,12 +5,13 @@ from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.client.perceived_actions import PerceivedActions
+from engage_hri.services.client.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
 from engage_hri.services.simulation.attentive import AttentiveHuman
@@ -29,28 +30,37 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     """Serve until cancelled. The person comes when all participants that the configuration names are on the bus."""
     table = Table(tangram_table(), hand_speed=config.hand_speed, shortest_movement=config.shortest_movement)
     human = _human(config, bus.robot, random.Random(config.seed))
-    person = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp)
+    person = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp, life=bus.run)
     cameras = Cameras(person, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
-    perceived = PerceivedActions(bus)
+    perceived, shared = PerceivedActions(bus), SharedWorld(bus.name)
     with bus.subscribe(
         keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT, keys.ROBOT_SEEN,
-        keys.BODY_FAULTS,
+        keys.BODY_FAULTS, keys.WORLD,
         *([keys.ROBOT_MOTION] if config.perception == "raw" else []),
     ) as inbox:  # fmt: skip
-        bus.publish(keys.WORLD, cameras.world(bus.now()))
+        bus.publish(keys.WORLD, _whole(cameras.world(bus.now()), shared))
         ready()
         await _wait_for(set(config.await_participants), inbox)
         if config.human != "none":
             cameras.enter(bus.now() + config.entrance)
         while not inbox.is_over:
-            received = await inbox.next(cameras.deadline)
+            due = [at for at in (cameras.deadline, shared.deadline) if at is not None]
+            received = await inbox.next(min(due, default=None))
             now = bus.now()
+            message, source = (received.message, received.source) if received else (None, "")
+            if shared.take(message, source, now):
+                bus.publish(keys.WORLD, World(entities=shared.entities, at=bus.stamp()))
             if received is not None:
                 cameras.feed(received.message, now)
             reports = list(cameras.advance(now))
             for message in reports:
-                bus.publish(_key(message), message)
+                bus.publish(_key(message), _whole(message, shared) if isinstance(message, World) else message)
             perceived.follow(reports)
+
+
+def _whole(world: World, shared: SharedWorld) -> World:
+    """The world with what others have told of besides."""
+    return World(entities=shared.tell(world.entities), at=world.at)
 
 
 def _key(message: Message) -> str:
@@ -61,6 +71,8 @@ def _key(message: Message) -> str:
             return keys.head_pose(actor)
         case VoiceActivity(actor=actor):
             return keys.voice_activity(actor)
+        case Utterance():
+            return keys.UTTERANCE
         case _:
             return keys.PERCEIVED_ACTION
 

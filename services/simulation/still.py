@@ -1,6 +1,5 @@
 """A world in which nothing moves: from a file, or the tangram table. Its people sit there, and one may attend."""
 
-import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
@@ -9,18 +8,23 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
+from engage_hri.schemas.actions import ActorFound
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.units import FARTHEST, Stamp
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.perceived_actions import PerceivedActions
+from engage_hri.services.client.person_actions import PersonActions
+from engage_hri.services.client.shared_world import SharedWorld
+from engage_hri.services.runtime.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.hearing import Ears
-from engage_hri.services.simulation.human import FACE, Act, LookAt, Pause, Start, Stop
+from engage_hri.services.simulation.human import FACE, Act, Human, LookAt, Pause, Start, Stop
+from engage_hri.services.simulation.speaking import SpokenWords
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 
@@ -41,47 +45,62 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
 
     is_attentive: the first person follows the robot's gaze and answers it; else all just sit there.
     """
-    with bus.subscribe(keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK, keys.BODY_FAULTS) as inbox:
+    patterns = (keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK, keys.BODY_FAULTS) if is_attentive else ()
+    with bus.subscribe(*patterns, keys.WORLD, keys.ANY_ALIVE) as inbox:
         ready()
-        bus.publish(keys.WORLD, msgspec.structs.replace(world, at=bus.stamp()))
+        shared = SharedWorld(bus.name)
+
+        def tell_world() -> None:
+            bus.publish(keys.WORLD, World(entities=shared.tell(world.entities), at=bus.stamp()))
+
+        tell_world()
         perceived = PerceivedActions(bus)
         perceived.tell(*(ActorFound(actor=person.id, at=bus.stamp()) for person in world.people))
-        if not (is_attentive and world.people):
-            await asyncio.get_running_loop().create_future()
-        sees = frozenset(entity.id for entity in world.objects)
-        human = AttentiveHuman(world.people[0].id, sees, bus.robot)
-        body, ears = Bystander(world.people[0].id, bus.robot), Ears()
-        human.schedule((LookAt(FACE),), bus.now())
+        human = Human(())
+        ears = Ears()
+        if is_attentive and world.people:
+            human = AttentiveHuman(world.people[0].id, frozenset(each.id for each in world.objects), bus.robot)
+            human.schedule((LookAt(FACE),), bus.now())
+            body = Bystander(world.people[0].id, bus.robot, bus.run)
         while not inbox.is_over:
-            received = await inbox.next(human.deadline)
+            due = [at for at in (human.deadline, shared.deadline) if at is not None]
+            received = await inbox.next(min(due, default=None))
+            now = bus.now()
+            message, source = (received.message, received.source) if received else (None, "")
+            if shared.take(message, source, now):
+                tell_world()
             if received is not None and ears.hear(received.message):
-                human.feed(received.message, bus.now())
+                human.feed(received.message, now)
             while acts := human.due(bus.now()):
-                perceived.tell(*body.does(acts[0], bus.stamp()))
+                for told in body.does(acts[0], bus.stamp()):
+                    if isinstance(told, Utterance):
+                        bus.publish(keys.UTTERANCE, told)
+                    else:
+                        perceived.tell(told)
                 human.schedule(acts[1:], bus.now() + (acts[0].seconds if isinstance(acts[0], Pause) else 0.0))
 
 
 class Bystander:
-    """Actions of a person who looks, gestures and speaks, and moves nothing. Pure."""
+    """Actions and words of a person who looks, gestures and speaks, and moves nothing. Pure.
 
-    def __init__(self, person: str, robot: str) -> None:
-        self._person = person
+    life: of the program that tells of the person.
+    """
+
+    def __init__(self, person: str, robot: str, life: str = "") -> None:
         self._robot = robot
-        self._look: tuple[str, ...] | None = None
+        self._actions = PersonActions(person)
+        self._actions.is_here = True
+        self._words = SpokenWords(person, life)
 
-    def does(self, act: Act, at: Stamp) -> Iterator[ActionBegan | ActionEnded]:
+    def does(self, act: Act, at: Stamp) -> Iterator[ActionEvent | Utterance]:
         match act:
             case LookAt(target=target):
-                look = (self._robot if target == FACE else target,) if target else ()
-                if look == self._look:
-                    return
-                if self._look is not None:
-                    yield ActionEnded(actor=self._person, action="look", targets=self._look, at=at)
-                self._look = look
-                yield ActionBegan(actor=self._person, action="look", targets=look, at=at)
-            case Start(action=action, target=target) | Stop(action=action, target=target):
-                kind = ActionBegan if isinstance(act, Start) else ActionEnded
-                yield kind(actor=self._person, action=action, targets=(target,) if target else (), at=at)
+                yield from self._actions.looks((self._robot if target == FACE else target,) if target else (), at)
+            case Start(action=action, target=target):
+                yield from self._actions.begins(action, (target,) if target else (), at)
+            case Stop(action=action, target=target):
+                yield from self._actions.ends(action, (target,) if target else (), at)
+        yield from self._words.does(act, at)
 
 
 def tangram_world() -> World:

@@ -33,6 +33,7 @@ from engage_hri.services.simulation.human import (
     Withdraw,
 )
 from engage_hri.services.simulation.listening import COMES, GOES, moves
+from engage_hri.services.simulation.speaking import speech
 from engage_hri.services.tangram.table import SIDES, TangramTable, poses_touching
 
 NOD: Seconds = 0.5
@@ -290,7 +291,7 @@ class StochasticHuman(Human):
         """Begin the task after finding the piece, and perhaps after studying all pieces. None: ask which is meant."""
         if task is None:
             self._glances(FACE, at)
-            self._gestures("speak", QUESTION, at)
+            self._says("Which one?", QUESTION, at)
             return
         if task == self._task:
             return
@@ -323,12 +324,18 @@ class StochasticHuman(Human):
     def _utter(self, at: Seconds) -> None:
         """Say a brief word or nod: an answer, or a backchannel while the robot speaks."""
         if self._happens(self._habits.speaks):
-            self._gestures("speak", WORD, at)
+            self._says("Uh-huh." if self._robot_speech else "Okay.", WORD, at)
         else:
             self._gestures("nod", NOD, at)
 
+    def _says(self, words: str, seconds: Seconds, at: Seconds) -> None:
+        """Speak, unless another gesture is still going on."""
+        if at >= self._gesture_until:
+            self._gesture_until = at + seconds
+            self.schedule(speech(words, seconds), at)
+
     def _gestures(self, action: Action, seconds: Seconds, at: Seconds, target: str = "") -> None:
-        """Speak, nod or point, unless another gesture is still going on."""
+        """Nod or point, unless another gesture is still going on."""
         if at >= self._gesture_until:
             self._gesture_until = at + seconds
             self.schedule((Start(action, target), Pause(seconds), Stop(action, target)), at)

@@ -6,6 +6,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop
@@ -60,11 +61,21 @@ def test_they_nod_when_it_has_spoken_but_not_when_it_only_thinks() -> None:
     says(human, "ummmm", 1.0)
     assert human.deadline is None
 
-    says(human, "Is that a cup?", 2.0)
+    says(human, "That is a cup.", 2.0)
 
     assert human.deadline == 2.0 + AttentiveHuman.ANSWERS
     answer = acts(human, 3.0)
     assert (answer[0], answer[2], answer[-1]) == (Start("nod"), Stop("nod"), LookAt(FACE))
+
+
+def test_they_answer_a_question_in_words() -> None:
+    human = person()
+    says(human, "Is that a cup?", 2.0)
+
+    body = Bystander("ann", "robot", "life")
+    told = [message for act in acts(human, 3.0) for message in body.does(act, AT)]
+    words = [(each.id, each.text, each.final) for each in told if isinstance(each, Utterance)]
+    assert words == [("life-1", "", False), ("life-1", "Yes.", True)]
 
 
 def test_at_the_tangram_table_they_do_what_is_asked() -> None:

@@ -1,0 +1,340 @@
+"""A person as a program tells of it: presence, looks, gestures, manipulations and words."""
+
+import asyncio
+import math
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+
+from msgspec.structs import replace
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
+from engage_hri.schemas.suggestion import suggestion
+from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.client.perceived_actions import PerceivedActions
+from engage_hri.services.client.person_actions import PersonActions
+from engage_hri.services.client.shared_world import SharedWorld
+from engage_hri.services.client.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
+from engage_hri.services.runtime.ongoing_actions import ActionEvent
+
+GESTURE: Seconds = 0.5
+MANIPULATION: Seconds = 1.5
+FRAME: Seconds = 0.1
+"""Time between two reports of the world while a hand moves."""
+SEAT: Vector = (1.2, 0.0, 1.2)
+"""Place of the face of a person opposite the robot; a second one sits beside."""
+BESIDE = 0.6
+LAP: Vector = (-0.2, 0.0, -0.5)
+"""Place of a hand that does nothing, from the face, in metres."""
+
+
+class PerceivedPerson:
+    """A person of whom this program tells. Made by `perceive`.
+
+    Every method raises RunFailed once the person has left, and InputRefused for what the world does not know.
+    Cancelling one ends the action or the words where they are.
+    """
+
+    def __init__(self, person: str, bus: Bus) -> None:
+        self.id = person
+        self._bus = bus
+        self._actions = PersonActions(person)
+        self._perceived = PerceivedActions(bus)
+        self._utterances = Utterances(person, bus.run)
+        self._world = SharedWorld(bus.name)
+        self._own: dict[str, Entity] = {}
+        """What this program brought into the world: the person, if nobody else tells of it, hands, things."""
+        self._has_left = False
+
+    # -- presence -----------------------------------------------------------------------------------------------
+
+    @property
+    def world(self) -> tuple[Entity, ...]:
+        """All entities that are known now, of whoever told of them."""
+        return self._world.entities
+
+    async def leave(self) -> None:
+        """Leave: everything that the person does ends. The end of `async with` does this, too."""
+        self.leaves()
+
+    def leaves(self) -> None:
+        """Leave; `perceive` calls this at its end."""
+        if self._has_left:
+            return
+        self._tell(self._actions.leaves(self._bus.stamp()))
+        self._has_left = True
+        if self._own:
+            self._own.clear()
+            self._show()
+
+    async def move_to(self, position: Vector) -> None:
+        """Move the face to another place.
+
+        position: metres, in the robot's frame.
+        """
+        self._check()
+        self.bring(replace(self._body, position=position))
+
+    def bring(self, *entities: Entity) -> None:
+        """Put entities into the world, or change them there: things, hands, the person.
+
+        entities: as they are now; each replaces what has its id.
+        """
+        self._check()
+        self._own.update((entity.id, entity) for entity in entities)
+        self._show()
+
+    # -- what the person does -----------------------------------------------------------------------------------
+
+    async def look_at(self, target: str) -> None:
+        """Look at an entity, until the next look. Repeating it changes nothing.
+
+        target: id of an entity, a person's or the robot's for the face; empty: away from everything.
+        """
+        self.begin("look", target)
+
+    async def look_away(self) -> None:
+        """Look at nothing that the robot knows of."""
+        self.begin("look")
+
+    async def nod(self, seconds: Seconds = GESTURE) -> None:
+        """Nod; returns when it is over.
+
+        seconds: that it takes.
+        """
+        await self._do("nod", "", seconds)
+
+    async def shake(self, seconds: Seconds = GESTURE) -> None:
+        """Shake the head; returns when it is over.
+
+        seconds: that it takes.
+        """
+        await self._do("shake", "", seconds)
+
+    async def point_at(self, target: str, seconds: Seconds = 2 * GESTURE) -> None:
+        """Point at an entity; returns when it is over.
+
+        target: its id.
+        seconds: for which the arm is there.
+        """
+        await self._do("point", target, seconds)
+
+    async def act(self, target: str, *, to: Vector | None = None, seconds: Seconds = MANIPULATION) -> None:
+        """Manipulate a thing; returns when it is over.
+
+        target: its id.
+        to: place where it is laid, in a straight line, metres; None: it stays where it is.
+        seconds: that it takes.
+        """
+        thing = self._entity(target)
+        try:
+            with self._doing("act", target):
+                if to is None or thing is None:
+                    await asyncio.sleep(seconds)
+                else:
+                    await self._carry(thing, to, seconds)
+        finally:
+            self._rest()
+
+    async def say(
+        self,
+        text: str,
+        *,
+        to: Collection[str] = (),
+        seconds: Seconds | None = None,
+        partial: bool = True,
+        delay: Seconds = RECOGNIZING,
+    ) -> None:
+        """Speak; returns when the words are known for good.
+
+        text: the words.
+        to: ids of those to whom it is said; empty: unknown.
+        seconds: that the speech takes; None: as long as such words do.
+        partial: tell the words also while they are spoken, as a recognizer does.
+        delay: seconds from the end of the speech until the words are known for good.
+        """
+        self._check_text(text)
+        duration = speaking_time(text) if seconds is None else seconds
+        said = self._utterances.begun(self._bus.stamp(), _ids(to))
+        try:
+            with self._doing("speak"):
+                self.tell(said)
+                pieces = [*partial_texts(text)] if partial else [text]
+                for piece in pieces:
+                    await asyncio.sleep(duration / len(pieces))
+                    said = replace(said, text=piece, at=self._bus.stamp())
+                    if partial:
+                        self.tell(said)
+            said = replace(said, text=text, ended=self._bus.stamp())
+            await asyncio.sleep(delay)
+        finally:
+            if not self._has_left:
+                now = self._bus.stamp()
+                self.tell(replace(said, at=now, ended=said.ended or now, final=True))
+
+    async def type(self, text: str, *, to: Collection[str] = ()) -> None:
+        """Send a line that was typed. It is speech by itself: it opens a pair, or answers one.
+
+        text: the line.
+        to: ids of those to whom it is said; empty: unknown.
+        """
+        self._check_text(text)
+        self.tell(self._utterances.typed(text, self._bus.stamp(), _ids(to)))
+
+    # -- beginnings and ends ------------------------------------------------------------------------------------
+
+    def begin(self, action: Action, *targets: str) -> None:
+        """Begin an action, which goes on until its `end`; a look until the next one.
+
+        action: `look`, `speak`, `nod`, `shake`, `point` or `act`.
+        targets: ids of entities; an actor's id means the face.
+        """
+        self._check(*targets)
+        self._tell(self._actions.begins(action, tuple(filter(None, targets)), self._bus.stamp()))
+
+    def end(self, action: Action, *targets: str) -> None:
+        """End an action that goes on; nothing if it does not.
+
+        action: as it was begun.
+        targets: as it was begun.
+        """
+        self._check()
+        self._tell(self._actions.ends(action, tuple(filter(None, targets)), self._bus.stamp()))
+
+    def tell(self, utterance: Utterance) -> None:
+        """Tell words as a recognizer has them, at any time; speech itself is begun and ended as an action.
+
+        utterance: with an id of your own; `actor` is this person's.
+        """
+        self._check()
+        self._bus.publish(keys.UTTERANCE, replace(utterance, actor=self.id))
+
+    async def _do(self, action: Action, target: str, seconds: Seconds) -> None:
+        with self._doing(action, target):
+            await asyncio.sleep(seconds)
+
+    @contextmanager
+    def _doing(self, action: Action, *targets: str) -> Iterator[None]:
+        self.begin(action, *targets)
+        try:
+            yield
+        finally:
+            if not self._has_left:
+                self.end(action, *targets)
+
+    def _tell(self, events: Iterable[ActionEvent]) -> None:
+        if told := tuple(events):
+            self._perceived.tell(*told)
+
+    # -- the world ----------------------------------------------------------------------------------------------
+
+    @property
+    def _body(self) -> Entity:
+        return self._own.get(self.id) or self._entity(self.id) or Entity(id=self.id, kind="person", position=SEAT)
+
+    def _entity(self, id: str) -> Entity | None:
+        return next((entity for entity in self._world.entities if entity.id == id), None)
+
+    def _hand(self, position: Vector) -> Entity | None:
+        """The person's hand at a place; None if another tells of this person's hands."""
+        if self.id not in self._own:
+            return None
+        return Entity(id=f"{self.id}-hand", kind="hand", owner=self.id, position=position)
+
+    async def _carry(self, thing: Entity, to: Vector, seconds: Seconds) -> None:
+        began = self._bus.now()
+        while (left := began + seconds - self._bus.now()) > 0:
+            self._hold(thing, _between(thing.position, to, 1 - left / seconds))
+            await asyncio.sleep(min(FRAME, left))
+        self._hold(thing, to)
+
+    def _hold(self, thing: Entity, position: Vector) -> None:
+        """Show a thing in the hand."""
+        hand = self._hand(position)
+        self.bring(replace(thing, position=position), *([hand] if hand is not None else []))
+
+    def _rest(self) -> None:
+        if not self._has_left and (hand := self._hand(_sum(self._body.position, LAP))) is not None:
+            self.bring(hand)
+
+    def _show(self) -> None:
+        entities = self._world.tell(self._own.values())
+        self._bus.publish(keys.WORLD, World(entities=entities, at=self._bus.stamp()))
+
+    def take(self, received: Received | None) -> None:
+        """Take a message about the world or about who is there, or none by `deadline`; `perceive` calls this."""
+        message, source = (received.message, received.source) if received else (None, "")
+        if self._world.take(message, source, self._bus.now()) and not self._has_left and self._own:
+            self._show()
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """Loop time at which `take` has something to do without a message."""
+        return self._world.deadline
+
+    def enter(self, position: Vector | None) -> None:
+        """Come; `perceive` calls this. position: of the face; None: a free seat, unless the world has the person."""
+        known = self._entity(self.id)
+        if position is not None or known is None or known.kind != "person":
+            place = position or _free_seat([each.position for each in self._world.entities if each.kind == "person"])
+            self._own[self.id] = Entity(id=self.id, kind="person", position=place)
+            self._own[f"{self.id}-hand"] = Entity(
+                id=f"{self.id}-hand", kind="hand", owner=self.id, position=_sum(place, LAP)
+            )  # fmt: skip
+            self._show()
+        self._tell(self._actions.comes(self._bus.stamp()))
+
+    # -- checks -------------------------------------------------------------------------------------------------
+
+    def _check(self, *targets: str) -> None:
+        """Refuse what cannot be told. Without any world every id is good: nobody knows better."""
+        if self._has_left:
+            raise RunFailed(Fault(reason="this person has left", where=self.id, advice="`perceive` brings it back"))
+        known = {entity.id for entity in self._world.entities}
+        for target in filter(None, targets):
+            if known - self._own.keys() and target not in known | {self._bus.robot}:
+                reason = f"the world does not know {target!r}"
+                raise InputRefused(
+                    Fault(reason=reason, where=self.id, advice=suggestion(target, known | {self._bus.robot}))
+                )
+
+    def _check_text(self, text: str) -> None:
+        self._check()
+        if not text.strip():
+            raise InputRefused(Fault(reason="no words", where=self.id, advice="give it what the person says"))
+        if len(text) > LONGEST_TEXT:
+            reason = f"{len(text)} letters; an utterance has {LONGEST_TEXT} at most"
+            raise InputRefused(Fault(reason=reason, where=self.id, advice="split it into several"))
+
+
+def _ids(to: Collection[str]) -> tuple[str, ...]:
+    return (to,) if isinstance(to, str) else tuple(to)
+
+
+def _sum(place: Vector, way: Vector) -> Vector:
+    return (place[0] + way[0], place[1] + way[1], place[2] + way[2])
+
+
+def _between(start: Vector, end: Vector, share: float) -> Vector:
+    return (
+        start[0] + share * (end[0] - start[0]),
+        start[1] + share * (end[1] - start[1]),
+        start[2] + share * (end[2] - start[2]),
+    )
+
+
+def _free_seat(taken: list[Vector]) -> Vector:
+    """Place of a face opposite the robot, as far to the left and right as it takes to be beside the others."""
+    number = 0
+    while any(math.dist(_seat(number), other) < BESIDE / 2 for other in taken):
+        number += 1
+    return _seat(number)
+
+
+def _seat(number: int) -> Vector:
+    side = (number + 1) // 2 * BESIDE * (-1 if number % 2 else 1)
+    return (SEAT[0], SEAT[1] + side, SEAT[2])

@@ -1,0 +1,257 @@
+"""A person told of by a program: what goes over the bus, and what it refuses."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
+from engage_hri.schemas.faults import InputRefused, RunFailed
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.perceive import perceive
+from engage_hri.services.client.perceived_person import PerceivedPerson
+from engage_hri.services.client.robot import connect
+from engage_hri.services.runtime.service import Ready, Service, running
+from engage_hri.services.simulation.still import show_world
+
+THINGS = World(
+    entities=(
+        Entity(id="cup", kind="object", position=(0.5, 0.1, 0.7)),
+        Entity(id="ball", kind="object", position=(0.5, -0.1, 0.7)),
+    )
+)
+
+
+async def idle(bus: Bus, ready: Ready) -> None:
+    """A service that is there."""
+    ready()
+    await asyncio.get_running_loop().create_future()
+
+
+@asynccontextmanager
+async def scene(hub: MemoryHub, world: World = THINGS) -> AsyncIterator[list[Message]]:
+    """A world, and recognition that only stands there. Yields what perception tells, as it is told."""
+    told: list[Message] = []
+    with hub.join("ear").subscribe(keys.PERCEIVED_ACTION, keys.UTTERANCE) as inbox:
+
+        async def listen() -> None:
+            async for received in inbox:
+                told.append(received.message)
+
+        services: dict[str, Service] = {"recognition": idle, "simulation": partial(show_world, world=world)}
+        async with running(hub, services):
+            listening = asyncio.create_task(listen())
+            yield told
+            await asyncio.sleep(0.01)
+        listening.cancel()
+        await asyncio.wait([listening])
+
+
+def summed(told: list[Message]) -> list[tuple[Any, ...]]:
+    found: list[tuple[Any, ...]] = []
+    for each in told:
+        match each:
+            case ActorFound():
+                found.append(("+", each.actor))
+            case ActorLost():
+                found.append(("-", each.actor))
+            case ActionBegan():
+                found.append(("+", each.actor, each.action, *each.targets))
+            case ActionEnded():
+                found.append(("-", each.actor, each.action, *each.targets))
+            case Utterance():
+                found.append((each.actor, each.text, each.final))
+    return found
+
+
+async def test_everything_that_they_do_has_a_beginning_and_an_end(hub: MemoryHub) -> None:
+    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+        await ann.look_at("cup")
+        await ann.look_at("robot")
+        await ann.nod()
+        await ann.point_at("ball")
+        await ann.act("cup", to=(0.6, 0.0, 0.7))
+
+    assert summed(told) == [
+        ("+", "ann"), ("+", "ann", "look", "cup"), ("-", "ann", "look", "cup"), ("+", "ann", "look", "robot"),
+        ("+", "ann", "nod"), ("-", "ann", "nod"), ("+", "ann", "point", "ball"), ("-", "ann", "point", "ball"),
+        ("+", "ann", "act", "cup"), ("-", "ann", "act", "cup"), ("-", "ann", "look", "robot"), ("-", "ann"),
+    ]  # fmt: skip
+
+
+async def test_words_come_while_they_are_spoken_and_are_final_a_moment_later(hub: MemoryHub) -> None:
+    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+        await ann.say("yes that one", seconds=3.0, delay=0.5, to="robot")
+
+    words = [each for each in told if isinstance(each, Utterance)]
+    assert [(each.text, each.final, each.at.seconds) for each in words] == [
+        ("", False, 0.0), ("yes", False, 1.0), ("yes that", False, 2.0), ("yes that one", False, 3.0),
+        ("yes that one", True, 3.5),
+    ]  # fmt: skip
+    assert {(each.id, each.actor, each.began.seconds, each.to) for each in words} == {
+        (words[0].id, "ann", 0.0, ("robot",))
+    }
+    assert words[-1].ended is not None
+    assert words[-1].ended.seconds == 3.0
+    speech = [(type(each), each.at.seconds) for each in told if isinstance(each, ActionBegan | ActionEnded)]
+    assert speech == [(ActionBegan, 0.0), (ActionEnded, 3.0)]
+
+
+async def test_words_that_are_broken_off_are_what_was_said_of_them(hub: MemoryHub) -> None:
+    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+        saying = asyncio.create_task(ann.say("yes that one", seconds=3.0))
+        await asyncio.sleep(2.5)
+        saying.cancel()
+        await asyncio.wait([saying])
+
+    assert summed(told)[-4:] == [
+        ("ann", "yes that", False), ("-", "ann", "speak"), ("ann", "yes that", True), ("-", "ann"),
+    ]  # fmt: skip
+
+
+async def test_a_typed_line_is_words_alone(hub: MemoryHub) -> None:
+    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+        await asyncio.sleep(2.0)
+        await ann.type("hello")
+
+    assert summed(told) == [("+", "ann"), ("ann", "hello", True), ("-", "ann")]
+    words = next(each for each in told if isinstance(each, Utterance))
+    assert (words.began, words.ended) == (words.at, None)
+
+
+async def test_who_leaves_ends_what_goes_on_and_does_no_more(hub: MemoryHub) -> None:
+    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+        ann.begin("speak")
+        ann.begin("act", "cup")
+        await ann.leave()
+        with pytest.raises(RunFailed, match="ann: this person has left"):
+            await ann.nod()
+
+    assert summed(told) == [
+        ("+", "ann"), ("+", "ann", "speak"), ("+", "ann", "act", "cup"), ("-", "ann", "speak"),
+        ("-", "ann", "act", "cup"), ("-", "ann"),
+    ]  # fmt: skip
+
+
+async def test_what_goes_on_is_told_as_a_state(hub: MemoryHub) -> None:
+    async with scene(hub), perceive("ann", hub=hub, name="camera") as ann:
+        ann.begin("speak")
+        with hub.join("late").subscribe(keys.perceived_ongoing("camera", "ann")) as inbox:
+            received = await inbox.next(1.0)
+
+    assert received is not None
+    assert isinstance(received.message, OngoingActions)
+    assert [each.action for each in received.message.actions] == ["speak"]
+    assert received.message.seen
+
+
+# -- the world -------------------------------------------------------------------------------------------------
+
+
+async def places(hub: MemoryHub) -> dict[str, tuple[float, float, float]]:
+    async with connect(hub=hub) as robot:
+        return {entity.id: entity.position for entity in (await robot.world()).entities}
+
+
+async def test_two_people_sit_beside_one_another_in_one_world(hub: MemoryHub) -> None:
+    async with scene(hub):
+        async with perceive("ann", hub=hub) as ann, perceive("bob", hub=hub):
+            world = await places(hub)
+            assert world.keys() == {"cup", "ball", "ann", "ann-hand", "bob", "bob-hand"}
+            assert math.dist(world["ann"], world["bob"]) > 0.5
+            assert {entity.id for entity in ann.world} == world.keys()
+        await asyncio.sleep(1.0)
+        assert (await places(hub)).keys() == {"cup", "ball"}
+
+
+async def test_a_person_whom_the_world_has_already_is_not_put_there_again(hub: MemoryHub) -> None:
+    ann = Entity(id="ann", kind="person", position=(2.0, 1.0, 1.5))
+    async with scene(hub, World(entities=(*THINGS.entities, ann))), perceive("ann", hub=hub):
+        assert (await places(hub))["ann"] == (2.0, 1.0, 1.5)
+        assert "ann-hand" not in await places(hub)
+
+
+async def test_a_thing_stays_where_somebody_has_laid_it(hub: MemoryHub) -> None:
+    async with scene(hub):
+        async with perceive("ann", hub=hub) as ann:
+            acting = asyncio.create_task(ann.act("cup", to=(0.7, 0.1, 0.7), seconds=1.0))
+            await asyncio.sleep(0.45)
+            midway = await places(hub)
+            assert midway["ann-hand"] == midway["cup"]
+            assert 0.5 < midway["cup"][0] < 0.7
+            await acting
+        await asyncio.sleep(10.0)
+        assert (await places(hub))["cup"] == (0.7, 0.1, 0.7)
+
+
+async def test_people_whose_program_was_killed_stay_for_a_grace(hub: MemoryHub) -> None:
+    async with scene(hub), perceive("ann", hub=hub, name="camera"):
+        hub.kill("camera")
+        await asyncio.sleep(3.0)
+        assert "ann" in await places(hub)
+        await asyncio.sleep(2.0)
+        assert (await places(hub)).keys() == {"cup", "ball"}
+
+
+async def test_without_any_world_there_is_the_person_alone(hub: MemoryHub) -> None:
+    async with running(hub, {"recognition": idle}), perceive("ann", hub=hub) as ann:
+        assert (await places(hub)).keys() == {"ann", "ann-hand"}
+        await ann.look_at("anything")  # nobody knows better
+        ann.bring(Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7)))
+        await ann.move_to((1.5, 0.2, 1.3))
+
+        assert (await places(hub))["ann"] == (1.5, 0.2, 1.3)
+        assert "cup" in await places(hub)
+
+
+# -- errors ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "deed",
+    [
+        lambda ann: ann.look_at("cap"),
+        lambda ann: ann.point_at("cap"),
+        lambda ann: ann.act("cap"),
+        lambda ann: ann.act("cap", to=(0.0, 0.0, 0.0)),
+    ],
+)
+async def test_an_unknown_id_is_refused(hub: MemoryHub, deed: Callable[[PerceivedPerson], Any]) -> None:
+    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+        with pytest.raises(InputRefused, match=r"ann: the world does not know 'cap' \(did you mean 'cup'"):
+            await deed(ann)
+
+    assert summed(told) == [("+", "ann"), ("-", "ann")]
+
+
+@pytest.mark.parametrize("way", [PerceivedPerson.say, PerceivedPerson.type])
+async def test_no_words_and_too_many_are_refused(hub: MemoryHub, way: Callable[..., Any]) -> None:
+    async with scene(hub), perceive("ann", hub=hub) as ann:
+        with pytest.raises(InputRefused, match="no words"):
+            await way(ann, "  ")
+        with pytest.raises(InputRefused, match=f"at most.*split|{LONGEST_TEXT} at most"):
+            await way(ann, "a" * (LONGEST_TEXT + 1))
+
+
+async def test_without_a_robot_it_says_so_after_three_seconds(hub: MemoryHub) -> None:
+    with pytest.raises(RunFailed, match=r"no robot 'robot' here within 3.0 s \(`engage up` starts one\)"):
+        async with perceive("ann", hub=hub):
+            pass
+
+    assert asyncio.get_running_loop().time() == 3.0
+
+
+@pytest.mark.parametrize("person", ["", "a/b", "@ann", "all", "robot"])
+async def test_what_can_be_no_persons_id_is_refused(hub: MemoryHub, person: str) -> None:
+    with pytest.raises(InputRefused, match="can't be a person's id"):
+        async with perceive(person, hub=hub):
+            pass
