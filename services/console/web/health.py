@@ -7,7 +7,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.sections import Health
 
 STOOD: Seconds = 0.25
-"""Time that messages waited for a process from which on it is a warning."""
+"""Time that messages waited for a process from which on it is told."""
 NOTABLE: tuple[str, ...] = (*keys.SERVICES, "simulation", "collaboration")
 """Participants that answer for their status."""
 
@@ -73,14 +73,14 @@ def _warnings(status: Status) -> list[str]:
     found = [f"{number} {one if number == 1 else many}" for number, one, many in counted if number]
     if status.stands is None:
         found.append("does not serve yet")
-    if bus.lag >= STOOD:
-        found.append(f"stood still for {bus.lag:.2f} s")
     return found
 
 
 def _facts(status: Status) -> list[str]:
     up = status.at.seconds - status.joined.seconds
     facts = [f"up {up:.0f} s", f"{status.bus.passed} messages in"]
+    if status.bus.lag >= STOOD:
+        facts.append(f"once stood still for {status.bus.lag:.2f} s")
     if status.process.host:
         facts.append(status.process.host)
     if status.process.loop:

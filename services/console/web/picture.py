@@ -213,12 +213,12 @@ class Picture:
             self.versions[name] = self._number
 
     def _latest_shown(self, left: nets.Nets) -> nets.Nets:
-        """The nets that are left, or the last one: it stays until another comes, so that people can look at it."""
-        if left or not self._nets:
-            return left
+        """The nets that are left, and the newest that is not of a mere look: it stays, so that people can study it."""
         others = [net for net in self._nets.values() if not net.block.startswith(view.OWN_BLOCKS)]
-        last = (others or list(self._nets.values()))[-1]
-        return {last.block: last if last.is_over else replace(last, is_over=True)}
+        if not others or others[-1].block in left:
+            return left
+        last = others[-1]
+        return {last.block: last if last.is_over else replace(last, is_over=True), **left}
 
     def section(self, name: str) -> bytes:
         """A section as JSON. It is made once for each version."""

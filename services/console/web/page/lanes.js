@@ -18,7 +18,7 @@ function lanes(panel, told, draw) {
       const rect = canvas.getBoundingClientRect();
       if (rect.bottom < 0 || rect.top > window.innerHeight) return;
       const { context, width, height } = sized(canvas);
-      const names = Math.min(150, Math.max(84, width * 0.2));
+      const names = Math.min(190, Math.max(96, width * 0.24));
       const narrow = width < 600;
       const [past, ahead] = narrow ? [PAST / 2, AHEAD / 2] : [PAST, AHEAD];
       const now = state.now();
@@ -68,7 +68,13 @@ function row(context, { names, width }, top, size, name, shaded) {
   context.fillStyle = color("--ink");
   context.textAlign = "left";
   context.textBaseline = "middle";
-  context.fillText(fitting(context, name, names - 10), 4, top + size / 2);
+  const [who, what] = name.split(": ");
+  if (what && size > 26 && context.measureText(name).width > names - 10) {
+    context.fillText(fitting(context, who, names - 10), 4, top + size / 2 - 7);
+    context.fillText(fitting(context, what, names - 10), 4, top + size / 2 + 7);
+  } else {
+    context.fillText(fitting(context, name, names - 10), 4, top + size / 2);
+  }
   context.textBaseline = "alphabetic";
 }
 
@@ -80,11 +86,12 @@ function fitting(context, text, width) {
 }
 
 // Text in a bar, or right of it where there is room.
-function caption(context, text, from, to, middle, room) {
+function caption(context, text, from, to, middle, room, inside) {
   context.textBaseline = "middle";
   context.textAlign = "left";
   const width = context.measureText(text).width;
   if (width < to - from - 6) {
+    if (inside) context.fillStyle = color("--onbar");
     context.fillText(text, from + 4, middle);
   } else if (width < room - to - 8) {
     context.fillText(text, to + 5, middle);
@@ -117,17 +124,19 @@ export function eventLanes(panel) {
     context.beginPath();
     context.rect(view.names, 0, width - view.names, height);
     context.clip();
-    for (const event of state.events ?? []) {
+    const next = new Map(); // where the event that follows begins, by row
+    for (const event of [...(state.events ?? [])].reverse()) {
       if (event.until !== null && event.until < first - 8) continue;
       const index = rows.findIndex((each) => each.kind === event.kind && each.mine === (event.by === state.robot));
-      drawEvent(view, event, index * size, size, color(shades.get(event.kind)));
+      drawEvent(view, event, index * size, size, color(shades.get(event.kind)), next.get(index) ?? width);
+      next.set(index, x(event.since));
     }
     context.restore();
     present(context, x, now, height);
   });
 }
 
-function drawEvent({ context, x, now, width }, event, top, size, shade) {
+function drawEvent({ context, x, now, names }, event, top, size, shade, room) {
   const [high, low] = [top + size * 0.16, size * 0.68];
   const decided = event.decided ?? now;
   const end = event.until ?? now;
@@ -145,7 +154,7 @@ function drawEvent({ context, x, now, width }, event, top, size, shade) {
   let text = "";
   if (GOOD.has(event.state)) {
     context.fillRect(x(decided), high, to - x(decided), low);
-    text = event.delay === null ? "" : seconds(event.delay);
+    text = event.delay === null ? "" : `after ${seconds(event.delay)}`;
   } else if (event.state !== "started") {
     context.fillStyle = color(event.state === "failed" ? "--bad" : "--quiet");
     context.textAlign = "center";
@@ -158,7 +167,8 @@ function drawEvent({ context, x, now, width }, event, top, size, shade) {
   }
   const about = event.about.length ? `${event.about.join(", ")} ` : "";
   context.fillStyle = color("--ink");
-  caption(context, `${about}${text}`, x(decided), to + (event.state === "failed" ? 6 : 0), top + size / 2, width);
+  const begins = Math.max(x(decided), names);
+  caption(context, `${about}${text}`, begins, to + (event.state === "failed" ? 6 : 0), top + size / 2, room, GOOD.has(event.state));
 }
 
 function tellEvents(state) {
@@ -215,7 +225,7 @@ function extent(points, key, other) {
   return times.length ? [Math.min(...times), Math.max(...times)] : null;
 }
 
-function drawBehavior({ context, x, now, width }, behavior, block, top, size, shade) {
+function drawBehavior({ context, x, now, names }, behavior, block, top, size, shade) {
   const planned = extent(behavior.points, "first");
   const real = extent(behavior.points, "measured");
   const over = block.until !== null || behavior.points.every((point) => point.measured !== null);
@@ -250,8 +260,9 @@ function drawBehavior({ context, x, now, width }, behavior, block, top, size, sh
   if (real && size > 30) {
     context.fillStyle = color("--onbar");
     const [from, to] = [x(real[0]), x(over ? real[1] : now)];
-    const text = fitting(context, behavior.id, to - from - 6);
-    if (text.length > 3) caption(context, text, from, to, high + low / 2, 0);
+    const begins = Math.max(from, names);
+    const text = fitting(context, behavior.id, to - begins - 6);
+    if (text.length > 3) caption(context, text, begins, to, high + low / 2, 0);
   }
 }
 

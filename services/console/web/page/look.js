@@ -1,7 +1,7 @@
 // Colours and sizes that several pictures share. Colours of the theme are read from the style sheet.
 export const KINDS = [
   ["directed_gaze", "directed gaze", "--gaze"],
-  ["mutual_facial_gaze", "mutual facial gaze", "--mutual"],
+  ["mutual_facial_gaze", "mutual gaze", "--mutual"],
   ["adjacency_pair", "adjacency pair", "--pair"],
   ["backchannel", "backchannel", "--back"],
 ];

@@ -1,8 +1,8 @@
 // The table from above, as the person sees it who sits opposite the robot: the robot is at the top.
 import { drawn, pieceColor } from "./look.js";
 
-const AHEAD = [-0.32, 1.62]; // metres, x of the robot: down the screen
-const ASIDE = [-0.85, 0.85]; // y of the robot: to the right
+const AHEAD = [-0.27, 1.5]; // metres, x of the robot: down the screen
+const ASIDE = [-0.62, 0.62]; // y of the robot: to the right
 
 // Coordinates of the screen, in millimetres, of a place.
 const place = ([x, y]) => [y * 1000, x * 1000];
@@ -65,8 +65,9 @@ function objects(layers, things, body) {
     shape.classList.toggle("pointed", Boolean(body?.points.includes(thing.id)));
     const label = keyed(layers.labels, thing.id, () => drawn("text", { class: "name" }, thing.label));
     const [x, y] = place(thing.at);
+    label.classList.toggle("meant", shape.classList.contains("looked") || shape.classList.contains("pointed"));
     label.setAttribute("x", x);
-    label.setAttribute("y", y + Math.max(thing.radius, 0.02) * 1000 * 0.72 + 24);
+    label.setAttribute("y", y + Math.max(thing.radius, 0.02) * 1000 * 0.72 + 44);
   }
   for (const layer of [layers.objects, layers.labels]) {
     for (const each of [...layer.children]) if (!ids.has(each.dataset.key)) each.remove();
@@ -89,7 +90,7 @@ function face(at, direction, kind, name, speaks) {
     drawn("ellipse", { class: "shoulders", rx: 190, ry: 75 }),
     drawn("g", { transform: `rotate(${90 - turn})` },
       drawn("ellipse", { class: "skull", rx: 100, ry: 78 }), drawn("circle", { class: "nose", cx: 98, cy: 0, r: 17 })),
-    drawn("text", { class: "name", y: kind === "robot" ? -95 : 128 }, speaks ? `${name} speaks` : name));
+    drawn("text", { class: "name", y: kind === "robot" ? -105 : 150 }, speaks ? `${name} speaks` : name));
 }
 
 function towards(from, to) {

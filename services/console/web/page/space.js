@@ -4,7 +4,7 @@ import { element, isDark, pieceColor } from "./look.js";
 
 const SHOULDERS = 0.2; // metres from the middle of the trunk
 const VIEWS = {
-  "across": [[2.25, 0.95, 1.95], [0.5, 0, 0.82]],
+  "across": [[1.9, 1.55, 1.8], [0.6, 0, 0.84]],
   "as the person": [[1.55, 0, 1.38], [0.3, 0, 0.85]],
   "as the robot": [[-0.55, 0.25, 1.75], [0.75, 0, 0.7]],
 };
@@ -56,6 +56,14 @@ export function space(panel) {
     button.addEventListener("click", () => view(name));
     return button;
   }));
+  const names = element("button", { type: "button", "aria-pressed": "false" }, "names");
+  names.addEventListener("click", () => {
+    const named = labels.domElement.classList.toggle("named");
+    document.querySelector(".map")?.classList.toggle("named", named);
+    names.setAttribute("aria-pressed", String(named));
+    stale = true;
+  });
+  panel.querySelector(".views").append(names);
 
   const pieces = new Map();
   const people = new Map();
@@ -67,7 +75,8 @@ export function space(panel) {
       const { body, things } = state.scene;
       keep(pieces, things, (thing) => makePiece(scene, thing), (made, thing) => made.put(thing, body));
       keep(people, state.scene.people.filter((each) => each.at && each.present), (person) => makePerson(scene, person),
-        (made, person) => made.put(person, placeOf(state.scene)));
+        (made, person) => made.put(person, placeOf(state.scene),
+          things.filter((each) => each.owner === person.id).map((each) => each.at)));
       robot.put(body, placeOf(state.scene));
       stale = true;
     },
@@ -310,7 +319,7 @@ function makePerson(scene, person) {
   const name = tag(person.id, "person");
   scene.add(name);
   return {
-    put(now, placeOf) {
+    put(now, placeOf, hands) {
       const at = vector(now.at);
       const target = now.looks?.length ? placeOf(now.looks[0]) : null;
       const towards = target ? vector(target).sub(at) : now.looks ? new THREE.Vector3(-0.3, 0.95, 0.1) : new THREE.Vector3(-1, 0, 0);
@@ -318,8 +327,12 @@ function makePerson(scene, person) {
       head.mimic({}, now.speaks);
       const below = new THREE.Vector3(at.x + 0.08, at.y, at.z - 0.3);
       trunk.between(below, below.clone().setZ(at.z - 0.62));
-      arms.forEach((arm, index) => arm.between(below.clone().add({ x: 0, y: index ? 0.17 : -0.17, z: 0.02 }),
-        below.clone().add({ x: -0.12, y: index ? 0.2 : -0.2, z: -0.2 })));
+      arms.forEach((arm, index) => {
+        const shoulder = below.clone().add({ x: 0, y: index ? 0.17 : -0.17, z: 0.02 });
+        const rest = below.clone().add({ x: -0.1, y: index ? 0.19 : -0.19, z: -0.28 });
+        const near = hands.map(vector).filter((hand) => (hand.y - at.y > 0) === Boolean(index));
+        arm.between(shoulder, near[0] ?? (hands.length === 1 && index ? vector(hands[0]) : rest));
+      });
       gaze.between(target ? at : null, target ? vector(target) : null);
       const pointed = now.points.map(placeOf).filter(Boolean)[0];
       pointing.between(pointed ? below : null, pointed ? vector(pointed) : null);
