@@ -21,6 +21,7 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
+from engage_hri.schemas.perception import Utterance as Words
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.status import Status
@@ -29,6 +30,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import net_layout, people, scene
 from engage_hri.services.console.web.health import HealthBoard
+from engage_hri.services.console.web.heard import Heard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
 from engage_hri.services.console.web.measures import Measures
 from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
@@ -73,6 +75,7 @@ class Picture:
         self._measures = Measures()
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
+        self._heard = Heard()
         self._notes: deque[Note] = deque(maxlen=NOTES_KEPT)
         self.versions = dict.fromkeys(SECTIONS, 1)
         """Number of the newest state of each section."""
@@ -80,6 +83,16 @@ class Picture:
         self._encoded: dict[str, tuple[int, bytes]] = {}
         self._late: dict[str, Seconds] = {}
         """Sections that have changed and are told slowly, and when they may be told."""
+
+    @property
+    def world(self) -> World:
+        """The world as it was told last; empty before."""
+        return self._world or World(entities=())
+
+    @property
+    def body(self) -> Capabilities | None:
+        """What the body said of itself; None: nothing yet."""
+        return self._body
 
     def zero(self, at: Seconds) -> Seconds:
         """Seconds of the picture at a local instant."""
@@ -116,6 +129,9 @@ class Picture:
                 self._take_net(message, at)
             case FragmentOutcome():
                 self._take_choices(message)
+            case Words():
+                self._heard.feed(message, self.zero(at))
+                self._changed("words")
             case PeerAlive() | PeerGone() | Status():
                 self._health.feed(message)
                 self._changed("health")
@@ -213,7 +229,7 @@ class Picture:
             self.versions[name] = self._number
 
     def _latest_shown(self, left: nets.Nets) -> nets.Nets:
-        """The nets that are left, and the newest that is not of a mere look: it stays, so that people can study it."""
+        """The nets that are left, and the newest that is not of a mere look: it stays, to be studied."""
         others = [net for net in self._nets.values() if not net.block.startswith(view.OWN_BLOCKS)]
         if not others or others[-1].block in left:
             return left
@@ -249,7 +265,8 @@ class Picture:
         return made[name]()
 
     def _words(self) -> list[Utterance]:
-        return [Utterance(said.actor, self.zero(said.began), said.text, said.open) for said in self._scene.said]
+        said = [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in self._scene.said]
+        return self._heard.joined(said)
 
     def _head(self) -> HeadSection:
         def shown(claim: Claim) -> ClaimShown:
@@ -260,9 +277,9 @@ class Picture:
         return HeadSection(None if owner is None else shown(owner), self.zero(self._head_since), waiting)
 
     def _switched(self) -> Switched:
-        return Switched(
-            tuple(wording.held(each.hold) for each in self._scene.held), tuple(map(words, self._scene.faults))
-        )
+        held = tuple(wording.held(each.hold) for each in self._scene.held)
+        kinds = dict.fromkeys(each.kind for each in self._scene.faults)
+        return Switched(held, tuple(map(words, self._scene.faults)), tuple(kinds))
 
     def _changed(self, *names: str) -> None:
         for name in names:

@@ -1,6 +1,7 @@
 """Sections of the picture that the page draws, as it gets them in JSON.
 
-A section is replaced as a whole when something in it has changed. Instants are seconds of the picture. Places are in metres, in the robot's frame.
+A section is replaced as a whole when something in it has changed. Instants are seconds of the picture. Places are
+metres, in the frame of the robot.
 """
 
 from typing import Literal
@@ -173,7 +174,7 @@ class NetInstant(Struct, frozen=True):
 
 
 class NetSpot(Struct, frozen=True):
-    """A place of a net, in its row. source, target: columns between which it lies. words: what a token there means."""
+    """A place of a net, in a row. source, target: columns between which it lies. words: what a token there means."""
 
     row: int
     source: int
@@ -254,7 +255,8 @@ class Note(Struct, frozen=True):
 
 
 class Switched(Struct, frozen=True):
-    """What is held, and which faults of the body are on, in words."""
+    """What is held, and which faults of the body are on, in words. kinds: of these faults."""
 
     held: tuple[str, ...]
     faults: tuple[str, ...]
+    kinds: tuple[str, ...]

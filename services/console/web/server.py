@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import secrets
 import socket
 from collections.abc import AsyncIterator, Iterator, Sequence
 from urllib.parse import urlsplit
@@ -15,6 +16,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.frames import Viewer
 from engage_hri.services.console.web.page import build
 from engage_hri.services.console.web.service import Window
+from engage_hri.services.console.web.visitor import Visitor
 
 TICK: Seconds = 1 / 15
 """Least time between two frames of a browser."""
@@ -22,23 +24,24 @@ FRAMES = "/frames"
 """Path of the WebSocket."""
 
 
-def application(window: Window, hosts: Sequence[str]) -> FastAPI:
-    """The page and its frames, for requests that name one of these hosts.
+def application(window: Window, hosts: Sequence[str], token: str) -> FastAPI:
+    """The page and its frames, for requests that name one of these hosts; `*` stands for all.
 
     A page of somebody else's in the same browser may call 127.0.0.1, too: the name that it calls, and the page that a
-    WebSocket is from, have to be ours.
+    WebSocket is from, have to be ours. token: who takes part has it in the address of the page.
     """
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts])
 
     @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
-        if urlsplit(browser.headers.get("origin", "")).hostname not in hosts:
+        if urlsplit(browser.headers.get("origin", "")).netloc != browser.headers.get("host"):
             await browser.close(4403, "the page is from elsewhere")
             return
         await browser.accept()
         with contextlib.suppress(WebSocketDisconnect):
-            await _show(window, browser)
+            given = browser.query_params.get("token", "")
+            await _show(window, browser, Visitor(window, secrets.compare_digest(given.encode(), token.encode())))
 
     @ui.page("/", title=f"Engage: {window.bus.robot}")
     def page() -> None:
@@ -51,22 +54,22 @@ def application(window: Window, hosts: Sequence[str]) -> FastAPI:
     return app
 
 
-async def _show(window: Window, browser: WebSocket) -> None:
+async def _show(window: Window, browser: WebSocket, visitor: Visitor) -> None:
     """Send frames until the browser has gone. Raises WebSocketDisconnect then."""
     viewer, drawn = Viewer(), asyncio.Event()
     drawn.set()
 
     async def listen() -> None:
         while True:
-            await browser.receive_text()
-            drawn.set()
+            if visitor.take(await browser.receive_text()):
+                drawn.set()
 
     window.viewers += 1
     listening = asyncio.create_task(listen(), name="browser")
     try:
         while not listening.done():
             window.picture.advance(window.bus.now())
-            frame = viewer.frame(window.picture, window.bus.now())
+            frame = viewer.frame(window.picture, window.bus.now(), visitor.you, visitor.told())
             if frame is not None:
                 drawn.clear()
                 await browser.send_text(frame.decode())
@@ -78,10 +81,19 @@ async def _show(window: Window, browser: WebSocket) -> None:
     finally:
         window.viewers -= 1
         listening.cancel()
+        await visitor.leave()
 
 
 class _Quiet(uvicorn.Server):
-    """The server without its own ways with signals: the process has its own."""
+    """The server without its own ways with signals: the process has its own. stands: set when it serves."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.stands = asyncio.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self.stands.set()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -102,8 +114,9 @@ async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
     server = _Quiet(config)
     running = asyncio.create_task(server.serve(sockets=[listening]), name="web server")
     try:
-        while not server.started and not running.done():
-            await asyncio.sleep(0.01)
+        standing = asyncio.create_task(server.stands.wait())
+        await asyncio.wait((standing, running), return_when=asyncio.FIRST_COMPLETED)
+        standing.cancel()
         if running.done():
             running.result()
         yield listening.getsockname()[1]

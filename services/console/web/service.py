@@ -14,14 +14,16 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.console.follow import FOLLOWED, following
 from engage_hri.services.console.web.health import NOTABLE
 from engage_hri.services.console.web.picture import Picture
+from engage_hri.services.console.web.script import Script
 
 PATTERNS = (
     *FOLLOWED, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
-    keys.ANY_PERCEIVED_ONGOING,
+    keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE,
 )  # fmt: skip
 """Expressions for all that the window shows."""
 ASKED_EVERY: Seconds = 3.0
@@ -31,10 +33,16 @@ PATIENCE: Seconds = 1.0
 
 
 class Window:
-    """The picture of a robot's bus, kept up to date. watched: while it is above 0, services are asked how they are."""
+    """The picture of a robot's bus, kept up to date, and what people need who take part.
 
-    def __init__(self, bus: Bus) -> None:
+    viewers: number of browsers; while there is none, services are not asked how they are.
+    """
+
+    def __init__(self, hub: Hub, bus: Bus, robot: Robot, script: Script) -> None:
+        self.hub = hub
         self.bus = bus
+        self.robot = robot
+        self.script = script
         self.picture = Picture(bus.robot, bus.now())
         self.viewers = 0
         self._here: set[str] = set()
@@ -47,6 +55,11 @@ class Window:
             case PeerGone(participant=name):
                 self._here.discard(name)
         self.picture.feed(message, at, self.bus.now())
+
+    def log(self, text: str) -> None:
+        """Write what somebody has ordered to the log, and show it to all who look."""
+        self.bus.log.info("%s", text)
+        self.picture.note(text, self.bus.now())
 
     async def look_after(self) -> None:
         """Ask the services how they are, again and again, and the body once what it is; until cancelled."""
@@ -84,13 +97,20 @@ class Window:
 
 
 @asynccontextmanager
-async def window(bus: Bus) -> AsyncIterator[Window]:
-    """Follow the bus while the body of `async with` runs."""
-    shown = Window(bus)
-    async with following(bus, (shown,), patterns=PATTERNS):
+async def window(hub: Hub, bus: Bus, script: Script) -> AsyncIterator[Window]:
+    """Follow the bus while the body of `async with` runs. bus: the window's own, with its role."""
+    async with Robot.on(bus) as robot:
+        shown = Window(hub, bus, robot, script)
+        async with _following(shown):
+            yield shown
+
+
+@asynccontextmanager
+async def _following(shown: Window) -> AsyncIterator[None]:
+    async with following(shown.bus, (shown,), patterns=PATTERNS):
         looking = asyncio.create_task(shown.look_after(), name="status")
         try:
-            yield shown
+            yield
         finally:
             looking.cancel()
             await asyncio.wait([looking])

@@ -5,6 +5,8 @@ import { space } from "./space.js";
 import { behaviorLanes, eventLanes } from "./lanes.js";
 import { net } from "./net.js";
 import { measures } from "./measures.js";
+import { part } from "./part.js";
+import { wizard } from "./wizard.js";
 import { away, head, health, notes, references, switched, words } from "./lists.js";
 
 const EACH = ["block/", "net/"]; // sections that there are several of
@@ -12,8 +14,10 @@ const EACH = ["block/", "net/"]; // sections that there are several of
 export function begin(root, robot) {
   const at = (id) => root.querySelector(`#${id}`);
   const state = { robot, blocks: new Map(), layouts: new Map(), now: () => 0 };
+  let send = () => {};
+  const order = (what) => send(what);
   const drawn = [
-    space(at("scene")), map(at("above")), words(at("said")), head(at("head")), eventLanes(at("events")),
+    space(at("scene"), order), map(at("above"), order), part(at("part"), order), wizard(at("wizard"), order), words(at("said")), head(at("head")), eventLanes(at("events")),
     behaviorLanes(at("behaviors")), net(at("net")), measures(at("measures")), references(at("references")),
     health(at("health")), notes(at("notes")), switched(root.querySelector(".switched")),
   ];
@@ -36,6 +40,14 @@ export function begin(root, robot) {
         changed.add(name);
       }
     }
+    if (frame.you) {
+      state.you = frame.you;
+      changed.add("you");
+    }
+    if (frame.told?.length) {
+      state.told = frame.told;
+      changed.add("told");
+    }
     for (const name of frame.gone ?? []) {
       state.blocks.delete(name.slice(EACH[0].length));
       state.layouts.delete(name.slice(EACH[1].length));
@@ -53,6 +65,7 @@ export function begin(root, robot) {
   }
   requestAnimationFrame(tick);
   const link = follow(take, warning.link);
+  send = link.send;
   window.engage = { state, send: link.send }; // for who looks into the page with the browser's tools
   return () => {
     running = false;

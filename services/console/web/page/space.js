@@ -12,7 +12,7 @@ const VIEWS = {
 const vector = (at) => new THREE.Vector3(...at);
 const material = (color, more = {}) => new THREE.MeshStandardMaterial({ color, roughness: 0.75, ...more });
 
-export function space(panel) {
+export function space(panel, order) {
   const place = panel.querySelector(".space");
   let renderer;
   try {
@@ -67,12 +67,28 @@ export function space(panel) {
 
   const pieces = new Map();
   const people = new Map();
+  let robotId = "";
+  let pressed = null;
+  const eye = new THREE.Raycaster();
+  labels.domElement.addEventListener("pointerdown", (event) => (pressed = [event.clientX, event.clientY]));
+  labels.domElement.addEventListener("pointerup", (event) => {
+    const still = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 5;
+    if (!still || !document.body.classList.contains("seated")) return;
+    const box = place.getBoundingClientRect();
+    eye.setFromCamera(new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2), camera);
+    const targets = [[robotId, robot.solid], ...[...pieces, ...people].map(([id, made]) => [id, made.solid])].filter(([, solid]) => solid);
+    const hit = eye.intersectObjects(targets.map(([, solid]) => solid), true)[0];
+    if (!hit) return;
+    const id = targets.find(([, solid]) => solid === hit.object || solid === hit.object.parent)?.[0];
+    if (id) order({ do: event.shiftKey || document.body.classList.contains("pointing") ? "point" : "look", target: id });
+  });
   const robot = makeRobot(scene);
   let dark = null;
   return {
     take(state, changed) {
       if (!changed.has("scene")) return;
       const { body, things } = state.scene;
+      robotId = state.robot;
       keep(pieces, things, (thing) => makePiece(scene, thing), (made, thing) => made.put(thing, body));
       keep(people, state.scene.people.filter((each) => each.at && each.present), (person) => makePerson(scene, person),
         (made, person) => made.put(person, placeOf(state.scene),
@@ -144,6 +160,7 @@ function makePiece(scene, thing) {
   scene.add(mesh);
   let drawnAs = "";
   return {
+    solid: thing.kind === "object" ? mesh : null,
     put(now, body) {
       const height = isTable ? 0.03 : 0.014;
       const key = JSON.stringify([now.outline, now.at]);
@@ -265,6 +282,7 @@ function makeRobot(scene) {
   }]));
   const all = [trunk.mesh, base.mesh, neck.mesh, bar.mesh, head.group];
   return {
+    solid: head.group,
     put(body, placeOf) {
       const eyes = body?.eyes ? vector(body.eyes) : null;
       for (const each of all) each.visible = Boolean(eyes);
@@ -319,6 +337,7 @@ function makePerson(scene, person) {
   const name = tag(person.id, "person");
   scene.add(name);
   return {
+    solid: head.group,
     put(now, placeOf, hands) {
       const at = vector(now.at);
       const target = now.looks?.length ? placeOf(now.looks[0]) : null;

@@ -10,6 +10,8 @@ const MAIN = [
   ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0"></div>`],
 ];
 const SIDE = [
+  ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
+  ["wizard", "The robot by hand", `<div class="wizard"></div>`],
   ["said", "Words", `<ol class="words" role="log" aria-live="polite" tabindex="0"></ol>`],
   ["head", "Who owns the head", `<div class="head"></div>`],
   ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="reasons"></p>`],
