@@ -6,6 +6,7 @@ Each browser gets a frame, draws it, says so, and gets the next one: a slow one 
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from itertools import count
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body import Capabilities, DescribeBody
@@ -46,6 +47,7 @@ class Window:
         self.picture = Picture(bus.robot, bus.now())
         self.viewers = 0
         self._here: set[str] = set()
+        self._numbers = count(1)
 
     def __call__(self, message: Message, at: Seconds) -> None:
         """Take a message. at: its local instant."""
@@ -55,6 +57,10 @@ class Window:
             case PeerGone(participant=name):
                 self._here.discard(name)
         self.picture.feed(message, at, self.bus.now())
+
+    def new_id(self) -> str:
+        """Make an id for a fragment that somebody makes at the page."""
+        return f"by-hand-{self.bus.run[:4]}-{next(self._numbers)}"
 
     def log(self, text: str) -> None:
         """Write what somebody has ordered to the log, and show it to all who look."""

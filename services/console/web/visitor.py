@@ -12,6 +12,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.perceive import perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson
 from engage_hri.services.console.web import orders, script
@@ -177,7 +178,8 @@ class Visitor:
         if isinstance(thing, Block):
             await self._window.robot.realize(thing, timeout=PATIENCE)
             return
-        outcome = await self._window.robot.perform(thing, timeout=PATIENCE)
+        fragment = fragment_in(thing, self._window.new_id())
+        outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
         if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
             self._told.append("; ".join(problems))
 

@@ -3,7 +3,8 @@ import { drawn, element, seconds } from "./look.js";
 
 const COLUMN = 46;
 const ROW = 34;
-const LEFT = 132;
+const NAMES = 138;
+const LEFT = 34; // with the tokens at rest
 const TOP = 40;
 const WAY = 320; // ms that a token is shown on its way
 
@@ -70,20 +71,24 @@ function draw(place, layout) {
   const width = LEFT + layout.instants.length * COLUMN + 30;
   const height = TOP + layout.rows.length * ROW + 10;
   const svg = drawn("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img" });
+  const names = drawn("svg", { class: "names", viewBox: `0 0 ${NAMES} ${height}`, width: NAMES, height, "aria-hidden": "true" });
   const across = (column) => LEFT + column * COLUMN + 20;
   const down = (row) => TOP + row * ROW + ROW / 2;
   layout.rows.forEach((row, index) => {
     if (index % 2) svg.append(drawn("rect", { class: "stripe", x: 0, y: TOP + index * ROW, width, height: ROW }));
-    svg.append(drawn("text", { class: row.tie ? "tie" : "name", x: 4, y: down(index) + 4 }, row.name));
+    if (index % 2) names.append(drawn("rect", { class: "stripe", x: 0, y: TOP + index * ROW, width: NAMES, height: ROW }));
+    names.append(drawn("text", { class: row.tie ? "tie" : "name", x: 4, y: down(index) + 4 }, drawn("title", {}, row.name), short(row.name)));
   });
   const arcs = svg.appendChild(drawn("g", { class: "arcs" }));
   const bars = layout.instants.map((instant, number) => bar(svg, instant, number, across, down));
   for (const row of layout.rows.keys()) labels(svg, layout.rows[row], row, across, down);
   const spots = layout.places.map((spot) => circle(svg, arcs, spot, across, down));
   const dots = svg.appendChild(drawn("g", { class: "tokens" }));
-  place.replaceChildren(svg);
+  place.replaceChildren(names, svg);
   return { layout, mark: marking(place, svg, layout, spots, bars, dots, across) };
 }
+
+const short = (name) => (name.length > 21 ? `${name.slice(0, 20)}…` : name);
 
 function bar(svg, instant, number, across, down) {
   const [first, last] = instant.rows;
@@ -154,7 +159,7 @@ function travel(dots, bar, spots, came, went, column, token) {
 // Keep what fires in sight.
 function follow(place, across, layout, newly) {
   const x = Math.max(...newly.map((number) => across(layout.instants[number].column)));
-  if (x < place.scrollLeft + LEFT || x > place.scrollLeft + place.clientWidth - 120) {
+  if (x < place.scrollLeft + 20 || x > place.scrollLeft + place.clientWidth - NAMES - 100) {
     place.scrollTo({ left: Math.max(0, x - place.clientWidth * 0.4), behavior: "smooth" });
   }
 }

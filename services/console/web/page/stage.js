@@ -8,6 +8,8 @@ const MAIN = [
   ["events", "Connection events", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["behaviors", "Behaviors: planned and measured", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0"></div>`],
+  ["references", "References", `<div class="references"></div>`],
+  ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" tabindex="0"></ul>`],
 ];
 const SIDE = [
   ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
@@ -15,9 +17,7 @@ const SIDE = [
   ["said", "Words", `<ol class="words" role="log" aria-live="polite" tabindex="0"></ol>`],
   ["head", "Who owns the head", `<div class="head"></div>`],
   ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="reasons"></p>`],
-  ["references", "References", `<div class="references"></div>`],
   ["health", "Services", `<ul class="health"></ul>`],
-  ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" tabindex="0"></ul>`],
 ];
 
 const panels = (all) => all.map(([id, title, inside]) => `<section id="${id}" aria-labelledby="${id}-title">
