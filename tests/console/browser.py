@@ -3,6 +3,7 @@
 import asyncio
 import base64
 import json
+import re
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -47,12 +48,12 @@ class Page:
                 case "Runtime.consoleAPICalled" if told["params"]["type"] == "error":
                     self.errors.append(str(told["params"]["args"])[:600])
 
-    async def call(self, method: str, **params: Any) -> dict[str, Any]:
+    async def call(self, method: str, patience: float = 30.0, **params: Any) -> dict[str, Any]:
         """Call a method of the protocol; returns its result. Raises RuntimeError where the browser refuses."""
         number = next(self._numbers)
         self._answers[number] = answer = asyncio.get_running_loop().create_future()
         await self._socket.send_json({"id": number, "method": method, "params": params})
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(patience):
             told = await answer
         if "error" in told:
             raise RuntimeError(f"{method}: {told['error']}")
@@ -63,22 +64,27 @@ class Page:
         """Load a page, and wait for nothing."""
         await self.call("Page.navigate", url=url)
 
-    async def value(self, script: str) -> Any:
+    async def value(self, script: str, patience: float = 30.0) -> Any:
         """The value of a JavaScript expression; a promise is awaited."""
-        result = await self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        asked = {"expression": script, "returnByValue": True, "awaitPromise": True}
+        result = await self.call("Runtime.evaluate", patience, **asked)
         if "exceptionDetails" in result:
             raise RuntimeError(f"{script}: {result['exceptionDetails']}")
         return result["result"].get("value")
 
     async def until(self, script: str, seconds: float = 20.0) -> Any:
-        """Wait for a JavaScript expression to be true; returns its value. Raises TimeoutError, with the expression."""
+        """Wait until a JavaScript expression is true; returns its value. Raises TimeoutError, with the expression."""
+        looking = (
+            "new Promise((done) => { const look = () => { let is; try { is = (%s); } catch { is = null; } "
+            "if (is) done(is); else setTimeout(look, 40); }; look(); })"
+        )
         try:
             async with asyncio.timeout(seconds):
-                while not (value := await self.value(script)):
-                    await asyncio.sleep(0.05)
+                while True:
+                    with suppress(RuntimeError):  # the page went away beneath it
+                        return await self.value(looking % script, seconds)
         except TimeoutError as error:
             raise TimeoutError(f"not within {seconds} s: {script}; errors: {self.errors}") from error
-        return value
 
     async def look(self, width: int, height: int, *, dark: bool = False) -> None:
         """Take the size of a screen, and its colours."""
@@ -88,10 +94,10 @@ class Page:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         await self.call("Emulation.setEmulatedMedia", features=[scheme])
 
-    async def picture(self, path: Path, *, whole: bool = True) -> None:
-        """Write a PNG of the page as it is. whole: also what one has to scroll to."""
+    async def picture(self, *, whole: bool = True) -> bytes:
+        """A PNG of the page as it is. whole: also what one has to scroll to."""
         shot = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
-        path.write_bytes(base64.b64decode(shot["data"]))
+        return base64.b64decode(shot["data"])
 
 
 class Browser:
@@ -125,16 +131,27 @@ async def chromium(folder: Path) -> AsyncIterator[Browser]:
     assert CHROMIUM is not None
     process = await asyncio.create_subprocess_exec(
         CHROMIUM, *FLAGS, f"--user-data-dir={folder}", "about:blank",
-        stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
     )  # fmt: skip
+    assert process.stderr is not None
+    listening: asyncio.Task[None] | None = None
     try:
-        told = folder / "DevToolsActivePort"
         async with asyncio.timeout(30):
-            while not (told.is_file() and told.read_text().strip()):
-                await asyncio.sleep(0.05)
-        port = int(told.read_text().splitlines()[0])
+            while not (
+                found := re.search(rb"DevTools listening on ws://[^:]+:(\d+)/", await process.stderr.readline())
+            ):
+                pass
+        listening = asyncio.create_task(_read_on(process.stderr))
         async with aiohttp.ClientSession() as session:
-            yield Browser(session, port)
+            yield Browser(session, int(found[1]))
     finally:
+        if listening is not None:
+            listening.cancel()
         process.terminate()
         await process.wait()
+
+
+async def _read_on(stream: asyncio.StreamReader) -> None:
+    """Read what the browser says, so that it is not kept waiting by a full pipe."""
+    while await stream.read(2**16):
+        pass

@@ -10,7 +10,7 @@ from engage_hri.services.console.web.sections import Level, MeasuresSection, Per
 KEPT = 600
 """Values of a course that are kept."""
 APART: Seconds = 0.5
-"""Least time between two values of a course; the newest is always there."""
+"""Time of which a course keeps two values at most; the newest is always there."""
 Course = deque[tuple[Seconds, float]]
 
 
