@@ -25,7 +25,7 @@ class Heard:
             del self._words[id]
 
     def joined(self, said: list[Utterance]) -> list[Utterance]:
-        """What is said, by beginnings, with the words of people in it. said: without them."""
+        """All that is said, by beginnings, with the words of people in it. said: without them."""
         left = [words for words in self._words.values() if words.words]
         found = []
         for each in said:

@@ -1,4 +1,4 @@
-"""What people and the robot do, told by events and, for who comes late, by what goes on. Pure."""
+"""Actions of people and the robot for a window that comes late: events told of them before it was there. Pure."""
 
 from msgspec.structs import replace
 

@@ -91,7 +91,7 @@ class Picture:
 
     @property
     def body(self) -> Capabilities | None:
-        """What the body said of itself; None: nothing yet."""
+        """The body as it described itself; None: not yet."""
         return self._body
 
     def zero(self, at: Seconds) -> Seconds:

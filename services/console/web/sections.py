@@ -72,7 +72,7 @@ class Body(Struct, frozen=True):
 
 
 class SceneSection(Struct, frozen=True):
-    """What is there. robot: its actor id. body: None: nothing is known of it yet."""
+    """Scene in space. robot: its actor id. body: None: nothing is known of it yet."""
 
     robot: str
     body: Body | None
@@ -255,7 +255,7 @@ class Note(Struct, frozen=True):
 
 
 class Switched(Struct, frozen=True):
-    """What is held, and which faults of the body are on, in words. kinds: of these faults."""
+    """Holds, and faults of the body that are on, in words. kinds: of these faults."""
 
     held: tuple[str, ...]
     faults: tuple[str, ...]

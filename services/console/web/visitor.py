@@ -1,4 +1,4 @@
-"""Somebody at a browser: carries out what they order, and remembers who they are."""
+"""Visitors: each is somebody at a browser, whose orders are carried out here."""
 
 import asyncio
 from collections import deque
@@ -54,7 +54,7 @@ class Visitor:
         )
 
     def told(self) -> tuple[str, ...]:
-        """What became of the orders since this was asked last."""
+        """News of the orders since this was asked last."""
         news = tuple(self._told)
         self._told.clear()
         return news
