@@ -48,7 +48,8 @@ def test_an_order_is_read(text: str, order: AnyOrder) -> None:
 @pytest.mark.parametrize(
     "text",
     ["", "{}", '{"do": "fly"}', '{"do": "move", "thing": "a", "x": 1e9, "y": 0}', '{"do": "type", "text": ""}',
-     "[" * 9999, '{"do": "speak"}', '{"do": "prepared", "number": -1}', '{"do": "tell", "text": "' + "a" * 5000 + '"}'],
+     "[" * 9999, '{"do": "speak"}',
+     '{"do": "prepared", "number": -1}', '{"do": "tell", "text": "' + "a" * 5000 + '"}'],
 )  # fmt: skip
 def test_what_is_no_order_is_refused_with_a_reason(text: str) -> None:
     with pytest.raises(InputRefused) as error:
