@@ -100,7 +100,7 @@ class Changes:
 
     def change(self, event: dict[str, Any]) -> None:
         if event["state"] in ("started", "succeeded"):
-            self.open[event["id"]] = event
+            self.open[event["id"]] = {key: value for key, value in event.items() if key != "retold"}
         else:
             self.open.pop(event["id"], None)
         self.tell(event)
@@ -182,7 +182,10 @@ def tell_event(event: dict[str, Any]) -> None:
     """Fields at their default are left out: a delay that is not known, objects if there are none."""
     about = f" about {', '.join(event['objects'])}" if "objects" in event else ""
     delay = f" after {event['delay']:.2f} s" if "delay" in event else ""
-    print(f"{event['id']}: {event['kind']} of {event['initiator']}{about}: {event['state']}{delay}", flush=True)
+    words = f': "{event["words"]}"' if "words" in event else ""  # of the person; told again when they become known
+    print(
+        f"{event['id']}: {event['kind']} of {event['initiator']}{about}: {event['state']}{delay}{words}", flush=True
+    )
 
 
 def tell_statistics(statistics: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.behaviors import Behavior, Event, Head, Reference, Speech, Wait
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.fragments import LONGEST_WITHIN, TurnFragment
 from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, is_sync_point
@@ -74,6 +74,9 @@ def _fault(thing: Input, problem: Problem, source: str, prefix: str, paths: bool
 def problems(thing: Input) -> Iterator[Problem]:
     """Find all problems: of ids first, then of each behavior, then of references."""
     yield from _ids(thing)
+    if isinstance(thing, TurnFragment) and thing.within is not None and not 0 < thing.within <= LONGEST_WITHIN:
+        advice = f"seconds, more than 0 and at most {LONGEST_WITHIN:g}"
+        yield Problem(f"within is {thing.within:g}", "$.within", "", thing.line, advice)
     for index, behavior in enumerate(thing.behaviors):
         yield from _behavior(behavior, f"$.behaviors[{index}]")
     yield from _references(thing)

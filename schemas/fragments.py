@@ -9,10 +9,14 @@ from engage_hri.schemas.blocks import SpokenText, Unread
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.requests import Outcome, Request
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 TurnStatus = Literal["beginning", "middle", "end", "full", "backchannel"]
 GestureChoice = Literal["none", "gaze", "directed_gaze", "directed_gaze_with_pointing"]
+
+
+LONGEST_WITHIN: Seconds = 120.0
+"""Longest time that a fragment may give for its answer."""
 
 
 class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defaults=True):
@@ -28,6 +32,7 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     delay: hold the turn after this fragment while the manager thinks, with the eyes on `delay_target`.
     delay_target: id of an entity; empty: a surface, away from the face.
     accept: the actions that answer the adjacency pair of this turn; empty: recognition's default.
+    within: seconds that its answer may take, from the end of the turn; None: recognition's default.
     line: of its XML source, from 1; 0 when there is none.
     """
 
@@ -40,6 +45,7 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     delay: bool = False
     delay_target: str = ""
     accept: tuple[Action, ...] = ()
+    within: Seconds | None = None
     unread: tuple[Unread, ...] = ()
     """Parts of the document that were left out. The realizer warns of each when the block of the fragment begins."""
     from_parts: bool = False
@@ -93,6 +99,20 @@ class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
     pairs: tuple[PairConsidered, ...] = ()
 
 
+class HeardText(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Words of a person, as they were understood for good.
+
+    actor: who said them. id: of the `Utterance`. began: when they began to say it. to: ids of those to whom it was
+    said, if that is known.
+    """
+
+    actor: str
+    id: str
+    text: str
+    began: Stamp
+    to: tuple[str, ...] = ()
+
+
 class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
     """evt: generation -> requester: the end of a fragment: its block has ended and its gazes are decided.
 
@@ -109,6 +129,8 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
     replaced_by: str = ""
     events: tuple[ConnectionEvent, ...] = ()
     """Each connection event of the turn in its last known state, by start."""
+    heard: tuple[HeardText, ...] = ()
+    """What people have said since the turn before was over, by start."""
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
     fault: Fault | None = None
@@ -131,3 +153,5 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
     """The words said in all its fragments, in order; speeches are named `fragment:behavior`."""
     events: tuple[ConnectionEvent, ...] = ()
     """Each connection event of the turn in its last known state, by start."""
+    heard: tuple[HeardText, ...] = ()
+    """What people have said since the turn before was over, its answer among it, by start."""

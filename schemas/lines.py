@@ -17,12 +17,14 @@ from engage_hri.schemas.feedback import Feedback
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Stamp
 
 LineMessage = (
     ConnectionEvent
     | Statistics
+    | Utterance
     | Feedback
     | HeadOwner
     | Held

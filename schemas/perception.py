@@ -48,7 +48,7 @@ class Utterance(Struct, frozen=True, kw_only=True, tag="utterance", omit_default
     actor: who says it. id: the same for all results of one utterance of this person, and never used again.
     text: all of it so far; empty: words will follow. final: False: a partial result, which the next may change.
     began: when they began to say it; of a typed line the same as `at`. ended: when they had said it; None: by `at`.
-    at: when this much was known. to: ids of those to whom it was said, if perception knows.
+    at: when this much was known. to: ids of those to whom it was said, if perception knows. confidence: in the words.
     """
 
     actor: str

@@ -63,6 +63,10 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     behavior: str = ""
     """The event behavior of that block."""
     turn: str = ""
+    words: str = ""
+    """Words of the person that opened or answered the event, as far as they are known."""
+    retold: bool = False
+    """True: the event itself was told before; only `words` have become known since then, or were corrected."""
 
     def person(self, robot: str) -> str:
         """Actor id of the person who takes part in it. robot: the robot's own actor id."""

@@ -1,6 +1,7 @@
 """Summary of performed fragments in a few hundred characters, for a language model: as `json` or `text`."""
 
 from collections.abc import Iterable
+from itertools import groupby
 from typing import Literal
 
 import msgspec
@@ -8,13 +9,15 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
+from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, HeardText, ReferenceChoice
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
 
 LONGEST_PROBLEM = 160
 MOST_PROBLEMS = 4
+MOST_HEARD = 16
+"""Utterances that are told, the newest."""
 ROUNDING = 2
 """Decimals of seconds."""
 _BY: dict[GestureChoice, str] = {
@@ -38,6 +41,14 @@ class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Time until the person looked there."""
 
 
+class HeardWords(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Words that somebody said. to: ids of those to whom they were said, if that is known."""
+
+    who: str
+    text: str
+    to: tuple[str, ...] = ()
+
+
 class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Result of a fragment or a turn, short enough for a language model.
 
@@ -46,6 +57,8 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     eye_contact: the person returned the look at the end of the turn; absent: the turn goes on.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
     absent: the turn expects none.
+    answered_by: id of the person who answered.
+    heard: what people have said during and after the turn, and before it since the last, in order.
     problems: what went wrong, in words.
     """
 
@@ -58,6 +71,8 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     answer: Action | Literal["none", "pending"] | None = None
     answer_delay: Seconds | None = None
     """Time from the end of the turn to the answer; negative for an earlier answer."""
+    answered_by: str = ""
+    heard: tuple[HeardWords, ...] = ()
     problems: tuple[str, ...] = ()
 
     @property
@@ -100,6 +115,8 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         eye_contact=_decision(contact),
         answer=_answer(pair, is_over=status != "done"),
         answer_delay=_rounded(pair.delay) if pair and _decision(pair) else None,
+        answered_by=pair.responder if pair and _decision(pair) else "",
+        heard=_heard(text for outcome in outcomes for text in outcome.heard),
         problems=_problems(
             text
             for outcome in outcomes
@@ -150,6 +167,13 @@ def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal[
     return (pair.response if _decision(pair) else None) or "none"
 
 
+def _heard(texts: Iterable[HeardText]) -> tuple[HeardWords, ...]:
+    """Words in order; fragments of one turn tell some of them again."""
+    newest = {(each.actor, each.id): each for each in texts}
+    said = sorted(newest.values(), key=lambda each: (each.began.seconds, each.actor, each.id))
+    return tuple(HeardWords(who=each.actor, text=each.text, to=each.to) for each in said[-MOST_HEARD:])
+
+
 def _problems(texts: Iterable[str]) -> tuple[str, ...]:
     told = tuple(dict.fromkeys(map(_shortened, texts)))
     left = len(told) - MOST_PROBLEMS
@@ -184,7 +208,9 @@ def _sentences(it: Summary) -> Iterable[str]:
         case "none":
             yield "No answer came."
         case str() as action:
-            yield f"Answered by: {action}, after {it.answer_delay or 0.0:g} s."
+            yield f"Answered by {it.answered_by}: {action}, after {it.answer_delay or 0.0:g} s."
+    for who, said in groupby(it.heard, key=lambda each: each.who):
+        yield f'Heard from {who}: "{" ".join(each.text for each in said)}"'
     if it.problems:
         yield f"Problems: {'; '.join(it.problems)}."
 

@@ -119,6 +119,13 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
     addressee: Annotated[
         str, Meta(description="Id of the person to speak to; left out or empty if there is only one.")
     ] = ""
+    within: Annotated[
+        Literal[0, 3, 6, 10, 20, 30, 60],
+        Meta(
+            description="Seconds that the person has to answer, if not as usual (1.5 for a reply, 8 for an action): "
+            "6 for a question to think about. 0, or left out: as usual."
+        ),
+    ] = 0
 
 
 Schema = dict[str, Any]

@@ -87,6 +87,7 @@ def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment
         addressee=turn.addressee,
         delay=turn.thinking and turn.turn_status in ("beginning", "middle"),
         accept=ANSWERS[turn.expects],
+        within=turn.within or None,
     )
 
 

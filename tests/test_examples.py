@@ -44,6 +44,21 @@ async def test_a_streaming_model_learns_that_nobody_looked_and_makes_itself_clea
     assert all(len(line) < 500 for line in printed.splitlines())
 
 
+async def test_a_model_that_listens_acts_on_what_it_heard(capsys: pytest.CaptureFixture[str]) -> None:
+    listening = example("listening_model")
+    async with listening.embedded() as robot:
+        choice, corrected, agreed, last = await listening.converse(robot)
+
+    assert [each.heard[0].text for each in (choice, corrected, agreed)] == list(listening.ANSWERS)
+    assert {each.answered_by for each in (choice, corrected, agreed)} == {"ann"}
+    assert [each.references[0].object for each in (corrected, agreed, last)] == [
+        "red-square", "blue-square", "blue-square",
+    ]  # fmt: skip
+    assert not last.heard
+    assert {each.status for each in (choice, corrected, agreed, last)} == {"done"}
+    assert capsys.readouterr().out.count("model:  ") == 4
+
+
 def test_what_the_page_on_language_models_shows_is_so() -> None:
     page = (ROOT / "docs" / "language-models.md").read_text()
     call, result = re.findall("```json\n(.*?)```", page, re.DOTALL)

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
@@ -27,9 +28,11 @@ class Link:
         self.now, self.here = 0.0, True
         self.lives, self.ids = count(1), count(1)
         self.ours = EventStream(0.0, partial(Stamp, "loop"))
-        self.told: list[tuple[str, str]] = []
-        self.plainly_told: list[tuple[str, str]] = []
-        self.plain = plain.Changes(lambda event: self.plainly_told.append((event["id"], event["state"])))
+        self.told: list[tuple[str, str, str]] = []
+        self.plainly_told: list[tuple[str, str, str]] = []
+        self.plain = plain.Changes(
+            lambda event: self.plainly_told.append((event["id"], event["state"], event.get("words", "")))
+        )
         self.open: dict[int, tuple[str, list[str]]] = {}
         self.start()
         self.join()
@@ -42,6 +45,8 @@ class Link:
         self.published: list[tuple[float, int, ConnectionEvent | OpenEvents]] = []
         self.missed: list[ConnectionEvent | OpenEvents] = []
         self.open.clear()
+        self.last: dict[int, ConnectionEvent] = {}
+        """Last event of each slot, as it was told."""
 
     def step(self, slot: int, late: bool = False) -> None:
         """The event of this slot goes on: the even ones are ann's, the odd ones bob's.
@@ -50,13 +55,24 @@ class Link:
         """
         late = late and not self.missed and self.life == self.plain.life
         id, states = self.open.get(slot) or (f"{self.life}-dg-{next(self.ids)}", list(COURSES[slot // 2 % 2]))
+        known = self.last.get(slot) if slot in self.open else None
         event = ConnectionEvent(
             id=id, kind="directed_gaze", initiator="robot", responder=("ann", "bob")[slot % 2], state=states[0],  # type: ignore[arg-type]
-            at=Stamp("loop", self.now), started=Stamp("loop", 0.0),
+            at=Stamp("loop", self.now), started=Stamp("loop", 0.0), words=known.words if known else "",
         )  # fmt: skip
         self.open[slot] = (id, states[1:])
         if event.state in ENDINGS:
             del self.open[slot]
+        self._tell(slot, event, late)
+
+    def words(self, slot: int) -> None:
+        """The words of this slot's last event become known, or others than before."""
+        if slot in self.last:
+            words = f"words {next(self.ids)}"
+            self._tell(slot, replace(self.last[slot], words=words, retold=True, at=Stamp("loop", self.now)))
+
+    def _tell(self, slot: int, event: ConnectionEvent, late: bool = False) -> None:
+        self.last[slot] = event
         for message in (event, *self.book.feed([event], event.at)):
             self.published.append((self.now, next(self.stamps), message))
             if not (self.here or late):
@@ -101,8 +117,8 @@ class Link:
         self.start()
 
 
-def heard(events: list[ConnectionEvent]) -> list[tuple[str, str]]:
-    return [(event.id, event.state) for event in events]
+def heard(events: list[ConnectionEvent]) -> list[tuple[str, str, str]]:
+    return [(event.id, event.state, event.words) for event in events]
 
 
 def news(at: float, stamp: int, message: ConnectionEvent | OpenEvents) -> Any:
@@ -113,6 +129,7 @@ def news(at: float, stamp: int, message: ConnectionEvent | OpenEvents) -> Any:
 STEP = st.tuples(st.just("step"), st.integers(0, 3), st.booleans())
 STEPS = st.one_of(
     STEP, STEP, STEP, STEP,
+    st.tuples(st.just("words"), st.integers(0, 3)),
     st.tuples(st.just("wait"), st.sampled_from([0.5, 1.0, 5.0])),
     st.tuples(st.just("cut")),
     st.tuples(st.just("join"), st.booleans()),
@@ -148,8 +165,9 @@ def test_of_a_cut_longer_than_it_asks_for_it_tells_what_is_still_open_and_what_i
     link.join(age=60.0)
 
     first, second = "life1-dg-1", "life1-dg-2"
-    assert link.plainly_told[:before] == [(first, "started"), (second, "started"), (first, "lost"), (second, "lost")]
-    assert set(link.plainly_told[before:]) == {
+    told = [event[:2] for event in link.plainly_told]
+    assert told[:before] == [(first, "started"), (second, "started"), (first, "lost"), (second, "lost")]
+    assert set(told[before:]) == {
         (first, "started"), (second, "started"), (first, "succeeded"), (second, "lost"),
         ("life1-dg-3", "started"), ("life1-dg-4", "started"),
     }  # fmt: skip

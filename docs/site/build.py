@@ -21,7 +21,7 @@ OUT = ROOT / "build" / "docs"
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "tests/README.md")
 CONTENTS = {
     "Using it": ("commands", "configuration", "deploy", "security", "faults", "scenario", "study", "language-models"),
-    "From other programs": ("reference", "connection-events", "protocol", "messages", "bml", "vocabulary"),
+    "From other programs": ("reference", "people", "connection-events", "protocol", "messages", "bml", "vocabulary"),
     "How it works": (
         "architecture",
         "generation",

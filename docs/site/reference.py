@@ -27,6 +27,7 @@ the bus, and stands on the page of [messages](messages.md).
 SECTIONS = {
     "Driving a robot": ("connect", "Robot"),
     "What you give it": ("TurnFragment", "Reference", "SpeechOption", "Speech", "Gaze", "Pointing", "Head", "Block"),
+    "Telling of people": ("perceive", "PerceivedPerson", "Utterance"),
     "What comes back": ("FragmentOutcome", "ConnectionEvent", "Statistics", "World", "Entity"),
     "Language models": ("perform_call", "stream", "tool_definition", "summary", "Summary"),
     "Writing a body": ("Body", "OrdinaryBody", "MovementAuthority", "Arrived", "Reached", "JointLimit", "Ray"),

@@ -88,7 +88,7 @@ class EventStream:
 
     def _change(self, event: ConnectionEvent) -> list[ConnectionEvent]:
         known = self.open.get(event.id) or self._ended.get(event.id)
-        if (self._kinds and event.kind not in self._kinds) or (known and _progress(known) >= _progress(event)):
+        if (self._kinds and event.kind not in self._kinds) or (known and not _is_news(event, known)):
             return []
         if event.state in ENDINGS:
             self.open.pop(event.id, None)
@@ -105,6 +105,13 @@ class EventStream:
 
 def _is_with(person: str, event: ConnectionEvent) -> bool:
     return person in (event.initiator, event.responder)
+
+
+def _is_news(event: ConnectionEvent, known: ConnectionEvent) -> bool:
+    """Tell whether a change is later in the event's life than what is known, or has other words in the same place."""
+    if _progress(event) == _progress(known):
+        return event.words != known.words and (event.retold or bool(event.words))
+    return _progress(event) > _progress(known)
 
 
 def _progress(event: ConnectionEvent) -> int:

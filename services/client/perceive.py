@@ -76,7 +76,7 @@ async def perceive(
         inbox = stack.enter_context(bus.subscribe(bus_keys.ANY_ALIVE, bus_keys.WORLD))
         bus.declare_alive()
         await _robot_there(bus, inbox, told, timeout)
-        told.enter(position)
+        told._enter(position)
         listening = asyncio.create_task(_listen(bus, inbox, told), name=f"world around {person}")
         try:
             yield told
@@ -84,8 +84,8 @@ async def perceive(
             listening.cancel()
             await asyncio.gather(listening, return_exceptions=True)
             while len(inbox):  # what others have said of the world is not to be said again as it was
-                told.take(await inbox.next())
-            told.leaves()
+                told._take(await inbox.next())
+            told._leaves()
 
 
 async def _opened(
@@ -110,7 +110,7 @@ async def _robot_there(bus: Bus, inbox: Subscription, told: PerceivedPerson, tim
     while not (is_there and told.world):
         received = await inbox.next(deadline)
         if received is not None:
-            told.take(received)
+            told._take(received)
         elif is_there:
             return
         else:
@@ -122,9 +122,9 @@ async def _robot_there(bus: Bus, inbox: Subscription, told: PerceivedPerson, tim
 
 async def _listen(bus: Bus, inbox: Subscription, told: PerceivedPerson) -> None:
     while not inbox.is_over:
-        received = await inbox.next(told.deadline)
+        received = await inbox.next(told._deadline)
         with bus.containing(received or "what is due by now"):
-            told.take(received)
+            told._take(received)
 
 
 def _check_id(person: str, other: str) -> None:

@@ -53,23 +53,27 @@ class PerceivedPerson:
     # -- presence -----------------------------------------------------------------------------------------------
 
     @property
+    def robot(self) -> str:
+        """The robot's actor id: its face, as a target."""
+        return self._bus.robot
+
+    @property
     def world(self) -> tuple[Entity, ...]:
         """All entities that are known now, of whoever told of them."""
         return self._world.entities
 
     async def leave(self) -> None:
-        """Leave: everything that the person does ends. The end of `async with` does this, too."""
-        self.leaves()
+        """Let the person leave, and end everything that the person does. The end of `async with` does this, too."""
+        self._leaves()
 
-    def leaves(self) -> None:
-        """Leave; `perceive` calls this at its end."""
+    def _leaves(self) -> None:
         if self._has_left:
             return
-        self._tell(self._actions.leaves(self._bus.stamp()))
         self._has_left = True
         if self._own:
             self._own.clear()
             self._show()
+        self._tell(self._actions.leaves(self._bus.stamp()))
 
     async def move_to(self, position: Vector) -> None:
         """Move the face to another place.
@@ -102,16 +106,16 @@ class PerceivedPerson:
         self.begin("look")
 
     async def nod(self, seconds: Seconds = GESTURE) -> None:
-        """Nod; returns when it is over.
+        """Let the person nod; returns when it is over.
 
-        seconds: that it takes.
+        seconds: how many it takes.
         """
         await self._do("nod", "", seconds)
 
     async def shake(self, seconds: Seconds = GESTURE) -> None:
         """Shake the head; returns when it is over.
 
-        seconds: that it takes.
+        seconds: how many it takes.
         """
         await self._do("shake", "", seconds)
 
@@ -119,7 +123,7 @@ class PerceivedPerson:
         """Point at an entity; returns when it is over.
 
         target: its id.
-        seconds: for which the arm is there.
+        seconds: for how many the arm is there.
         """
         await self._do("point", target, seconds)
 
@@ -128,7 +132,7 @@ class PerceivedPerson:
 
         target: its id.
         to: place where it is laid, in a straight line, metres; None: it stays where it is.
-        seconds: that it takes.
+        seconds: how many it takes.
         """
         thing = self._entity(target)
         try:
@@ -149,7 +153,7 @@ class PerceivedPerson:
         partial: bool = True,
         delay: Seconds = RECOGNIZING,
     ) -> None:
-        """Speak; returns when the words are known for good.
+        """Say words aloud; returns when they are known for good.
 
         text: the words.
         to: ids of those to whom it is said; empty: unknown.
@@ -161,8 +165,8 @@ class PerceivedPerson:
         duration = speaking_time(text) if seconds is None else seconds
         said = self._utterances.begun(self._bus.stamp(), _ids(to))
         try:
+            self.tell(said)  # first, so that whoever waits for the speech knows that its words will come
             with self._doing("speak"):
-                self.tell(said)
                 pieces = [*partial_texts(text)] if partial else [text]
                 for piece in pieces:
                     await asyncio.sleep(duration / len(pieces))
@@ -262,22 +266,25 @@ class PerceivedPerson:
             self.bring(hand)
 
     def _show(self) -> None:
-        entities = self._world.tell(self._own.values())
+        entities = self._world.tell(self._own.values(), self._bus.now())
         self._bus.publish(keys.WORLD, World(entities=entities, at=self._bus.stamp()))
 
-    def take(self, received: Received | None) -> None:
-        """Take a message about the world or about who is there, or none by `deadline`; `perceive` calls this."""
+    def _take(self, received: Received | None) -> None:
+        """Take a message about the world or about who is there, or none by the deadline; `perceive` calls this."""
         message, source = (received.message, received.source) if received else (None, "")
         if self._world.take(message, source, self._bus.now()) and not self._has_left and self._own:
             self._show()
 
     @property
-    def deadline(self) -> Seconds | None:
-        """Loop time at which `take` has something to do without a message."""
+    def _deadline(self) -> Seconds | None:
+        """Loop time at which `_take` has something to do without a message."""
         return self._world.deadline
 
-    def enter(self, position: Vector | None) -> None:
-        """Come; `perceive` calls this. position: of the face; None: a free seat, unless the world has the person."""
+    def _enter(self, position: Vector | None) -> None:
+        """Let the person come; `perceive` calls this.
+
+        position: of the face; None: a free seat, unless the world has the person.
+        """
         known = self._entity(self.id)
         if position is not None or known is None or known.kind != "person":
             place = position or _free_seat([each.position for each in self._world.entities if each.kind == "person"])

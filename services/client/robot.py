@@ -33,18 +33,18 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.faulting import Faulting
 from engage_hri.services.client.feeds import EventFeed, Feed, NewFeed
+from engage_hri.services.client.hearing import Hearing, NewWords
 from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in
 from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.configuration import bus_config
 
-ANSWER_PATIENCE = 20.0
-"""Seconds after a fragment's end for which `await_answer` waits: longer than recognition waits for an answer."""
+ANSWER_PATIENCE = 40.0
+"""Seconds after a fragment's end for which `await_answer` waits: longer than an answer takes, and its words."""
 
 
-class Robot(Faulting):
+class Robot(Hearing):
     """An engaged robot, as its collaboration manager sees it. Made by `connect` or, in a service, `Robot.on(bus)`.
 
     Errors carry a `fault` that says where and why. Once the client has ended (its `async with` has, or it broke), all
@@ -55,6 +55,7 @@ class Robot(Faulting):
         self._bus = bus
         self._requests = requests
         self._numbers = count(1)
+        self._words = NewWords()
         self._life = bus.new_life()
         """Part of the ids of fragments without one, so that they differ from those of another client or life."""
 
@@ -91,7 +92,8 @@ class Robot(Faulting):
 
         fragment: a `TurnFragment`, the path of a file with EBML or JSON, such a text itself, or JSON as a dict; also
         the tool input of a language model.
-        await_answer: if it ends a turn, return only when that has been answered, or it is too late; `events` tell.
+        await_answer: if it ends a turn, return only when that has been answered, or it is too late; `events` tell,
+            and `heard` has the words.
         timeout: seconds to wait for it to be accepted, for example until generation is there; None: for ever.
 
         Raises:
@@ -103,7 +105,7 @@ class Robot(Faulting):
         request = self._fragment_request(parsed)
         awaits_answer = await_answer and parsed.turn_status in ("end", "full")
         outcome = await (self._answered(request, timeout) if awaits_answer else self._performed(request, timeout))
-        return successful(outcome, parsed.id)
+        return successful(self._with_new_words(outcome), parsed.id)
 
     def begin_to_perform(self, fragment: TurnFragment) -> None:
         """Send a fragment and do not wait for what becomes of it.
@@ -127,11 +129,11 @@ class Robot(Faulting):
         with self.turns() as turns:
             outcome = await self._performed(request, timeout)
             events = {event.id for event in outcome.events}
-            deadline = self.now() + ANSWER_PATIENCE
+            deadline = self.now() + ANSWER_PATIENCE + (request.fragment.within or 0.0)
             while (turn := await turns.next(max(0.0, deadline - self.now()))) is not None:
                 # An earlier turn of the same name, told again, has other events.
                 if request.fragment.id in turn.fragments and events <= {event.id for event in turn.events}:
-                    return replace(outcome, events=turn.events)
+                    return replace(outcome, events=turn.events, heard=turn.heard)
         return outcome
 
     async def realize(

@@ -15,6 +15,8 @@ from engage_hri.schemas.world import Entity, World
 
 GRACE: Seconds = 4.0
 """Time for which what a participant brought stays after it has gone; what it said of people holds as long."""
+ECHO: Seconds = 1.0
+"""Time for which others may still repeat what its owner has taken away."""
 REMEMBERED = 64
 """States of one entity of our own that are remembered, to know them when others repeat them late."""
 
@@ -36,6 +38,10 @@ class SharedWorld:
         """What was last given to `tell`, by id."""
         self._told: dict[str, deque[Entity]] = {}
         """Our own entities as they were told, the newest last."""
+        self._had: dict[str, frozenset[str]] = {}
+        """Ids in the last world of each other participant: what it had and has no more, somebody has taken away."""
+        self._taken_away: dict[str, tuple[str, Seconds]] = {}
+        """Entities that are not there any more: by whom they were taken away, and when."""
         self._gone: dict[str, Seconds] = {}
         """Participants that have gone, and since when."""
         self._last = ""
@@ -50,7 +56,7 @@ class SharedWorld:
         """The entities that others brought or changed last."""
         return tuple(entity for id, entity in self._entities.items() if self._owner[id] != self._name)
 
-    def tell(self, entities: Iterable[Entity]) -> tuple[Entity, ...]:
+    def tell(self, entities: Iterable[Entity], now: Seconds) -> tuple[Entity, ...]:
         """Take all of our own part as it is now. Returns the whole, to be published.
 
         What another has changed since stays as the other has it, until we change it, too.
@@ -66,7 +72,7 @@ class SharedWorld:
             if (owner := self._before.pop(id, "")) and self._owner.get(id) == self._name:
                 self._owner[id] = owner
             elif self._owner.get(id) == self._name:
-                self._drop(id)
+                self._drop(id, now)
         self._given = given
         self._last = self._name
         return self.entities
@@ -81,25 +87,29 @@ class SharedWorld:
             case None:
                 return again
             case World():
-                return self.see(message, source) or again
+                return self.see(message, source, now) or again
         return self.feed(message, now) or again
 
-    def see(self, world: World, source: str) -> bool:
+    def see(self, world: World, source: str, now: Seconds) -> bool:
         """Take a world that another has published. True if it lacks something of ours, and has to be told again."""
         if source == self._name:
             return False
         self._last = source
-        self._gone.pop(source, None)
         seen = {entity.id: entity for entity in world.entities}
-        lacks = False
+        lacks, had = False, self._had.get(source, frozenset())
+        self._had[source] = frozenset(seen)
         for id, entity in tuple(self._entities.items()):
             theirs = seen.get(id)
             if self._owner[id] == self._name:
                 lacks |= theirs is None or (theirs != entity and theirs in self._told.get(id, ()))
-            elif theirs is None and self._owner[id] == source:
-                lacks |= self._let_go(id)
+            elif theirs is None and (self._owner[id] == source or id in had):
+                lacks |= self._let_go(id, now)
+        self._taken_away = {id: taken for id, taken in self._taken_away.items() if now <= taken[1] + ECHO}
         for id, entity in seen.items():
             known = self._entities.get(id)
+            if known is None and self._taken_away.get(id, (source,))[0] != source:
+                lacks |= self._taken_away[id][0] == self._name
+                continue
             is_echo = known is not None and (
                 entity == known or (self._owner[id] == self._name and entity in self._told.get(id, ()))
             )
@@ -126,21 +136,21 @@ class SharedWorld:
         dropped = False
         for name in [name for name, since in self._gone.items() if now >= since + GRACE]:
             del self._gone[name]
+            self._had.pop(name, None)
             for id in [id for id, owner in self._owner.items() if owner == name]:
-                self._let_go(id)
+                self._let_go(id, now)
                 dropped = True
         return dropped
 
-    def _let_go(self, id: str) -> bool:
+    def _let_go(self, id: str, now: Seconds) -> bool:
         """Take what another has left: ours stays where they left it, and theirs is gone. True if it is ours."""
         if id not in self._given:
-            self._drop(id)
+            self._drop(id, now)
             return False
         self._owner[id] = self._name
         self._told.setdefault(id, deque(maxlen=REMEMBERED)).append(self._entities[id])
         return True
 
-    def _drop(self, id: str) -> None:
-        self._entities.pop(id, None)
-        self._owner.pop(id, None)
-        self._told.pop(id, None)
+    def _drop(self, id: str, now: Seconds) -> None:
+        self._taken_away[id] = (self._owner.pop(id), now)
+        del self._entities[id]

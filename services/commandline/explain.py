@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
 from engage_hri.services.commandline.generating import Unplanned, generated
@@ -81,7 +82,9 @@ def show(plans: Sequence[FragmentPlan], console: Console) -> None:
         total = sum(choice.cost for choice in plan.choices)
         count = len(plan.choices)
         made = f"{count} reference{'s' if count != 1 else ''}, {total:.3g} s" if count else "no references"
-        console.print(Text(f"{plan.block.id}: {made}", style="bold"))
+        limits = [each.limit for each in plan.block.behaviors if isinstance(each, Event) and each.limit is not None]
+        answer = "".join(f"; an answer within {limit:g} s" for limit in limits)
+        console.print(Text(f"{plan.block.id}: {made}{answer}", style="bold"))
         for warning in plan.warnings:
             console.print(Text(f"warning: {warning}", style="yellow"))
 

@@ -130,7 +130,7 @@ def main(options: Options) -> int:
         outputs.wanted = played.concerns
         console = outputs.console(quiet=options.quiet)
         warnings = Warnings(Terminal(stderr=True))
-        prose = Prose(console, outputs)
+        prose = Prose(console, outputs, played.words_will_come)
         job = Job(options, sources, times, played, outputs, console, prose, warnings)
         performing = _embedded(job, config, world) if options.embedded else _remote(job, config)
         code = run(performing, virtual_time=options.virtual_time)

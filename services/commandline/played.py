@@ -8,12 +8,15 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.sources import Thing
 from engage_hri.services.console.performed import deeds
 
+WORDS: Seconds = 2.0
+"""Time after an answer in words in which these become known."""
 GRACE: Seconds = 0.5
 """Time after its limit in which the end of an event must arrive."""
 
@@ -41,6 +44,10 @@ class Played:
         self._begun: set[str] = set()
         """Blocks that have begun."""
         self._changed = asyncio.Event()
+        self._utterances: dict[tuple[str, str], bool] = {}
+        """Utterances by person and id, and whether they are known for good."""
+        self._wordless: dict[str, ConnectionEvent] = {}
+        """Answers in words that are over, and of which the words are not known."""
 
     def __call__(self, message: Message, at: Seconds) -> None:
         match message:
@@ -55,11 +62,16 @@ class Played:
                 # A block may end before recognition has said that the event has started.
                 if (block, behavior) in self._announced:
                     self._open.setdefault((block, behavior), None)
+            case Utterance(actor=actor, id=id):
+                self._utterances[actor, id] = message.final or self._utterances.get((actor, id), False)
             case ConnectionEvent(block=block, state="started") if block in self.blocks:
                 self._events.add(message.id)
                 self._open[block, message.behavior] = message
             case ConnectionEvent(id=id) if id in self._events and message.state in ENDINGS:
                 self._open.pop((message.block, message.behavior), None)
+                self._wordless.pop(id, None)
+                if self.words_will_come(message):
+                    self._wordless[id] = message
             case _:
                 return
         self._changed.set()
@@ -102,6 +114,13 @@ class Played:
             except TimeoutError:
                 return
 
+    def words_will_come(self, event: ConnectionEvent) -> bool:
+        """Tell whether an answer will get words, or more of them: somebody tells those of this person."""
+        if event.response != "speak":
+            return False
+        known = [is_final for (actor, _), is_final in self._utterances.items() if actor == event.responder]
+        return bool(known) and not (event.words and all(known))
+
     def _longest_limit(self) -> Seconds | None:
         """Longest limit of the events that are waited for; None if there are none."""
         limits = [
@@ -109,6 +128,7 @@ class Played:
             for event in self._open.values()
             if not (self._holds_turn and event and event.kind == "adjacency_pair")
         ]
+        limits += [WORDS] * any(map(self.words_will_come, self._wordless.values()))
         return max(limits, default=None)
 
     def end_before_turn(self, outcome: FragmentOutcome | BlockOutcome) -> str:

@@ -8,11 +8,13 @@ from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.client.hearing import NewWords
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.console import wording
 
@@ -23,16 +25,30 @@ class Prose:
     Ended fragments wait here for the answer to their turn.
     """
 
-    def __init__(self, console: Console, outputs: Outputs) -> None:
+    def __init__(
+        self, console: Console, outputs: Outputs, words_will_come: Callable[[ConnectionEvent], bool] = lambda _: False
+    ) -> None:
+        """words_will_come: tells whether an event will get words."""
         self._console = console
         self._outputs = outputs
+        self._words_will_come = words_will_come
         self._waiting: list[FragmentOutcome] = []
         self._events: dict[str, ConnectionEvent] = {}
+        self._heard: dict[tuple[str, str], HeardText] = {}
+        """Words that have become known since the last outcome was told."""
+        self._new = NewWords()
 
     def __call__(self, message: Message, at: Seconds) -> None:
-        if isinstance(message, ConnectionEvent):
-            self._events[message.id] = message
-            self._tell_decided()
+        match message:
+            case ConnectionEvent():
+                self._events[message.id] = message
+            case Utterance(final=True):
+                self._heard[message.actor, message.id] = HeardText(
+                    actor=message.actor, id=message.id, text=message.text, began=message.began, to=message.to
+                )
+            case _:
+                return
+        self._tell_decided()
 
     def expect(self, outcome: FragmentOutcome) -> None:
         """Take the outcome of a fragment, to be told now or when its last event is decided."""
@@ -45,14 +61,21 @@ class Prose:
             self._tell(self._waiting.pop(0))
 
     def _tell_decided(self) -> None:
-        while self._waiting and all(event.state != "started" for event in self._now(self._waiting[0]).events):
+        while self._waiting and all(map(self._is_over, self._now(self._waiting[0]).events)):
             self._tell(self._waiting.pop(0))
+
+    def _is_over(self, event: ConnectionEvent) -> bool:
+        """True once an event is decided, and its words are known if there will be some."""
+        return event.state != "started" and not self._words_will_come(event)
 
     def _now(self, outcome: FragmentOutcome) -> FragmentOutcome:
         return replace(outcome, events=tuple(self._events.get(event.id, event) for event in outcome.events))
 
     def _tell(self, outcome: FragmentOutcome) -> None:
-        result = summary(self._now(outcome))
+        now = self._now(outcome)
+        heard = self._new.of(({(each.actor, each.id): each for each in outcome.heard} | self._heard).values())
+        self._heard.clear()
+        result = summary(replace(now, heard=heard))
         self._outputs.outcome(outcome.fragment, result)
         text = f"{outcome.fragment}: {result.text}"
         self._console.print(text, style="bold", markup=False, highlight=False, soft_wrap=True)

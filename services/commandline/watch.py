@@ -15,6 +15,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
@@ -26,10 +27,19 @@ from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import LiveNets, Log, NetLog
 from engage_hri.services.console.log import Telling
 
-OTHERS = (keys.ANY_FEEDBACK, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS, keys.ANY_FAULT)
+OTHERS = (
+    keys.UTTERANCE,
+    keys.ANY_FEEDBACK,
+    keys.HEAD_OWNER,
+    keys.HELD,
+    keys.BODY_HELD,
+    keys.BODY_FAULTS,
+    keys.ANY_FAULT,
+)
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "events": (ConnectionEvent,),
     "statistics": (Statistics,),
+    "words": (Utterance,),
     "feedback": (BlockProgress, SyncPointProgress, WarningFeedback),
     "head": (HeadOwner,),
     "holds": (Held, BodyHeld),
@@ -42,7 +52,9 @@ class Options(Connected):
     json: Annotated[bool, typer.Option("--json", help="JSON lines instead of text.")] = False
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="WHAT", help="events, statistics, feedback, head, holds or faults; may be repeated."),
+        typer.Option(
+            metavar="WHAT", help="events, statistics, words, feedback, head, holds or faults; may be repeated."
+        ),
     ] = None
     net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
     actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
@@ -54,7 +66,7 @@ class Options(Connected):
 class Wanted(NamedTuple):
     """Selection of what to show. Empty fields select all.
 
-    only: subjects. actor: a person, who has only events and statistics. kinds: of connection events.
+    only: subjects. actor: a person, who has only events, statistics and words. kinds: of connection events.
     """
 
     only: tuple[str, ...] = ()
@@ -81,7 +93,7 @@ class Wanted(NamedTuple):
     def subjects(self) -> Collection[str]:
         if self.only:
             return self.only
-        return ("events",) if self.kinds else ("events", "statistics") if self.actor else tuple(SUBJECTS)
+        return ("events",) if self.kinds else ("events", "statistics", "words") if self.actor else tuple(SUBJECTS)
 
     @property
     def patterns(self) -> Collection[str]:
@@ -90,6 +102,8 @@ class Wanted(NamedTuple):
         return (*keys.event_stream(self.actor, self.kinds), keys.statistics(keys.chunk(self.actor)), *OTHERS)
 
     def includes(self, message: Message) -> bool:
+        if isinstance(message, Utterance) and self.actor not in ("", message.actor):
+            return False
         return any(isinstance(message, SUBJECTS[subject]) for subject in self.subjects)
 
 

@@ -20,6 +20,7 @@ FOLLOWED = (
     keys.ANY_FEEDBACK,
     keys.SYNC_POINT,
     keys.ANY_ACTION,
+    keys.UTTERANCE,
     keys.ANY_CONNECTION_EVENT,
     keys.ANY_OPEN_EVENTS,
     keys.ANY_STATISTICS,

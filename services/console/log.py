@@ -11,6 +11,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
@@ -49,10 +50,12 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
     match message:
         case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
             return _action(message, before) if telling.actions else None
+        case Utterance(final=True, text=text, actor=actor) if telling.actions and text:
+            return f'{actor}: "{text}"'
         case SyncPointProgress(block=block) if telling.points and not block.startswith(OWN_BLOCKS):
             planned = "" if message.predicted is None else f" (planned {wording.seconds(message.predicted)})"
             return f"{block}:{message.behavior}:{message.sync} at {wording.seconds(message.time)}{planned}"
-        case ConnectionEvent(state=state) if state != "completed":
+        case ConnectionEvent(state=state) if state != "completed" and not message.retold:
             about = f" about {', '.join(message.objects)}" if message.objects else ""
             kind, decided = wording.KINDS[message.kind], wording.decision(message)
             return f"* {kind}, {message.initiator} → {message.responder}{about} ({message.cause}): {decided}"
@@ -105,9 +108,9 @@ def _action(message: ActionBegan | ActionEnded | ActorFound | ActorLost, before:
         case ActorLost():
             return f"{actor} has left"
         case ActionEnded(action="speak"):
-            # An utterance is told once its last word is out; of people the words are not known.
+            # An utterance of the robot is told once its last word is out; those of people when they are understood.
             for said in reversed(before.said):
-                if said.open and said.actor == actor and said.text:
+                if said.open and said.actor == actor and said.text and said.behavior:
                     return f'{actor}: "{said.text}" (from {wording.clock(said.began - before.began)})'
         case ActionBegan(action="speak") if actor == before.robot:
             return None

@@ -15,6 +15,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
@@ -24,6 +25,8 @@ UTTERANCES_KEPT = 40
 EVENTS_KEPT = 100
 NOTES_KEPT = 3
 ENDED_BLOCKS_KEPT = 2
+SAME_SPEECH: Seconds = 1.0
+"""Greatest distance of the beginnings of a speech and of its words."""
 OWN_BLOCKS = ("maintenance-", "response-")
 """Prefixes of the ids of the gaze arbiter's blocks; the view shows their effect, not their points."""
 
@@ -49,11 +52,12 @@ class Actor(Struct, frozen=True, kw_only=True):
 
 
 class UtteranceInView(Struct, frozen=True, kw_only=True):
-    """Utterance of an actor. text: the words said so far; empty for people."""
+    """Utterance of an actor. text: the words so far; of people as they are understood. id: of the `Utterance`."""
 
     actor: str
     began: Seconds
     behavior: str = ""
+    id: str = ""
     text: str = ""
     open: bool = True
 
@@ -136,6 +140,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return _act(scene, message, at)
         case WordSpoken():
             return _speak(scene, message, at)
+        case Utterance(text=text) if text:
+            return _understand(scene, message, at)
         case BlockProgress(block=str() as block) if not block.startswith(OWN_BLOCKS):
             return _block(scene, message, at)
         case SyncPointProgress(block=block) if not block.startswith(OWN_BLOCKS):
@@ -209,6 +215,19 @@ def _speak(scene: Scene, word: WordSpoken, at: Seconds) -> Scene:
     else:
         said.append(UtteranceInView(actor=scene.robot, behavior=behavior, began=at, text=word.word))
     return replace(scene, said=tuple(said)[-UTTERANCES_KEPT:])
+
+
+def _understand(scene: Scene, utterance: Utterance, at: Seconds) -> Scene:
+    """Put the words of a person where they were said."""
+    began = at - max(0.0, utterance.at.seconds - utterance.began.seconds)
+    new = UtteranceInView(actor=utterance.actor, began=began, id=utterance.id, text=utterance.text, open=False)
+    said = list(scene.said)
+    for index, known in reversed(list(enumerate(said))):
+        is_speech = not known.id and not known.behavior and abs(known.began - began) <= SAME_SPEECH
+        if known.actor == utterance.actor and (is_speech or known.id == utterance.id):
+            said[index] = replace(known, id=utterance.id, text=utterance.text)
+            return replace(scene, said=tuple(said))
+    return replace(scene, said=(*scene.said, new)[-UTTERANCES_KEPT:])
 
 
 def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:

@@ -77,6 +77,11 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     backchannel, as the longest of Table 2.1."""
     decision_patience: Seconds = 8.0
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
+    words_patience: Seconds = 2.0
+    """Seconds after the end of a spoken answer for which the outcome of the turn waits for its words, if somebody
+    tells the words of that person: recognizers know them 0.3 to 2 s after they were said."""
+    longest_answer: Seconds = 15.0
+    """Seconds after the beginning of such an answer for which it waits for the end. Ours."""
     world_patience: Seconds = 5.0
     """Seconds that a fragment waits for a first report of the world, or for a person to speak to. Ours."""
     fragments: int = 200
@@ -153,11 +158,12 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 _POSITIVE = (
-    "turn_silence", "barge_in", "decision_patience", "world_patience", "glance_factor", "mtbce_prior", "mtbce_low",
+    "turn_silence", "barge_in", "decision_patience", "longest_answer", "world_patience", "glance_factor",
+    "mtbce_prior", "mtbce_low",
     "glance_duration", "response_hold", "retry", "fragments", "utterance",
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events", "body_patience", "words_between",
+    "mtbce_events", "body_patience", "words_between", "words_patience",
 )  # fmt: skip

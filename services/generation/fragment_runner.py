@@ -5,6 +5,8 @@ from collections.abc import Callable, Collection, Iterable
 from functools import reduce
 from typing import Literal
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
@@ -13,6 +15,7 @@ from engage_hri.schemas.body import AbortBehavior
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -28,6 +31,7 @@ from engage_hri.services.generation.pipeline import glance, planning, targets
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
+from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
 from engage_hri.services.requests.ends import Pending, RequestDesk, Requester, RequestRefused
 from engage_hri.services.requests.serving import GRACE
@@ -56,7 +60,8 @@ class FragmentRunner:
         self._changed = changed
         self._turns = TurnPolicy(bus.robot, config)
         self._events = TurnEvents()
-        self._outcomes = TurnOutcomes(self._events, config.decision_patience)
+        self._heard = HeardWords()
+        self._outcomes = TurnOutcomes(self._events, self._heard, config)
         self._gazes = GazesOfFragments()
         self._body = BodyLink(bus, config.body_patience)
         self._world: World | None = None
@@ -88,6 +93,7 @@ class FragmentRunner:
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)
         self._events.expect(fragment.id, turn.turn)
+        self._heard.turn_begins(turn.turn, self._bus.now())
         if any(not each.is_over and each.turn.turn != turn.turn for each in self._live.values()):
             self._accept(performance)
         # A fragment that need not wait for another turn is accepted when its block is: then, if the realizer finds
@@ -109,18 +115,22 @@ class FragmentRunner:
         self._abort(aborted, now)
 
     def feed(
-        self, message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress, now: Seconds
+        self,
+        message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress | Utterance,
+        now: Seconds,
     ) -> None:
         match message:
             case World():
                 self._world = message
             case ConnectionEvent():
-                self._events.feed(message)
+                self._events.feed(message, now)
                 self._discourse = self._discourse.hearing(message, self._bus.robot)
             case ActionBegan() | ActionEnded():
                 self._turns.feed(message, now)
             case SyncPointProgress():
                 self._follow(message)
+            case Utterance():
+                self._heard.feed(message, now)
 
     def recognition_gone(self, now: Seconds) -> None:
         """Start the grace after which the open events are lost: recognition may only be cut off."""
@@ -185,11 +195,14 @@ class FragmentRunner:
             elif (outcome := performance.outcome(self._events, now)) is not None:
                 del self._live[performance.request.id]
                 self._outcomes.end(outcome, performance.turn, now)
-                self._desk.end(outcome)
+                self._desk.end(replace(outcome, heard=self._heard.of_turn(performance.turn.turn)))
+                if not performance.turn.backchannel:  # that is said in the other's turn
+                    self._heard.turn_ends(now)
         going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
         for closed in self._outcomes.close_due(going, now):
             self._bus.publish(keys.TURN_CLOSED, closed)
         self._events.forget({*going, *self._outcomes.turns})
+        self._heard.forget({*going, *self._outcomes.turns})
         return refused
 
     def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:

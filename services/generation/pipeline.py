@@ -21,7 +21,7 @@ from engage_hri.services.generation.references.policy import Choices, choice, we
 from engage_hri.services.generation.references.posture import references_apart
 from engage_hri.services.generation.references.sequence import unasked
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
-from engage_hri.services.generation.turns.policy import TurnPlan, vain_delay
+from engage_hri.services.generation.turns.policy import TurnPlan, in_vain
 
 ELEMENTS = 512
 """Elements that the making of phrases counts for, and that of a block (see `runtime.steps`)."""
@@ -81,7 +81,7 @@ def planning(
             chosen = yield from choice(tables, scene, motions, config, apart)
         yield ELEMENTS
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
-    return replace(emitted, warnings=(*vain_delay(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
+    return replace(emitted, warnings=(*in_vain(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 
 def planned(planning: Planning, answers: Callable[[tuple[EstimateItem, ...]], Sequence[Estimate]]) -> FragmentPlan:

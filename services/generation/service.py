@@ -11,6 +11,7 @@ from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
 from engage_hri.schemas.requests import Cancel, Request, Unreadable
@@ -30,7 +31,7 @@ from engage_hri.services.runtime.service import Ready
 NAME = "generation"
 PATTERNS = (
     *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD,
-    keys.ANY_ACTION, keys.ROBOT_STATE, keys.ANY_STATISTICS,
+    keys.ANY_ACTION, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
 )  # fmt: skip
 
 
@@ -98,7 +99,11 @@ class _Generation:
                 self._admit_early(now)
             case ConnectionEvent():
                 self._runner.feed(message, now)
-                self._arbiter.feed(message, now)
+                if not message.retold:
+                    self._arbiter.feed(message, now)
+            case Utterance():
+                if message.actor != self._bus.robot:
+                    self._runner.feed(message, now)
             case ActionBegan() | ActionEnded():
                 self._runner.feed(message, now)
                 if message.actor != self._bus.robot:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import asdict
 
+from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.nets import NetPlanned
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net import pnml
@@ -37,6 +38,9 @@ def as_text(plan: Plan) -> str:
         lines += ["", heading, *ties] if ties else []
     lines += [""] if plan.natural else []
     lines += [f"ends when something takes its place, or with the block: {id}" for id in sorted(plan.natural)]
+    limited = [each for each in plan.block.behaviors if isinstance(each, Event) and each.limit is not None]
+    lines += [""] if limited else []
+    lines += [f"may be answered for {each.limit:g} s: {each.id}" for each in limited]
     return "\n".join(lines) + "\n"
 
 

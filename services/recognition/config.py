@@ -87,6 +87,11 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Time after a robot's directed gaze in which a look at the same object is no direction of its own."""
     least_confidence: Probability = 0.4
     """Least confidence of an observation: a beginning below is ignored, a thing below counts as covered. Ours."""
+    words_margin: Seconds = 0.5
+    """Time by which spoken words may miss the speech that they belong to: recognizers and voice detectors disagree
+    about where speech begins and ends. Ours."""
+    words_patience: Seconds = 10.0
+    """Time after the end of an event for which it is told again, should its words become known or be corrected."""
     sensing: Sensing = Sensing()
     """Settings for raw perception."""
     lost_face_grace: Seconds = 0.5
@@ -126,7 +131,9 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
             "turn_patience", "backchannel_limit", "direct_by_look", "window", "reference_mtbce",
             "longest_speech", "longest_gesture", "longest_manipulation",
         ))  # fmt: skip
-        not_negative(self, ("after_robot_directed", "lost_face_grace", "report_grace", "hysteresis"))
+        not_negative(self, (
+            "after_robot_directed", "lost_face_grace", "report_grace", "hysteresis", "words_margin", "words_patience",
+        ))  # fmt: skip
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
         if not 0 <= self.look_break <= self.sensing.settling:

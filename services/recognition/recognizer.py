@@ -22,8 +22,9 @@ from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mi
 from engage_hri.services.recognition.events.scene import Covered, GoesOn
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
+from engage_hri.services.recognition.perceive.words import HeardWords, Words
 
-Perceived = Observation | HeadPose | VoiceActivity | RobotState
+Perceived = Observation | HeadPose | VoiceActivity | RobotState | HeardWords
 Result = Effect | Symbolic
 """The actions among them were derived from raw perception; the session gets them without another call."""
 
@@ -40,6 +41,7 @@ class Recognizer:
         self._new_attention = partial(Attention, robot, config, clock)
         self._attention = self._new_attention()
         self._interrupted = InterruptedLooks(config.look_break)
+        self._words = Words(config.words_margin, clock)
         self._waiting: list[tuple[Seconds, int, Observation | Covered]] = []
         self._numbers = count()
         self._mishaps: list[Mishap] = []
@@ -78,8 +80,12 @@ class Recognizer:
                 if (covered := self._attention.covered) != self._covered:
                     self._covered = covered
                     self._wait(covered, at)
-            case ActionBegan(confidence=confidence) if confidence < self._config.least_confidence:
+            case ActionBegan(confidence=confidence) | HeardWords(confidence=confidence) if (
+                confidence < self._config.least_confidence
+            ):
                 pass
+            case HeardWords():
+                derived = self._hear(observation, at)
             case GoesOn(began=began) if began.confidence < self._config.least_confidence:
                 pass
             case GoesOn(began=began) if began.actor != self.session.robot:
@@ -114,6 +120,14 @@ class Recognizer:
             self._wait(meaning if told is report else told, when)
         return derived
 
+    def _hear(self, words: HeardWords, at: Seconds) -> list[Symbolic]:
+        """Take words. Returns the speech that they are, if nothing else has told of it."""
+        worded = self._words.hear(words, at)
+        if worded is None:
+            return []
+        self._wait(worded, worded.since if worded.is_alone else at)
+        return [*self._words.speech(words)] if worded.is_alone else []
+
     def _attend(self, derive: Callable[[Attention], list[Symbolic]], at: Seconds) -> list[Symbolic]:
         """Derive actions from raw perception. If that fails, a new `Attention` begins with nothing."""
         try:
@@ -145,10 +159,16 @@ class Recognizer:
         for result in results:
             if isinstance(result, Forgotten):
                 self._interrupted.forget(result.actor)
+                self._words.forget(result.actor)
         mishaps, self._mishaps = self._mishaps, []
         return [*results, *mishaps]
 
     def _wait(self, observation: Observation | Covered, at: Seconds) -> None:
+        match observation:
+            case ActionBegan(actor=actor) | ActionEnded(actor=actor) if actor != self.session.robot:
+                self._words.follow(observation, at)
+            case GoesOn(began=began, since=since) if began.actor != self.session.robot:
+                self._words.follow(began, since)
         heapq.heappush(self._waiting, (at, next(self._numbers), observation))
 
     @property

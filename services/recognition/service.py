@@ -7,7 +7,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
@@ -25,10 +25,11 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.machine import Forgotten, Mishap
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
-from engage_hri.services.recognition.events.scene import GoesOn
+from engage_hri.services.recognition.events.scene import GoesOn, Worded
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.reporters import OLDEST, Reporters
 from engage_hri.services.recognition.perceive.reports import Told
+from engage_hri.services.recognition.perceive.words import HeardWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.requests.ends import RequestDesk
@@ -45,7 +46,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
     """Serve until cancelled. One inbox, so that actions, requests and feedback keep their order."""
     recognition = _Recognition(bus, config)
     patterns = (
-        keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
+        keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
         keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD,
         keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.ROBOT_STATE,
         *RequestDesk.patterns("recognition"),
@@ -107,10 +108,22 @@ class _Recognition:
             self._tell(self._reporters.hear(observation, name, life, now, past=received.past))
         elif isinstance(observation, PeerAlive | PeerGone):
             self._tell(self._reporters.feed(observation, now))
+        elif isinstance(observation, Utterance):
+            self._hear(observation)
         elif isinstance(observation, Perceived):
             fault = self._feed(observation, self._when(observation, received.at))
             if fault is not None and request is not None and self.desk.is_live(request.id):
                 self.desk.refuse(request.id, fault)
+
+    def _hear(self, said: Utterance) -> None:
+        began, at = self._instant(said.began), self._instant(said.at)
+        ended = at if said.ended is None else self._instant(said.ended)
+        self._note_error(said.actor, said.began, began)
+        words = HeardWords(
+            actor=said.actor, id=said.id, text=said.text, began=began, ended=ended, final=said.final,
+            confidence=said.confidence,
+        )  # fmt: skip
+        self._feed(words, at)
 
     def _reporter(self, received: Received) -> tuple[str, str]:
         """Name and life of who tells of actions. The robot's are told by its body, whoever speaks for it."""
@@ -143,7 +156,7 @@ class _Recognition:
             case ActionBegan(actor=actor) | ActionEnded(actor=actor):
                 by_robot = actor == self._bus.robot
                 return self._has_valid_id(actor) and by_robot == (received.key == keys.ROBOT_ACTION)
-            case ActorFound(actor=actor) | ActorLost(actor=actor):
+            case ActorFound(actor=actor) | ActorLost(actor=actor) | Utterance(actor=actor):
                 return self._has_valid_id(actor) and actor != self._bus.robot
             case HeadPose(actor=actor):
                 return actor != self._bus.robot and received.key == keys.head_pose(actor)
@@ -182,7 +195,7 @@ class _Recognition:
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
                 pass
-            case Cancel() | GoesOn():
+            case Cancel() | GoesOn() | Worded() | HeardWords():
                 stamp = None
             case _:
                 stamp = observation.at
@@ -232,7 +245,8 @@ class _Recognition:
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for message in self._open_events.feed(events, self._bus.stamp()):
             self._bus.publish(keys.open_events(message.actor), message)
-        for statistics in self._statistics.feed(changes, self._recognizer.session.busy, self._bus.now()):
+        counted = [change for change in changes if isinstance(change, Forgotten) or not change.retold]
+        for statistics in self._statistics.feed(counted, self._recognizer.session.busy, self._bus.now()):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 self._bus.publish(keys.statistics(statistics.actor or "all"), statistics)
         gone = [change.actor for change in changes if isinstance(change, Forgotten)]

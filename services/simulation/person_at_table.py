@@ -90,6 +90,8 @@ class PersonAtTable:
 
     def _do(self, act: Act, then: tuple[Act, ...], now: Seconds) -> Iterator[Message]:
         following = now
+        # Before the speech: whoever waits for that knows then that its words will come.
+        yield from self._words.does(act, self._stamp(now))
         match act:
             case LookAt(pointed=True) if self._arms.are_moving(now):
                 self._human.schedule((act, *then), now + self._frame)
@@ -122,7 +124,6 @@ class PersonAtTable:
                 yield from self._actions.begins(action, (target,) if target else (), self._stamp(now))
             case Stop(action=action, target=target):
                 yield from self._actions.ends(action, (target,) if target else (), self._stamp(now))
-        yield from self._words.does(act, self._stamp(now))
         self._human.schedule(then, following)
 
     def _looks_at(self, target: str, now: Seconds) -> Iterator[Message]:

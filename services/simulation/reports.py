@@ -35,20 +35,34 @@ class Ear:
     """Hearing of utterances, some of which are missed.
 
     heard: True while one is heard. understood: the last one was heard, so its words are known.
+    announced: the words of the next one will come, if that is heard.
     """
 
     def __init__(self, faults: PerceptionFaults, chances: Chances) -> None:
         self._dropped = faults.dropped_speech
         self._chance = chances("speech")
         self.heard = self.understood = False
+        self.announced: Utterance | None = None
 
-    def hear(self, message: ActionBegan | ActionEnded) -> bool:
-        """Take the beginning or end of an utterance. True if that is heard."""
+    def hear(self, message: ActionBegan | ActionEnded) -> Iterator[Message]:
+        """Take the beginning or end of speech. Yields it if it is heard, behind the news that words will come."""
+        announced, self.announced = self.announced, None
         if isinstance(message, ActionBegan):
             self.heard = self.understood = self._chance.random() >= self._dropped
-            return self.heard
-        was, self.heard = self.heard, False
-        return was
+            if self.heard and announced is not None:
+                yield announced
+            is_heard = self.heard
+        else:
+            is_heard, self.heard = self.heard, False
+        if is_heard:
+            yield message
+
+    def understand(self, message: Utterance) -> Iterator[Message]:
+        """Take words. Yields them if they were heard."""
+        if not message.final:
+            self.announced = message
+        elif self.understood:
+            yield message
 
 
 class SymbolicReports:
@@ -82,10 +96,9 @@ class SymbolicReports:
                     yield ActionEnded(actor=message.actor, action="look", targets=self._reported.targets, at=at)
                 self._lost, self._reported = False, None  # the loss was reported when the face was lost
             case (ActionBegan(action="speak") | ActionEnded(action="speak")) as speech:
-                if self._ear.hear(speech):
-                    yield speech
-            case Utterance() if not self._ear.understood:
-                pass
+                yield from self._ear.hear(speech)
+            case Utterance():
+                yield from self._ear.understand(message)
             case _:
                 yield message
 
@@ -138,9 +151,9 @@ class RawReports:
                 self._head.turn(self._facing(now), now)
                 self._target = targets[0] if targets else ""
             case (ActionBegan(action="speak") | ActionEnded(action="speak")) as speech:
-                self._ear.hear(speech)
-            case Utterance() if self._ear.understood:
-                yield message
+                yield from (told for told in self._ear.hear(speech) if isinstance(told, Utterance))
+            case Utterance():
+                yield from self._ear.understand(message)
             case ActionBegan(action="nod" | "shake" | "point") | ActionEnded(action="nod" | "shake" | "point"):
                 yield message
 

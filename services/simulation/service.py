@@ -38,7 +38,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
         keys.BODY_FAULTS, keys.WORLD,
         *([keys.ROBOT_MOTION] if config.perception == "raw" else []),
     ) as inbox:  # fmt: skip
-        bus.publish(keys.WORLD, _whole(cameras.world(bus.now()), shared))
+        bus.publish(keys.WORLD, _whole(cameras.world(bus.now()), shared, bus.now()))
         ready()
         await _wait_for(set(config.await_participants), inbox)
         if config.human != "none":
@@ -54,13 +54,13 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
                 cameras.feed(received.message, now)
             reports = list(cameras.advance(now))
             for message in reports:
-                bus.publish(_key(message), _whole(message, shared) if isinstance(message, World) else message)
+                bus.publish(_key(message), _whole(message, shared, now) if isinstance(message, World) else message)
             perceived.follow(reports)
 
 
-def _whole(world: World, shared: SharedWorld) -> World:
+def _whole(world: World, shared: SharedWorld, now: Seconds) -> World:
     """The world with what others have told of besides."""
-    return World(entities=shared.tell(world.entities), at=world.at)
+    return World(entities=shared.tell(world.entities, now), at=world.at)
 
 
 def _key(message: Message) -> str:

@@ -51,7 +51,7 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
         shared = SharedWorld(bus.name)
 
         def tell_world() -> None:
-            bus.publish(keys.WORLD, World(entities=shared.tell(world.entities), at=bus.stamp()))
+            bus.publish(keys.WORLD, World(entities=shared.tell(world.entities, bus.now()), at=bus.stamp()))
 
         tell_world()
         perceived = PerceivedActions(bus)
@@ -93,6 +93,7 @@ class Bystander:
         self._words = SpokenWords(person, life)
 
     def does(self, act: Act, at: Stamp) -> Iterator[ActionEvent | Utterance]:
+        yield from self._words.does(act, at)
         match act:
             case LookAt(target=target):
                 yield from self._actions.looks((self._robot if target == FACE else target,) if target else (), at)
@@ -100,7 +101,6 @@ class Bystander:
                 yield from self._actions.begins(action, (target,) if target else (), at)
             case Stop(action=action, target=target):
                 yield from self._actions.ends(action, (target,) if target else (), at)
-        yield from self._words.does(act, at)
 
 
 def tangram_world() -> World:

@@ -13,6 +13,7 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.client.perceive import perceive
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
@@ -22,7 +23,9 @@ from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.still import show_world, tangram_world
 from tests.access.spy import Flow, SpyHub
 
-ROLES = {"alice": "manager", "alice-log": "manager", "viewer": "observer", "guard": "operator"}
+ROLES = {
+    "alice": "manager", "alice-log": "manager", "viewer": "observer", "guard": "operator", "camera": "perception",
+}  # fmt: skip
 LIMIT = 900.0
 SPEECH = Speech(id="s", text="one two three four five six seven eight nine ten eleven twelve")
 
@@ -61,7 +64,10 @@ async def visit(flows: set[Flow]) -> None:
         async with nets, log, Robot.on(hub.join("alice")) as alice, Robot.on(hub.join("guard")) as guard:
             feeds = [alice.connection_events(open=True), alice.turns(), alice.feedback(), alice.actions()]
             feeds += [alice.faults(), alice.worlds(), alice.head_owners(), alice.statistics_updates()]
+            feeds.append(alice.utterances())
             await alice.statistics()
+            async with perceive("carl", hub=hub, name="camera") as carl:
+                await carl.say("hello")
             async with alice.inhibit_gaze():
                 speaking = asyncio.create_task(alice.realize("b", [SPEECH]))
                 await asyncio.sleep(2.0)

@@ -338,7 +338,7 @@ def test_the_person_minds_the_robot_and_a_line_of_prose_says_so(engage: Engage, 
     assert "failed" not in states
     assert states.count("succeeded") == states.count("started") == 3
     last = result.out.splitlines()[-1]
-    assert re.search(r'Said: "Please move the blue piece".* they looked after .* Answered by: nod', last)
+    assert re.search(r'Said: "Please move the blue piece".* they looked after .* Answered by human: nod', last)
     assert " (planned" not in result.out
 
 

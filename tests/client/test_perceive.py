@@ -5,6 +5,7 @@ import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from engage_hri.services.client.perceived_person import PerceivedPerson
 from engage_hri.services.client.robot import connect
 from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.simulation.still import show_world
+from tests.cli.command import engage
 
 THINGS = World(
     entities=(
@@ -254,4 +256,14 @@ async def test_without_a_robot_it_says_so_after_three_seconds(hub: MemoryHub) ->
 async def test_what_can_be_no_persons_id_is_refused(hub: MemoryHub, person: str) -> None:
     with pytest.raises(InputRefused, match="can't be a person's id"):
         async with perceive(person, hub=hub):
+            pass
+
+
+async def test_keys_of_another_role_are_refused_before_anything_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    engage(capsys)("keys", "init", tmp_path / "keys", "manager=alice", "perception=camera")
+
+    with pytest.raises(InputRefused, match=r"role manager; what people do is told by perception or wizard"):
+        async with perceive("ann", keys=str(tmp_path / "keys" / "alice")):
             pass

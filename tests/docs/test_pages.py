@@ -54,6 +54,7 @@ ELSEWHERE = {
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
+    ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }

@@ -35,7 +35,7 @@ from engage_hri.services.generation.references.motions import (
 from engage_hri.services.generation.references.phrases import proposed
 from engage_hri.services.generation.references.policy import Choices, Unreferable
 from engage_hri.services.generation.references.posture import references_apart
-from engage_hri.services.generation.turns.policy import plan_turn, vain_delay
+from engage_hri.services.generation.turns.policy import in_vain, plan_turn
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.generation.all_motions import all_motions
 from tests.generation.old_policy import choose
@@ -65,7 +65,7 @@ def as_it_was(it: Scenario, body: Capabilities, ask: Ask) -> FragmentPlan:
         scene = _scene(it.world, body, it.permits, it.config)
         chosen = choose(made.references, scene, motions, it.config, apart)
     emitted = Emission(it.fragment, turn, chosen.choices, it.config, it.permits, chosen.hands, apart=apart).plan()
-    return replace(emitted, warnings=(*vain_delay(it.fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
+    return replace(emitted, warnings=(*in_vain(it.fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 
 def as_it_is(it: Scenario, body: Capabilities, ask: Ask) -> FragmentPlan:

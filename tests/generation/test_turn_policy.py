@@ -9,7 +9,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, plan_turn, vain_delay
+from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, in_vain, plan_turn
 
 AT = Stamp("test", 0.0)
 
@@ -322,6 +322,6 @@ def test_a_turn_may_speak_to_another_person_than_the_one_before() -> None:
     ],
 )
 def test_a_delay_that_holds_nothing_is_warned_of(fields: dict[str, Any], warning: str) -> None:
-    told = vain_delay(TurnFragment(id="f", **fields))
+    told = in_vain(TurnFragment(id="f", **fields))
 
     assert [warning in text for text in told] == [True] * bool(warning)

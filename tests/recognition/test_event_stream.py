@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
@@ -324,3 +325,42 @@ def test_what_comes_twice_is_told_once(opening: bool):
             told += [*reader.feed(message, 0, 0), *reader.feed(message, 0, 0)]
 
     assert told == life
+
+
+def told_again(event: ConnectionEvent, words: str, at: float) -> ConnectionEvent:
+    return replace(event, words=words, retold=True, at=Stamp("loop", at))
+
+
+@pytest.mark.parametrize("state", ["succeeded", "completed"])
+def test_words_that_come_later_are_told_once(state: str):
+    one, (begun, changed) = stream(), (change(1, "ann", each, at) for at, each in ((1.0, "started"), (2.0, state)))
+    again = told_again(changed, "yes", 3.0)
+    told = [one.feed(each, each.at.seconds, 3.0) for each in (begun, changed, again, again)]
+
+    assert told == [[begun], [changed], [again], []]
+
+
+def test_words_of_an_event_that_ended_before_it_was_followed_are_told_too():
+    one = stream(began=2.5)
+    again = told_again(change(1, "ann", "completed", 2.0), "yes", 3.0)
+
+    assert one.feed(again, 3.0, 3.0) == [again]
+
+
+def test_an_open_event_has_its_words_for_who_comes_late():
+    tracker, one = OpenEventTracker(ROBOT, "s"), stream(began=5.0)
+    begun = change(1, "ann", "started", 1.0)
+    tracker.feed([begun], Stamp("loop", 1.0))
+    (state,) = tracker.feed([told_again(begun, "where is it", 2.0)], Stamp("loop", 2.0))
+
+    (told,) = one.feed(state, 2.0, 5.0, past=True)
+    assert (told.words, told.retold) == ("where is it", False)
+
+
+def test_an_older_change_takes_no_words_away():
+    one, begun = stream(), change(1, "ann", "started", 1.0)
+    again = told_again(begun, "where is it", 2.0)
+    for each in (begun, again):
+        one.feed(each, each.at.seconds, 2.0)
+
+    assert one.feed(begun, 1.0, 2.0) == []

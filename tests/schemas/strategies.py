@@ -158,6 +158,7 @@ def fragments(draw: st.DrawFn) -> TurnFragment:
         delay=draw(st.booleans()),
         delay_target=draw(words),
         accept=draw(actions),
+        within=draw(st.none() | st.floats(0.1, 120.0)),
     )
 
 

@@ -59,11 +59,12 @@ def test_a_good_fragment_is_told_in_a_few_hundred_characters() -> None:
         "eye_contact": False,
         "answer": "act",
         "answer_delay": -0.2,
+        "answered_by": "ann",
     }
     assert len(told.json) < 300
     assert told.text == (
         'Said: "Please take that cup away." cup: that cup, by pointing; they looked after 0.42 s. '
-        "At the end they did not look at the robot. Answered by: act, after -0.2 s."
+        "At the end they did not look at the robot. Answered by ann: act, after -0.2 s."
     )
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.simulation.cameras import Cameras
@@ -39,6 +39,7 @@ from engage_hri.services.simulation.human import (
     Withdraw,
 )
 from engage_hri.services.simulation.person_at_table import PersonAtTable
+from engage_hri.services.simulation.speaking import speech
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 from tests.ongoing import going_on, is_seen
@@ -369,3 +370,28 @@ def test_turning_one_fault_on_does_not_change_the_others() -> None:
 def test_a_wrong_fault_is_refused_by_name(name: str, value: Any) -> None:
     with pytest.raises(ValueError, match=name):
         PerceptionFaults(**{name: value})
+
+
+# -- words ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("film", [raw, symbolic])
+def test_words_that_are_heard_are_announced_and_known_a_moment_after_the_speech(film: Any) -> None:
+    filmed = film(*speech("Which one?", 1.0), until=3.0)
+
+    told = [(each.text, each.final, each.began.seconds, each.at.seconds) for each in filmed.of(Utterance)]
+    assert told == [("", False, 0.0, 0.0), ("Which one?", True, 0.0, pytest.approx(1.3))]
+
+
+@pytest.mark.parametrize("film", [raw, symbolic])
+def test_of_speech_that_is_missed_there_are_no_words(film: Any) -> None:
+    said = [act for number in range(40) for act in speech(str(number), 0.5)]
+    filmed = film(*said, until=60.0, dropped_speech=0.5)
+
+    words = filmed.of(Utterance)
+    announced, final = ([each.id for each in words if each.final is is_final] for is_final in (False, True))
+    assert announced == final
+    assert 5 < len(final) < 35
+    if film is symbolic:
+        began = [each.at for each in filmed.of(ActionBegan) if each.action == "speak"]
+        assert began == [each.began for each in words if each.final]

@@ -31,6 +31,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.lowering import lowered
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
@@ -291,12 +292,19 @@ class Emission:
         return self.turn.closes and self.permits.looks
 
     def _event(
-        self, id: str, kind: EventKind, start: str, *, accept: tuple[Action, ...] = (), optional: bool = False
+        self,
+        id: str,
+        kind: EventKind,
+        start: str,
+        *,
+        accept: tuple[Action, ...] = (),
+        within: Seconds | None = None,
+        optional: bool = False,
     ) -> Event:
         """An event of the turn. start: the sync point with which it begins; "": it begins with the block."""
         return Event(
             id=self.names.fresh(id), kind=kind, responder=self.turn.addressee, cause="turn", turn=self.turn.turn,
-            timing=(Timing("start", start),) if start else (), accept=accept, optional=optional,
+            timing=(Timing("start", start),) if start else (), accept=accept, limit=within, optional=optional,
         )  # fmt: skip
 
     def _opening(self) -> list[BlockBehavior]:
@@ -304,7 +312,7 @@ class Emission:
         turn = self.turn
         start = f"{self.speeches[0]}:start" if self.speeches else ""
         if turn.announces_pair:
-            return [self._event("turn-pair", "adjacency_pair", start, accept=turn.accept)]
+            return [self._event("turn-pair", "adjacency_pair", start, accept=turn.accept, within=turn.within)]
         if turn.reply:
             id = self.names.fresh(f"turn-{turn.reply}")
             timing = (Timing("start", start),) if start else ()

@@ -10,6 +10,8 @@ from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
 
 
@@ -20,14 +22,22 @@ class TurnEvents:
         self._events: dict[str, ConnectionEvent] = {}
         self._turn_of: dict[str, str] = {}
         """The turn of each block."""
+        self._changed: dict[str, Seconds] = {}
+        """When each event came to its state."""
 
     def expect(self, block: str, turn: str) -> None:
         self._turn_of[block] = turn
 
-    def feed(self, event: ConnectionEvent) -> None:
+    def feed(self, event: ConnectionEvent, now: Seconds) -> None:
         # An event that is first heard of in a later state belongs to an earlier performance under the same id.
         if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
-            self._events[event.id] = event
+            if not event.retold:
+                self._changed[event.id] = now
+            self._events[event.id] = replace(event, retold=False)
+
+    def changed(self, event: ConnectionEvent) -> Seconds:
+        """Local time at which the event came to its state, as far as is known here."""
+        return self._changed.get(event.id, float("-inf"))
 
     def lose(self, session: str = "") -> None:
         """End undecided events of other sessions as lost: recognition is gone, or has come back as `session`."""
@@ -45,16 +55,20 @@ class TurnEvents:
         mine = (event for event in reversed(self._events.values()) if event.block == block)
         return next((event for event in mine if event.behavior == behavior), None)
 
+    def pairs(self, turn: str) -> tuple[ConnectionEvent, ...]:
+        """The adjacency pairs of a turn: one, unless it was performed before under the same id."""
+        return tuple(event for event in self.of_turn(turn) if event.kind == "adjacency_pair")
+
     def open_pair(self, turn: str) -> ConnectionEvent | None:
         """The adjacency pair of a turn, while it is undecided."""
-        pairs = (event for event in self.of_turn(turn) if event.kind == "adjacency_pair")
-        return next((event for event in pairs if event.state == "started"), None)
+        return next((event for event in self.pairs(turn) if event.state == "started"), None)
 
     def forget(self, turns: Iterable[str]) -> None:
         """Keep only these turns."""
         kept = set(turns)
         self._turn_of = {block: turn for block, turn in self._turn_of.items() if turn in kept}
         self._events = {id: event for id, event in self._events.items() if event.block in self._turn_of}
+        self._changed = {id: at for id, at in self._changed.items() if id in self._events}
 
 
 class _Record(Struct):
@@ -70,9 +84,10 @@ class _Record(Struct):
 class TurnOutcomes:
     """Outcomes of the robot's turns; backchannels have none. `deadline`: when to call `close_due` again."""
 
-    def __init__(self, events: TurnEvents, patience: Seconds) -> None:
+    def __init__(self, events: TurnEvents, heard: HeardWords, config: GenerationConfig) -> None:
         self._events = events
-        self._patience = patience
+        self._heard = heard
+        self._config = config
         self._records: dict[str, _Record] = {}
         self._given_up: dict[str, Seconds] = {}
         """Turns that are over, and when to stop waiting for the answer."""
@@ -119,10 +134,25 @@ class TurnOutcomes:
         return tuple(closed for turn in over if (closed := self._close(turn)).fragments)
 
     def _due_at(self, turn: str) -> Seconds:
-        """Time when the outcome of a turn is due: its end or, with an open pair, some time after the pair's limit."""
+        """Time when the outcome of a turn is due: its end or, with an open pair, some time after the pair's limit.
+
+        After an answer in words it is once these are known, if somebody tells them, but no later than a while.
+        """
         pair = self._events.open_pair(turn)
         ended = self._records[turn].ended
-        return ended + (pair.limit or 0.0) + self._patience if pair is not None else ended
+        if pair is not None:
+            return ended + (pair.limit or 0.0) + self._config.decision_patience
+        return max((ended, *map(self._words_due_at, self._events.pairs(turn))))
+
+    def _words_due_at(self, pair: ConnectionEvent) -> Seconds:
+        """Time until which the words of an answer are waited for; long ago: they are not."""
+        person = pair.responder
+        if pair.response == "speak" and self._heard.expects(person):
+            if pair.state == "succeeded":
+                return self._events.changed(pair) + self._config.longest_answer
+            if pair.state == "completed" and (not pair.words or self._heard.is_saying(person)):
+                return self._events.changed(pair) + self._config.words_patience
+        return float("-inf")
 
     def _close(self, turn: str) -> TurnClosed:
         record = self._records.pop(turn)
@@ -138,4 +168,5 @@ class TurnOutcomes:
                 for said in all_said
             ),
             events=self._events.of_turn(turn),
+            heard=self._heard.of_turn(turn),
         )

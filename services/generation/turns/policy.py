@@ -39,6 +39,7 @@ class TurnPlan(Struct, frozen=True, kw_only=True):
     turn: str
     addressee: str
     accept: tuple[Action, ...] = ()
+    within: Seconds | None = None
     announces_pair: bool = False
     reply: Literal["", "answered", "repaired"] = ""
     """Message of a second or third turn, which starts no pair: tells recognition what became of the pending one."""
@@ -66,6 +67,7 @@ def plan_turn(fragment: TurnFragment, turn: str, addressee: str) -> TurnPlan:
         turn=turn,
         addressee=addressee,
         accept=fragment.accept,
+        within=fragment.within,
         announces_pair=rule.opens and fragment.turn_index == 1,
         reply=("answered" if fragment.turn_index == 2 else "repaired")
         if rule.opens and fragment.turn_index != 1
@@ -249,8 +251,12 @@ class TurnPolicy:
             self._interrupters.clear()
 
 
-def vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
-    """The warning that a fragment asks to hold the turn in a way that holds nothing; none if it does not."""
+def in_vain(fragment: TurnFragment) -> tuple[str, ...]:
+    """Warnings for what a fragment asks for in vain: holding a turn that is not held, time that nobody waits."""
+    return (*_vain_delay(fragment), *_vain_within(fragment))
+
+
+def _vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
     if fragment.delay_target and not fragment.delay:
         return ("delayTarget without delay='true': the turn is not held",)
     if fragment.delay and fragment.turn_status not in ("beginning", "middle"):
@@ -258,6 +264,12 @@ def vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
     if fragment.delay and not fragment.delay_target:
         return ("delay: the world has no surface to look at; name a delayTarget",)
     return ()
+
+
+def _vain_within(fragment: TurnFragment) -> tuple[str, ...]:
+    if fragment.within is None or (TABLE[fragment.turn_status].opens and fragment.turn_index == 1):
+        return ()
+    return ("within: an answer is awaited where a first turn begins, with 'beginning' or 'full'",)
 
 
 def _illegal(fragment: TurnFragment, field: str, reason: str, advice: str) -> InputRefused:

@@ -165,6 +165,7 @@ class AdjacencyPair(Machine):
         if self.event is None or not (is_first or self._is_earlier_answer(action, at)):
             return False
         self.event.rests_on(confidence)
+        self.event.spoken = (at,) if action == "speak" else ()
         if is_first:
             self._answer("human_answers", action, at)
         else:
@@ -183,6 +184,8 @@ class AdjacencyPair(Machine):
             return False
         self._asked_with = action
         self._turn_end = None
+        if action == "speak" and self.event is not None:
+            self.event.spoken = (*self.event.spoken, at)
         self.step("turn_goes_on", at)
         return True
 

@@ -73,8 +73,11 @@ class Conversation:
         self.speaks_since, self.silent_since = at, None
         self._scene.speaks(self.id)
         self._speech_confidence = confidence
-        if self.robot_holds_floor:
-            self.own_backchannel.speaks(self._backchannel(self._scene.robot, self.id, at, confidence))
+        # A line that was typed has no length by which it could be judged: who sends one has something to say.
+        if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
+            event = self._backchannel(self._scene.robot, self.id, at, confidence)
+            event.spoken = (at,)
+            self.own_backchannel.speaks(event)
         else:
             self._human_turn(at, "speak", confidence)
 
@@ -134,6 +137,7 @@ class Conversation:
             event = OngoingEvent(
                 kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,
                 limit=self._config.adjacency_pair_limit, confidence=confidence,
+                spoken=(at,) if action == "speak" else (),
             )  # fmt: skip
             pair.human_asks(event, action)
         if action == "speak" and self.speaks_since is None and self.silent_since is not None:

@@ -8,11 +8,13 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action, Cause, EventKind
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, EventState, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.services.recognition.events.history import Latest
 
 
 class Forgotten(NamedTuple):
@@ -32,6 +34,8 @@ class Mishap(NamedTuple):
     error: Exception
 
 
+TEXTS_KEPT = 64
+"""Number of speeches whose words, and of events with speech, that are remembered."""
 Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused | Forgotten | Mishap
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
@@ -90,6 +94,8 @@ class OngoingEvent(Struct, kw_only=True):
     confidence: Probability = 1.0
     """Least confidence of the observations on which the event rests."""
     changed: Seconds | None = None
+    spoken: tuple[Seconds, ...] = ()
+    """Starts of the person's speeches that it consists of: its words are theirs."""
 
     def rests_on(self, confidence: Probability) -> None:
         """Count one more observation, of this confidence."""
@@ -99,16 +105,22 @@ class OngoingEvent(Struct, kw_only=True):
 class EventWriter:
     """Writer of messages: numbers the events and turns their changes into `effects`.
 
-    clock: of the stamps. session: prefix of the ids, so that a restarted service never reuses one.
+    clock: of the stamps. session: prefix of the ids, so that a restarted service never reuses one. words_patience:
+    time after its end for which an event is told again, should its words become known.
     """
 
-    def __init__(self, clock: str, session: str = "") -> None:
+    def __init__(self, clock: str, session: str = "", *, words_patience: Seconds = 0.0) -> None:
         self.effects: list[Effect] = []
         self._clock = clock
         self._session = session
         self._count: dict[EventKind, int] = dict.fromkeys(PREFIX, 0)
         self._open: dict[str, OngoingEvent] = {}
         """Published events that have not ended, by id."""
+        self._words_patience = words_patience
+        self._texts: Latest[tuple[str, Seconds], str] = Latest(TEXTS_KEPT)
+        """Words of speeches, by person and start."""
+        self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
+        """Events with speech of a person, each as it was last told."""
 
     def take(self) -> list[Effect]:
         """Return the effects since the last call."""
@@ -127,16 +139,18 @@ class EventWriter:
         if state == "failed":
             event.delay = at - event.started
         begins, ends = state == "started", state == "completed"
-        self.effects.append(
-            ConnectionEvent(
+        told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,
                 at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
                 optional=event.optional, delay=None if begins else event.delay,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, confidence=event.confidence,
-                block=event.block, behavior=event.behavior, turn=event.turn,
-            )
+                block=event.block, behavior=event.behavior, turn=event.turn, words=self._words_of(event),
         )  # fmt: skip
+        self.effects.append(told)
+        if event.spoken:
+            self._spoken[event.id] = (event, told)
+        self._forget_spoken(at)
         if state in ENDINGS:
             self._open.pop(event.id, None)
         else:
@@ -149,6 +163,34 @@ class EventWriter:
                 )
             )  # fmt: skip
             event.request = ""
+
+    def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
+        """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""
+        self._texts[person, speech] = text
+        for event, told in tuple(self._spoken.values()):
+            if speech not in event.spoken or person not in (event.initiator, event.responder):
+                continue
+            words = self._words_of(event)
+            is_too_late = event.id not in self._open and at > (event.changed or at) + self._words_patience
+            if words != told.words and not is_too_late:
+                # An event's times never run backwards, but `changed` stays: it says when the event itself changed.
+                when = self.stamp(max(at, told.at.seconds))
+                told = replace(told, words=words, at=when, retold=True)
+                self._spoken[event.id] = (event, told)
+                self.effects.append(told)
+
+    def _forget_spoken(self, at: Seconds) -> None:
+        """Forget the events that are not told again, whatever may become known of their words."""
+        while self._spoken:
+            id, (event, _) = next(iter(self._spoken.items()))
+            if id in self._open or (event.changed or at) + self._words_patience >= at:
+                return
+            del self._spoken[id]
+
+    def _words_of(self, event: OngoingEvent) -> str:
+        pair = (event.initiator, event.responder)
+        texts = (self._texts.get((actor, speech), "") for speech in event.spoken for actor in pair)
+        return " ".join(filter(None, texts))
 
     def lose(self, person: str, at: Seconds) -> None:
         """End the open events with `person` as lost."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Stamp
 
@@ -23,7 +25,7 @@ class OpenEventTracker:
             if change.state in ENDINGS:
                 events.pop(change.id, None)
             else:
-                events[change.id] = change
+                events[change.id] = replace(change, retold=False)
             touched[person] = tuple(events.values())
             if not events:
                 del self._open[person]

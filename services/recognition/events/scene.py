@@ -9,7 +9,9 @@ from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
+from engage_hri.services.recognition.events.history import Latest
 
+LINES_KEPT = 256
 SAME_INSTANT: Seconds = 0.001
 """Longest gap between two looks at the same target that count as one."""
 
@@ -36,6 +38,19 @@ class GoesOn(Struct, frozen=True):
 
     began: ActionBegan
     since: Seconds
+
+
+class Worded(Struct, frozen=True, kw_only=True):
+    """Observation: all that is known of the words of a person's speech. since: local time at which that began.
+
+    is_alone: nothing but the words tells of this speech, and it is told next. is_line: it was typed in no time.
+    """
+
+    actor: str
+    since: Seconds
+    text: str
+    is_alone: bool = False
+    is_line: bool = False
 
 
 class GazeState(Struct):
@@ -94,6 +109,8 @@ class SessionScene:
         self._others: dict[str, Seconds] = {}
         """People and hands with the time when they were last seen; the longest ago first."""
         self._speakers: set[str] = set()
+        self.lines: Latest[str, Seconds] = Latest(LINES_KEPT)
+        """When each person last sent a line that was typed."""
         self.speech = 0
         """Number of times that speech of any actor has begun or ended."""
         self._fell_silent: list[tuple[Seconds, str]] = []

@@ -27,11 +27,11 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Person
-from engage_hri.services.recognition.events.scene import Covered, GoesOn, SessionScene
+from engage_hri.services.recognition.events.scene import Covered, GoesOn, SessionScene, Worded
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
-    | GoesOn | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
+    | GoesOn | Worded | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
 )  # fmt: skip
 TURNS_KEPT = 64
 """Number of ended turns that are remembered, for a pair announced after the end of its turn; aborted ones too."""
@@ -55,7 +55,7 @@ class Session:
         self.blocks = Blocks()
         self.scene = SessionScene(robot, config.gaze_resolution)
         self._config = config
-        self._writer = EventWriter(clock, name)
+        self._writer = EventWriter(clock, name, words_patience=config.words_patience)
         self._people = People(self.scene, config, self._writer, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
@@ -128,6 +128,10 @@ class Session:
                 self._people.observe(actor, at, lambda person: person.presence.found(at))
             case ActorLost(actor=actor) if actor in self.persons:
                 self._people.observe(actor, at, lambda person: person.presence.lost(at))
+            case Worded(actor=actor, since=since):
+                if observation.is_line:
+                    self.scene.lines[actor] = since
+                self._writer.understand(actor, since, observation.text, at)
             case RequestEvent():
                 self._request(observation, at)
             case SignalTurn():
