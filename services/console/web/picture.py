@@ -21,7 +21,6 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.perception import Utterance as Words
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.status import Status
@@ -30,7 +29,6 @@ from engage_hri.schemas.world import World
 from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import net_layout, people, scene
 from engage_hri.services.console.web.health import HealthBoard
-from engage_hri.services.console.web.heard import Heard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
 from engage_hri.services.console.web.measures import Measures
 from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
@@ -75,7 +73,6 @@ class Picture:
         self._measures = Measures()
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
-        self._heard = Heard()
         self._notes: deque[Note] = deque(maxlen=NOTES_KEPT)
         self.versions = dict.fromkeys(SECTIONS, 1)
         """Number of the newest state of each section."""
@@ -117,7 +114,7 @@ class Picture:
             case HeadOwner():
                 self._head_since = at
                 self._changed("head")
-            case ConnectionEvent():
+            case ConnectionEvent(retold=False):
                 self._events.feed(message, at)
                 self._changed("events", *(("measures",) if self._measures.feed(message, at) else ()))
             case Statistics():
@@ -129,9 +126,6 @@ class Picture:
                 self._take_net(message, at)
             case FragmentOutcome():
                 self._take_choices(message)
-            case Words():
-                self._heard.feed(message, self.zero(at))
-                self._changed("words")
             case PeerAlive() | PeerGone() | Status():
                 self._health.feed(message)
                 self._changed("health")
@@ -265,8 +259,8 @@ class Picture:
         return made[name]()
 
     def _words(self) -> list[Utterance]:
-        said = [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in self._scene.said]
-        return self._heard.joined(said)
+        said = sorted(self._scene.said, key=lambda each: each.began)
+        return [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in said]
 
     def _head(self) -> HeadSection:
         def shown(claim: Claim) -> ClaimShown:

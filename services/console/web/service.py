@@ -24,7 +24,7 @@ from engage_hri.services.console.web.script import Script
 
 PATTERNS = (
     *FOLLOWED, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
-    keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE,
+    keys.ANY_PERCEIVED_ONGOING,
 )  # fmt: skip
 """Expressions for all that the window shows."""
 ASKED_EVERY: Seconds = 3.0
