@@ -191,7 +191,10 @@ async def _again(tell: Callable[[], None]) -> None:
             ("--kind", "gaze"),
             "--kind: unknown 'gaze' (known: directed_gaze, mutual_facial_gaze, adjacency_pair, backchannel)",
         ),
-        (("--only", "all"), "--only: unknown 'all' (known: events, statistics, words, feedback, head, holds, faults)"),
+        (
+            ("--only", "all"),
+            "--only: unknown 'all' (known: events, statistics, words, feedback, head, holds, faults)",
+        ),
         (("--net", "--only", "events"), "--net: shows nets and nothing else (leave out --only, --actor and --kind)"),
         (("--actor", "a/b"), "--actor: 'a/b' can't be in a key: "),
     ],

@@ -5,8 +5,10 @@ import base64
 import json
 import re
 import shutil
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+import subprocess
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,7 @@ FLAGS = (
 
 
 class Page:
-    """One tab. requests: addresses that it has asked for. errors: what its console has complained of."""
+    """One page. requests: addresses that it has asked for. errors: what its console has complained of."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self._socket = socket
@@ -101,7 +103,7 @@ class Page:
 
 
 class Browser:
-    """A running browser."""
+    """A running browser, whose debugging protocol is at a port."""
 
     def __init__(self, session: aiohttp.ClientSession, port: int) -> None:
         self._session = session
@@ -109,10 +111,15 @@ class Browser:
 
     @asynccontextmanager
     async def page(self) -> AsyncIterator[Page]:
-        """An empty tab, while the body of `async with` runs."""
-        async with self._session.put(f"http://127.0.0.1:{self._port}/json/new?about:blank") as answer:
-            target = await answer.json()
-        async with self._session.ws_connect(target["webSocketDebuggerUrl"], max_msg_size=2**28) as socket:
+        """An empty page in a window of its own, while the body of `async with` runs: hidden tabs draw nothing."""
+        async with self._session.get(f"http://127.0.0.1:{self._port}/json/version") as answer:
+            whole = (await answer.json())["webSocketDebuggerUrl"]
+        async with self._session.ws_connect(whole) as socket:
+            asked = {"url": "about:blank", "newWindow": True}
+            await socket.send_json({"id": 1, "method": "Target.createTarget", "params": asked})
+            target = (await socket.receive_json(timeout=30))["result"]["targetId"]
+        place = f"http://127.0.0.1:{self._port}/devtools/page/{target}"
+        async with self._session.ws_connect(place, max_msg_size=2**28) as socket:
             page = Page(socket)
             listening = asyncio.create_task(page.listen())
             for domain in ("Page", "Runtime", "Network"):
@@ -121,37 +128,42 @@ class Browser:
                 yield page
             finally:
                 with suppress(Exception):
-                    await page.call("Page.close")
+                    await page.call("Page.close", 5)
                 listening.cancel()
+                await asyncio.wait([listening])
 
 
 @asynccontextmanager
-async def chromium(folder: Path) -> AsyncIterator[Browser]:
-    """Run a browser with a profile in `folder`, while the body of `async with` runs."""
+async def at_port(port: int) -> AsyncIterator[Browser]:
+    """The browser that runs already, with its protocol at this port."""
+    async with aiohttp.ClientSession() as session:
+        yield Browser(session, port)
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[int]:
+    """A browser with a profile in `folder`, while the body of `with` runs. Gives the port of its protocol."""
     assert CHROMIUM is not None
-    process = await asyncio.create_subprocess_exec(
-        CHROMIUM, *FLAGS, f"--user-data-dir={folder}", "about:blank",
-        stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
-    assert process.stderr is not None
-    listening: asyncio.Task[None] | None = None
+    told = folder / "told"
+    with told.open("wb") as log:
+        process = subprocess.Popen(
+            (CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", "about:blank"),
+            stdout=subprocess.DEVNULL, stderr=log,
+        )  # fmt: skip
     try:
-        async with asyncio.timeout(30):
-            while not (
-                found := re.search(rb"DevTools listening on ws://[^:]+:(\d+)/", await process.stderr.readline())
-            ):
-                pass
-        listening = asyncio.create_task(_read_on(process.stderr))
-        async with aiohttp.ClientSession() as session:
-            yield Browser(session, int(found[1]))
+        yield int(waited(process, told, rb"DevTools listening on ws://[^:]+:(\d+)/"))
     finally:
-        if listening is not None:
-            listening.cancel()
         process.terminate()
-        await process.wait()
+        process.wait()
 
 
-async def _read_on(stream: asyncio.StreamReader) -> None:
-    """Read what the browser says, so that it is not kept waiting by a full pipe."""
-    while await stream.read(2**16):
-        pass
+def waited(process: "subprocess.Popen[bytes]", told: Path, pattern: bytes, patience: float = 60.0) -> str:
+    """The group of a pattern in a file that a process writes, as soon as it is there."""
+    until = time.monotonic() + patience
+    while (found := re.search(pattern, told.read_bytes())) is None:
+        ended = process.poll()
+        assert ended is None, f"ended with {ended}: {told.read_text()}"
+        assert time.monotonic() < until, f"without {pattern!r} after {patience} s: {told.read_text()}"
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(0.05)
+    return found[1].decode()

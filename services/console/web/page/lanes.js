@@ -8,13 +8,17 @@ const AXIS = 20;
 
 function lanes(panel, told, draw) {
   const canvas = panel.querySelector("canvas");
-  let summary = 0;
+  let summary = -9999;
   let at = 0;
   return {
     take() {},
     tick(state) {
       if (panel.offsetParent === null || performance.now() - at < 40) return;
       at = performance.now();
+      if (at - summary > 2000) {
+        summary = at;
+        canvas.setAttribute("aria-label", told(state));
+      }
       const rect = canvas.getBoundingClientRect();
       if (rect.bottom < 0 || rect.top > window.innerHeight) return;
       const { context, width, height } = sized(canvas);
@@ -26,10 +30,6 @@ function lanes(panel, told, draw) {
       context.font = `${LABEL}px system-ui, sans-serif`;
       axis(context, { x, now, past, ahead, names, width, height });
       draw({ context, state, x, names, width, height, now, first: now - past, last: now + ahead });
-      if (performance.now() - summary > 2000) {
-        summary = performance.now();
-        canvas.setAttribute("aria-label", told(state));
-      }
     },
   };
 }
