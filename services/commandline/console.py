@@ -24,10 +24,12 @@ class Options(Connected):
     """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
 
     role: Annotated[
-        Literal["observer", "perception", "operator", "wizard"],
-        typer.Option(help="observer only looks; perception: visitors may be persons; operator: hold, stop, faults; "
-                     "wizard: all of it, and speak as the robot."),
-    ] = "observer"  # fmt: skip
+        Literal["observer", "operator", "wizard"],
+        typer.Option(
+            help="observer: only looks; operator: also holds, stops, switches faults; wizard: also speaks as the "
+            "robot, and visitors may take a seat."
+        ),
+    ] = "observer"
     script: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Prepared fragments and blocks, for buttons and the keys 1 to 9."),
@@ -82,7 +84,7 @@ async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> 
                 raise RunFailed(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
 
 
-HOLDERS = {"observer": "viewer", "perception": "perception", "operator": "operator", "wizard": "wizard"}
+HOLDERS = {"observer": "viewer", "operator": "operator", "wizard": "wizard"}
 """Whose keys each role takes, where the folder of keys is that of several."""
 
 

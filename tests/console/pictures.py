@@ -28,6 +28,10 @@ async def take(url: str, port: int) -> None:
                 await page.value("new Promise((done) => setTimeout(done, 1000))")
                 name = f"{width}-{'dark' if dark else 'light'}.png"
                 (FOLDER / name).write_bytes(await page.picture(whole=False))
+        await page.look(1280, 800)
+        await page.value("document.querySelector('#net').scrollIntoView()")
+        await page.until("document.querySelectorAll('.net svg:not(.over) .fired').length > 4", 60)
+        (FOLDER / "net.png").write_bytes(await page.picture(whole=False))
 
 
 def main() -> None:

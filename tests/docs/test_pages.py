@@ -45,6 +45,8 @@ EXCUSED = {
     ".venv/bin/engage simulate --sessions 20 --seed 1 --out study": "takes minutes; tests/cli/test_simulate.py",
     ".venv/bin/python -m pip install -e '.[study]'": "changes the tests' environment; the extra is checked",
     ".venv/bin/python -m pip install -e '.[reachy-mini]'": "the same",
+    ".venv/bin/python -m pip install -e '.[console]'": "the same",
+    "make demo ARGS=--you": "waits for somebody to sit down; tests/console/test_window.py sits down",
     "make reachy-mini": "takes a minute and a half; .ci/run does it",
 }
 """Commands that do not run here, and why."""
@@ -64,7 +66,7 @@ IN_LESS_TIME = {
     "--embedded": "--embedded --virtual-time",
 }
 """What is left out of a command, so that nobody waits for it here."""
-ENDLESS = {"up": 0, "run": 0, "watch": 0, "demo": 130}
+ENDLESS = {"up": 0, "run": 0, "watch": 0, "console": 0, "demo": 130}
 """Commands that go on until Ctrl-C (docs/commands.md), and their exit code then. Of a demo whose output no page shows
 the beginning is enough."""
 TALK = """\

@@ -16,7 +16,6 @@ from engage_hri.schemas.units import Coordinate
 
 Right = Literal["seat", "speak", "steer", "faults"]
 RIGHTS: dict[str, tuple[Right, ...]] = {
-    "perception": ("seat",),
     "operator": ("steer", "faults"),
     "wizard": ("seat", "speak", "steer", "faults"),
 }

@@ -3,10 +3,12 @@ import { clock, element, seconds } from "./look.js";
 
 export function words(panel) {
   const list = panel.querySelector(".words");
+  let follows = true; // until somebody scrolls up
+  list.addEventListener("scroll", () => (follows = list.scrollHeight - list.scrollTop - list.clientHeight < 40));
+  new ResizeObserver(() => follows && (list.scrollTop = list.scrollHeight)).observe(list);
   return {
     take(state, changed) {
       if (!changed.has("words")) return;
-      const atEnd = list.scrollHeight - list.scrollTop - list.clientHeight < 40;
       const shown = state.words.filter((said) => said.words || said.open);
       while (list.children.length > shown.length) list.lastChild.remove();
       shown.forEach((said, index) => {
@@ -20,7 +22,7 @@ export function words(panel) {
           element("span", { class: "text" }, said.words || (said.open ? "speaks" : "(spoke)")),
         );
       });
-      if (atEnd) list.scrollTop = list.scrollHeight;
+      if (follows) list.scrollTop = list.scrollHeight;
     },
   };
 }
