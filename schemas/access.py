@@ -104,6 +104,12 @@ def _manages(role: str, *more: str, why: str = "") -> Iterator[Row]:
     yield Row(role, "serves", keys.status(OWN), why)
 
 
+def _looks(role: str, *more: str) -> Iterator[Row]:
+    """Rows for what `engage console` shows besides what people watch."""
+    shown = (keys.NET, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, *more)
+    yield from (Row(role, "subscribes", key, "shown by `engage console`") for key in shown)
+
+
 _RAW = (keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY)
 _NO_PROGRAM = "of no program of ours: for those of others"
 
@@ -144,21 +150,17 @@ TABLE: tuple[Row, ...] = (
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
     *_manages("manager"),
     *_watches("observer"),
-    Row("observer", "subscribes", keys.NET),
-    *(
-        Row("observer", "subscribes", key, _NO_PROGRAM)
-        for key in (keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.TURN_CLOSED, keys.ROBOT_ONGOING,
-                    keys.ANY_PERCEIVED_ONGOING)
-    ),
-    Row("observer", "subscribes", keys.WORLD, "looked at by `engage doctor`"),
+    *_looks("observer", keys.WORLD),
+    Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
     *_watches("operator", "what an operator sees"),
-    Row("operator", "subscribes", keys.NET, "what an operator sees"),
+    *_looks("operator", keys.WORLD),
     *_commands("operator", "robot", "faults"),
     Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
-    *_manages("wizard", "robot", "faults", why=f"drives the robot by hand; {_NO_PROGRAM}"),
+    *_manages("wizard", "robot", "faults", why="drives the robot by hand, in `engage console`"),
+    *_looks("wizard"),
     *(
-        Row("wizard", "publishes", key, f"says what perception does not see; {_NO_PROGRAM}")
-        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING)
+        Row("wizard", "publishes", key, "says what perception does not see; visitors of `engage console` are people")
+        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, keys.WORLD)
     ),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""

@@ -42,5 +42,7 @@ SHELLS = {
     "services/hostile/visitor.py",  # an honest client
     "services/console/follow.py",  # subscribes
     "services/console/live.py",  # draws
+    "services/console/web/server.py",  # serves the page
+    "services/console/web/visitor.py",  # carries out orders
 }
 """Files beside `service.py` that are not pure. Each is a decision: keep the list short."""

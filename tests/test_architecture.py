@@ -64,6 +64,11 @@ ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
+WEB = {"nicegui", "fastapi", "starlette", "uvicorn"}
+WITH_WEB = {"services/console/web/server.py", "services/console/web/page.py"}
+"""The only files with a web stack. It is the exception to "no threads": it reads the files of the page on worker
+threads, which touch nothing of ours; pages, frames and orders stay on the one loop."""
+
 NO_SUBJECTS = re.compile(
     "(Its?|Who|Whose|Whom|What|Which|How|When|Where|Whether|Why|Of|Is|Has|Have|Does|Do|Did|Are|May|Can|Could|Was|Were|Will"
     "|As|From|To|In|On|At|By|Under|(No|Some|Every)body|Those|That|This|These|They|There|Here|And|Or|But|So|If|Once|Only"
@@ -140,6 +145,8 @@ def _import(place: PurePosixPath, module: str) -> Iterator[str]:
         yield "only services/bus/zenoh may"
     if first in THREADS and not measures:
         yield "this code starts no threads"
+    if first in WEB and str(place) not in WITH_WEB:
+        yield "the web stack has threads, and is for the window's server alone"
     if top == "schemas" and first == "services":
         yield "the vocabulary knows no service"
     machinery = first == "services" and second in MACHINERY and not _is_in(module, PURE_MACHINERY)
@@ -326,6 +333,7 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         ("services/control/x.py", "import math", "no place in the layers"),
         ("schemas/x.py", "from engage_hri.schemas.documents.xml_grammar import PARTS", "not below"),
         ("services/commandline/app.py", "import threading", "no threads"),
+        ("services/console/web/visitor.py", "from nicegui import ui", "for the window's server alone"),
         ("services/bus/zenoh/hub.py", "from concurrent.futures import ThreadPoolExecutor", "no threads"),
         ("services/commandline/app.py", "async def f():\n    await asyncio.to_thread(g)", "no threads"),
         ("services/commandline/app.py", "loop.run_in_executor(None, f)", "no threads"),

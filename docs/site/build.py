@@ -20,7 +20,17 @@ SOURCE = ROOT / "build" / "docs-source"
 OUT = ROOT / "build" / "docs"
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "tests/README.md")
 CONTENTS = {
-    "Using it": ("commands", "configuration", "deploy", "security", "faults", "scenario", "study", "language-models"),
+    "Using it": (
+        "commands",
+        "console",
+        "configuration",
+        "deploy",
+        "security",
+        "faults",
+        "scenario",
+        "study",
+        "language-models",
+    ),
     "From other programs": (
         "reference",
         "people",
@@ -78,6 +88,10 @@ def stage(folder: Path) -> None:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+    for picture in sorted((ROOT / "docs").rglob("*.png")):
+        place = folder / picture.relative_to(ROOT)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(picture, place)
     shutil.copytree(ROOT / "examples", folder / "examples", ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "_static").mkdir()
     here = Path(__file__).parent

@@ -2,8 +2,9 @@
 
 import asyncio
 from collections.abc import Iterable
+from contextlib import nullcontext
 
-from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.interface import Bus, Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
@@ -11,10 +12,13 @@ from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.runtime.service import Ready, Service, running
 
 
-async def play_tangram(config: Config, sinks: Iterable[Sink]) -> None:
-    """Run all services until the task is over. sinks: get all messages, with instants of this loop."""
+async def play_tangram(config: Config, sinks: Iterable[Sink], hub: Hub | None = None) -> None:
+    """Run all services until the task is over. sinks: get all messages, with instants of this loop.
+
+    hub: the bus on which they run, for others to look on; None: one in memory.
+    """
     finished = asyncio.Event()
-    async with MemoryHub(config.robot, decodes=False) as hub:
+    async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
         services = {name: roster.service(name, config) for name in roster.NAMES}
         services["collaboration"] = ending(services["collaboration"], finished)
         async with following(hub.join("console"), sinks), running(hub, services):

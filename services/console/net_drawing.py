@@ -13,20 +13,13 @@ from rich.text import Text
 from engage_hri.schemas.nets import NetPlace, NetTransition
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
+from engage_hri.services.console import net_rows
+from engage_hri.services.console.net_rows import BLOCK, LETTERS, MARK, Row, behaviors, ordered, without_number
 from engage_hri.services.console.nets import NetInView
 from engage_hri.services.console.view import OWN_BLOCKS
 from engage_hri.services.console.wording import number
 
 TOKEN, EMPTY = "●", "○"
-LETTERS = {
-    "start": "s", "ready": "r", "attackPeak": "p", "stroke_start": "[", "strokeStart": "[", "stroke": "*",
-    "stroke_end": "]", "strokeEnd": "]", "relax": "x", "end": "e",
-}  # fmt: skip
-"""Letters of sync points, as blocks of all dialects spell them."""
-MARK = "m"
-"""Letter of a sync point that the behavior itself names: a mark in a speech."""
-BLOCK = "bml"
-"""Name of the line of the block itself."""
 NARROWEST, WIDEST = 3, 9
 """Cells of a column."""
 LABEL = 20
@@ -38,8 +31,6 @@ REST = 2
 WAITING, AHEAD, DONE = "┄", "─", "━"
 CROSSED = {" ": "┊", WAITING: "┊", AHEAD: "┼", DONE: "┿"}
 """Line of an instant through the lines of behaviors that have no part in it."""
-TIES = ("delay", "order", "handover", "series")
-"""Places between behaviors, the most interesting first."""
 
 
 class _Columns(NamedTuple):
@@ -52,20 +43,11 @@ class _Columns(NamedTuple):
     cut: tuple[int, int]
 
 
-class _Row(NamedTuple):
-    """A line to draw. points: transitions with their letters. places: those on the line, in order."""
-
-    name: str
-    points: Mapping[int, str]
-    places: Sequence[int]
-    is_tie: bool = False
-
-
 def drawing(net: NetInView, width: int = 80, height: int | None = None, now: Seconds | None = None) -> list[str]:
     """The lines of a net. width, height: most cells and lines; None: as many as it takes. now: local time."""
     if net.waits_for:
         return [_cut(_title(net, now), width)]
-    rows, ties = _behaviors(net), _ties(net)
+    rows, ties = behaviors(net), net_rows.ties(net)
     left = min(LABEL, max(cell_len(printable(row.name)) for row in (*rows, *ties))) if rows else 0
     left = max(7, min(left, width // 3)) + 1
     columns = _columns(net, max(NARROWEST + 2, width - left - REST - 1))
@@ -113,18 +95,9 @@ def picture(nets: Sequence[NetInView], width: int, height: int, now: Seconds, he
 def legend(nets: Iterable[NetInView]) -> str:
     """The letters that stand in the drawings of these nets, with what they mean."""
     points = {each.sync for net in nets for instant in net.transitions for each in instant.points}
-    used = {name if (name := _without_number(sync)) in LETTERS else "mark" for sync in points}
+    used = {name if (name := without_number(sync)) in LETTERS else "mark" for sync in points}
     words = [f"{letter}={name}" for name, letter in (*LETTERS.items(), ("mark", MARK)) if name in used]
     return " ".join((f"{TOKEN}=token", *words))
-
-
-def _letter(sync: str) -> str:
-    return LETTERS.get(_without_number(sync), MARK)
-
-
-def _without_number(sync: str) -> str:
-    """The name of a point, without the number of a stroke: `stroke` of `stroke:2`."""
-    return sync.partition(":")[0]
 
 
 def _title(net: NetInView, now: Seconds | None) -> str:
@@ -142,49 +115,12 @@ def _title(net: NetInView, now: Seconds | None) -> str:
 # -- what is drawn -----------------------------------------------------------------------------------------------
 
 
-def _behaviors(net: NetInView) -> list[_Row]:
-    """The block itself, then its behaviors by their first instant."""
-    points: dict[str, dict[int, str]] = {}
-    for transition in _ordered(net):
-        for point in net.transitions[transition].points:
-            here = points.setdefault(point.behavior, {})
-            here[transition] = here.get(transition, "") + _letter(point.sync)
-    places: dict[str, list[int]] = {name: [] for name in points}
-    for each, place in enumerate(net.places):
-        if (name := _owner(net, place)) is not None:
-            places.setdefault(name, []).append(each)
-    names = sorted(places, key=lambda name: name != "")
-    return [_Row(name or BLOCK, points.get(name, {}), places[name]) for name in names]
-
-
-def _owner(net: NetInView, place: NetPlace) -> str | None:
-    """The behavior on whose line a place lies; None: it lies between behaviors."""
-    end = len(net.transitions) - 1
-    if place.kind in ("phase", "idle") or (not place.lag and (place.source == 0 or place.target == end)):
-        return place.behavior
-    return None
-
-
-def _ties(net: NetInView) -> list[_Row]:
-    """A line for each place between behaviors; one for those that say the same."""
-    found: dict[tuple[str, int, int, Seconds], list[int]] = {}
-    for each, place in enumerate(net.places):
-        if _owner(net, place) is None:
-            found.setdefault((place.kind, place.source, place.target, place.lag), []).append(each)
-    ranks = {kind: rank for rank, kind in enumerate(TIES)}
-    ordered = sorted(found, key=lambda tie: ranks.get(tie[0], len(TIES)))
-    return [
-        _Row(f"{kind} {lag:g} s" if lag else kind, {source: "├", target: "┤"}, found[kind, source, target, lag], True)
-        for kind, source, target, lag in ordered
-    ]
-
-
-def _is_in_view(row: _Row, columns: _Columns) -> bool:
+def _is_in_view(row: Row, columns: _Columns) -> bool:
     cells = [columns.at[each] for each in row.points]
     return max(cells) >= 0 and min(cells) < columns.size
 
 
-def _fitting(net: NetInView, rows: list[_Row], height: int | None) -> tuple[list[_Row], list[_Row]]:
+def _fitting(net: NetInView, rows: list[Row], height: int | None) -> tuple[list[Row], list[Row]]:
     """The rows that are drawn, and those for which there is no room: what holds a token on its way comes first."""
     if height is None or len(rows) <= height:
         return rows, []
@@ -201,15 +137,9 @@ def _fitting(net: NetInView, rows: list[_Row], height: int | None) -> tuple[list
 # -- where it is drawn -------------------------------------------------------------------------------------------
 
 
-def _ordered(net: NetInView) -> list[int]:
-    """Transitions by their planned times; the end of the block is the last."""
-    end = len(net.transitions) - 1
-    return sorted(range(end + 1), key=lambda each: (each == end, net.transitions[each].time, each))
-
-
 def _columns(net: NetInView, space: int) -> _Columns:
     """Columns for as many instants as there is space for, around the one that fired last."""
-    order = _ordered(net)
+    order = ordered(net)
     fits = max(1, space // NARROWEST)
     first = 0
     if len(order) > fits:
@@ -251,13 +181,13 @@ def _sharing(instant: NetTransition) -> int:
     return len({each.behavior for each in instant.points})
 
 
-def _at_rest(net: NetInView, row: _Row) -> str:
+def _at_rest(net: NetInView, row: Row) -> str:
     """The idle place of a line, if it has one."""
     idle = [each for each in row.places if net.places[each].kind == "idle"]
     return (TOKEN if idle[0] in net.marked else EMPTY) if idle else " "
 
 
-def _cells(net: NetInView, row: _Row, columns: _Columns) -> list[str]:
+def _cells(net: NetInView, row: Row, columns: _Columns) -> list[str]:
     """The columns of a line: its points, and its places between them."""
     cells = [" "] * columns.size
     done = max((place.source for place in _held(net, row)), default=None, key=lambda each: columns.at[each])
@@ -282,7 +212,7 @@ def _cells(net: NetInView, row: _Row, columns: _Columns) -> list[str]:
     return cells
 
 
-def _held(net: NetInView, row: _Row) -> list[NetPlace]:
+def _held(net: NetInView, row: Row) -> list[NetPlace]:
     """The places of a line that hold a token of what is under way."""
     return [net.places[each] for each in row.places if each in net.marked and net.places[each].kind != "idle"]
 
@@ -295,7 +225,7 @@ def _draw(cells: list[str], since: int, to: int, style: str, token: str) -> None
         cells[(since + to - 1) // 2] = token
 
 
-def _connect(rows: Sequence[_Row], cells: Sequence[list[str]], columns: _Columns) -> None:
+def _connect(rows: Sequence[Row], cells: Sequence[list[str]], columns: _Columns) -> None:
     """Draw each instant that several behaviors share through the lines between them."""
     first: dict[int, int] = {}
     for here, row in enumerate(rows):

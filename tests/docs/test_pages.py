@@ -49,6 +49,8 @@ EXCUSED = {
         "needs zenoh-pico; tests/cli/test_c_example.py"
     ),
     "./events tcp/127.0.0.1:7447": "the same",
+    ".venv/bin/python -m pip install -e '.[console]'": "the same",
+    "make demo ARGS=--you": "waits for somebody to sit down; tests/console/test_window.py sits down",
     "make reachy-mini": "takes a minute and a half; .ci/run does it",
 }
 """Commands that do not run here, and why."""
@@ -68,7 +70,7 @@ IN_LESS_TIME = {
     "--embedded": "--embedded --virtual-time",
 }
 """What is left out of a command, so that nobody waits for it here."""
-ENDLESS = {"up": 0, "run": 0, "watch": 0, "demo": 130}
+ENDLESS = {"up": 0, "run": 0, "watch": 0, "console": 0, "demo": 130}
 """Commands that go on until Ctrl-C (docs/commands.md), and their exit code then. Of a demo whose output no page shows
 the beginning is enough."""
 TALK = """\

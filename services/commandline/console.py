@@ -1,0 +1,101 @@
+"""Command `engage console`: a page in the browser that shows a running robot, and lets people take part."""
+
+import secrets
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.options import Connected
+from engage_hri.services.commandline.patient import complain
+from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name, until_closed
+from engage_hri.services.commandline.sources import Thing, read_source
+
+PORT = 8137
+LOCAL = ("127.0.0.1", "::1", "localhost")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Connected):
+    """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
+
+    role: Annotated[
+        Literal["observer", "operator", "wizard"],
+        typer.Option(
+            help="observer: only looks; operator: also holds, stops, switches faults; wizard: also speaks as the "
+            "robot, and visitors may take a seat."
+        ),
+    ] = "observer"
+    script: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Prepared fragments and blocks, for buttons and the keys 1 to 9."),
+    ] = None
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Where to listen; others than this machine see it all.")
+    ] = "127.0.0.1"
+    port: Annotated[
+        int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0: any that is free.")
+    ] = PORT
+    browser: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False
+    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
+
+
+def main(options: Options) -> int:
+    """Show the window until a signal."""
+    config = options.load()
+    things = read_source(options.script).things if options.script else ()
+    run_until_signal(_show(options, config, things))
+    return DONE
+
+
+async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> None:
+    try:
+        from engage_hri.services.console.web.server import application, serving
+    except ModuleNotFoundError as error:
+        advice = "python -m pip install 'engage-hri[console]', in the environment of `engage`"
+        raise InputRefused(Fault(reason=f"{error.name} is not installed", where="console", advice=advice)) from error
+    from engage_hri.services.bus.zenoh.neighbors import hinting
+    from engage_hri.services.console.web.script import Script
+    from engage_hri.services.console.web.service import window
+
+    token = secrets.token_urlsafe(12)
+    hosts = ("127.0.0.1", "localhost", "[::1]") if options.host in LOCAL else ("*",)
+    async with await options.open(config.bus, HOLDERS[options.role]) as hub:
+        bus = hub.join(unique_name("console"), options.role)
+        async with window(hub, bus, Script(things)) as shown:
+            bus.declare_alive()
+            try:
+                async with serving(application(shown, hosts, token), options.host, options.port) as port:
+                    url = _address(options, port, token)
+                    print(url, flush=True)
+                    if hosts == ("*",):
+                        complain(_open_to_all(options))
+                    if options.browser:
+                        webbrowser.open(url)
+                    async with hinting(bus, config.bus.connect):
+                        await (until_closed() if options.attended else forever())
+            except OSError as error:
+                advice = "is another `engage console` there? --port 0 takes any that is free"
+                where = f"{options.host}:{options.port}"
+                raise RunFailed(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
+
+
+HOLDERS = {"observer": "viewer", "operator": "operator", "wizard": "wizard"}
+"""Whose keys each role takes, where the folder of keys is that of several."""
+
+
+def _address(options: Options, port: int, token: str) -> str:
+    host = "127.0.0.1" if options.host in ("0.0.0.0", "::") else options.host
+    host = f"[{host}]" if ":" in host else host
+    return f"http://{host}:{port}/" + ("" if options.role == "observer" else f"?token={token}")
+
+
+def _open_to_all(options: Options) -> str:
+    seen = f"everybody who reaches {options.host} sees all of this robot, and the people before it, unencrypted"
+    if options.role == "observer":
+        return seen
+    return f"{seen}; who has the token in the address above takes part as {options.role}"

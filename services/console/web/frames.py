@@ -1,0 +1,63 @@
+"""Frames: what a browser gets next, which is all that has changed since the last one that it drew. Pure."""
+
+from collections.abc import Iterable
+
+from msgspec import Raw, Struct
+from msgspec.json import Encoder
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.web.picture import Picture
+
+HEARTBEAT: Seconds = 1.0
+"""Time after which a browser gets a frame though nothing has changed, so that it knows that the window is there."""
+
+
+class Frame(Struct, frozen=True, omit_defaults=True):
+    """Message to the browser. now: seconds of the picture. sections: by name. gone: names of those that are over.
+
+    you: who looks at this page. told: what became of its orders.
+    """
+
+    now: Seconds
+    sections: dict[str, Raw] = {}
+    gone: tuple[str, ...] = ()
+    you: "You | None" = None
+    told: tuple[str, ...] = ()
+
+
+class You(Struct, frozen=True):
+    """The one who looks at a page.
+
+    person: id of the person that they are; empty: none. denied: rights that they do not have, with the reason.
+    script: titles of the prepared fragments. faults: kinds of faults that the body can play. inhibits: they keep the
+    gaze now.
+    """
+
+    person: str = ""
+    denied: dict[str, str] = {}
+    script: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+    inhibits: bool = False
+
+
+class Viewer:
+    """One browser, which draws a frame before it gets the next: a slow one misses frames, and nothing queues up."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, int] = {}
+        self._you: You | None = None
+        self._told: Seconds | None = None
+        self._encoder = Encoder()
+
+    def frame(self, picture: Picture, now: Seconds, you: You | None = None, told: Iterable[str] = ()) -> bytes | None:
+        """The next frame as JSON; None: there is nothing new, and the browser has heard of the window lately."""
+        told = tuple(told)
+        new = {name: version for name, version in picture.versions.items() if self._known.get(name) != version}
+        gone = tuple(self._known.keys() - picture.versions.keys())
+        if not (new or gone or told or you != self._you) and self._told is not None and now - self._told < HEARTBEAT:
+            return None
+        self._told = now
+        self._known = dict(picture.versions)
+        sections = {name: Raw(picture.section(name)) for name in new}
+        news, self._you = (you if you != self._you else None), you
+        return self._encoder.encode(Frame(picture.zero(now), sections, gone, news, told))

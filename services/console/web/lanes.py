@@ -1,0 +1,177 @@
+"""Lanes over time: connection events, and behaviors as planned and as measured. Pure.
+
+Instants are seconds of the clock that feeds them. What ended long ago is forgotten.
+"""
+
+from collections.abc import Callable
+
+from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.nets import NetPlanned
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventState
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.view import OWN_BLOCKS
+from engage_hri.services.console.web.sections import BehaviorLane, BlockLane, EventShown, SyncShown
+
+KEPT: Seconds = 90.0
+"""Time for which what has ended is kept."""
+MOST = 80
+"""Blocks and events that are kept at most."""
+Zero = Callable[[Seconds], Seconds]
+"""Conversion of an instant to seconds of the picture."""
+
+
+class EventLanes:
+    """Connection events that are open or ended lately."""
+
+    def __init__(self) -> None:
+        self._events: dict[str, _Event] = {}
+
+    def feed(self, event: ConnectionEvent, at: Seconds) -> None:
+        """Take a change of an event. at: its local instant."""
+        known = self._events.setdefault(event.id, _Event(event, at))
+        known.feed(event, at)
+        ended = [id for id, each in self._events.items() if each.until is not None and at - each.until > KEPT]
+        for id in (*ended, *list(self._events)[: max(0, len(self._events) - MOST)]):
+            self._events.pop(id, None)
+
+    def shown(self, zero: Zero) -> tuple[EventShown, ...]:
+        """The events, the oldest first."""
+        return tuple(each.shown(zero) for each in self._events.values())
+
+
+class _Event:
+    def __init__(self, event: ConnectionEvent, at: Seconds) -> None:
+        self.event = event
+        self.since = at
+        self.decision: EventState = "started"
+        self.decided: Seconds | None = None
+        self.until: Seconds | None = None
+        self.delay: Seconds | None = None
+
+    def feed(self, event: ConnectionEvent, at: Seconds) -> None:
+        self.event = event
+        if event.state != "started" and self.decided is None:
+            self.decision, self.decided, self.delay = event.state, at, event.delay
+        if event.state in ENDINGS and self.until is None:
+            self.until = at
+
+    def shown(self, zero: Zero) -> EventShown:
+        event = self.event
+        return EventShown(
+            id=event.id, kind=event.kind, by=event.initiator, to=event.responder, about=event.objects,
+            cause=event.cause, state=self.decision, optional=event.optional, delay=self.delay, limit=event.limit,
+            since=zero(self.since), decided=_or_none(zero, self.decided), until=_or_none(zero, self.until),
+        )  # fmt: skip
+
+
+class BlockLanes:
+    """Blocks that run or ended lately, with their sync points."""
+
+    def __init__(self) -> None:
+        self._blocks: dict[str, _Block] = {}
+
+    def feed(self, message: BlockProgress | SyncPointProgress | PredictionFeedback | NetPlanned, at: Seconds) -> str:
+        """Take feedback about a block, or its net. at: its local instant. Returns the id of the block, if any."""
+        if message.block is None:
+            return ""
+        if isinstance(message, BlockProgress) and message.progress == "start":
+            self._blocks.pop(message.block, None)  # A name may come again.
+        block = self._blocks.setdefault(message.block, _Block(at - _since_start(message)))
+        match message:
+            case BlockProgress(progress="end"):
+                block.until, block.status = at, message.status
+            case SyncPointProgress():
+                block.measured(message)
+            case PredictionFeedback():
+                for point in message.points:
+                    block.planned(point)
+            case NetPlanned():
+                block.tie(message)
+        return message.block
+
+    def forget(self, now: Seconds) -> tuple[str, ...]:
+        """Forget what ended long ago. Returns the ids of these blocks."""
+        old = [id for id, block in self._blocks.items() if block.until is not None and now - block.until > KEPT]
+        gone = tuple(dict.fromkeys((*old, *list(self._blocks)[: max(0, len(self._blocks) - MOST)])))
+        for id in gone:
+            del self._blocks[id]
+        return gone
+
+    def shown(self, id: str, zero: Zero) -> BlockLane:
+        """The lane of a block that is known."""
+        return self._blocks[id].shown(id, zero)
+
+
+class _Point:
+    __slots__ = ("first", "measured", "planned")
+
+    def __init__(self) -> None:
+        self.first: Seconds | None = None
+        self.planned: Seconds | None = None
+        self.measured: Seconds | None = None
+
+
+class _Block:
+    def __init__(self, since: Seconds) -> None:
+        self.since = since
+        self.until: Seconds | None = None
+        self.status = ""
+        self.points: dict[str, dict[str, _Point]] = {}
+        self.types: dict[str, str] = {}
+        self.ties: tuple[tuple[tuple[str, str], ...], ...] = ()
+
+    def _point(self, behavior: str, sync: str) -> _Point:
+        return self.points.setdefault(behavior, {}).setdefault(sync, _Point())
+
+    def planned(self, planned: PlannedPoint) -> None:
+        point = self._point(planned.behavior, planned.sync)
+        point.first = planned.time if point.first is None else point.first
+        if point.measured is None:
+            point.planned = planned.time
+        if planned.type:
+            self.types[planned.behavior] = planned.type
+
+    def measured(self, message: SyncPointProgress) -> None:
+        point = self._point(message.behavior, message.sync)
+        point.measured = message.time
+        if message.predicted is not None:
+            point.planned = message.predicted
+            point.first = message.predicted if point.first is None else point.first
+
+    def tie(self, net: NetPlanned) -> None:
+        """Learn which sync points of several behaviors are one instant."""
+        found = []
+        for instant in net.transitions:
+            one_of_each = {point.behavior: point.sync for point in instant.points if point.behavior}
+            if len(one_of_each) > 1:
+                found.append(tuple(one_of_each.items()))
+        self.ties = tuple(found)
+
+    def shown(self, id: str, zero: Zero) -> BlockLane:
+        def moved(time: Seconds | None) -> Seconds | None:
+            return None if time is None else zero(self.since + time)
+
+        lanes = [
+            BehaviorLane(
+                id=name,
+                type=self.types.get(name, ""),
+                points=tuple(
+                    SyncShown(sync, moved(each.first), moved(each.planned), moved(each.measured))
+                    for sync, each in points.items()
+                ),
+            )
+            for name, points in self.points.items()
+        ]
+        return BlockLane(
+            id=id, since=zero(self.since), until=_or_none(zero, self.until), status=self.status,
+            own=id.startswith(OWN_BLOCKS), behaviors=tuple(lanes), ties=self.ties,
+        )  # fmt: skip
+
+
+def _since_start(message: BlockProgress | SyncPointProgress | PredictionFeedback | NetPlanned) -> Seconds:
+    """Time from the block's start to the instant that the message tells of."""
+    return message.time if isinstance(message, BlockProgress | SyncPointProgress) else 0.0
+
+
+def _or_none(zero: Zero, at: Seconds | None) -> Seconds | None:
+    return None if at is None else zero(at)

@@ -1,0 +1,66 @@
+"""Courses of what is measured: engagement and MTBCE of each person, delays of connection events. Pure."""
+
+from collections import deque
+
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.web.lanes import Zero
+from engage_hri.services.console.web.sections import Level, MeasuresSection, PersonMeasures
+
+KEPT = 600
+"""Values of a course that are kept."""
+APART: Seconds = 0.5
+"""Time of which a course keeps two values at most; the newest is always there."""
+Course = deque[tuple[Seconds, float]]
+
+
+class Measures:
+    """Courses of all that is measured, by person; an empty name stands for all people."""
+
+    def __init__(self) -> None:
+        self._people: dict[str, _Person] = {}
+        self._delays: deque[tuple[Seconds, float, str]] = deque(maxlen=KEPT)
+
+    def feed(self, message: Statistics | ConnectionEvent, at: Seconds) -> bool:
+        """Take a message; at: its local instant. Returns whether anything has changed."""
+        match message:
+            case Statistics(actor=actor, session=session, engagement=engagement):
+                person = self._people.setdefault(actor, _Person())
+                person.level, person.reasons = message.level, message.reasons
+                _add(person.engagement, at, engagement)
+                _add(person.mtbce, at, session.mtbce)
+                return True
+            case ConnectionEvent(state="succeeded", delay=float() as delay, kind=kind):
+                self._delays.append((at, delay, kind))
+                return True
+        return False
+
+    def shown(self, zero: Zero) -> MeasuresSection:
+        """All courses, with their instants in seconds of the picture."""
+        people = [
+            PersonMeasures(
+                actor=actor,
+                level=person.level,
+                reasons=person.reasons,
+                engagement=tuple((zero(at), value) for at, value in person.engagement),
+                mtbce=tuple((zero(at), value) for at, value in person.mtbce),
+            )
+            for actor, person in self._people.items()
+        ]
+        return MeasuresSection(tuple(people), tuple((zero(at), delay, kind) for at, delay, kind in self._delays))
+
+
+class _Person:
+    def __init__(self) -> None:
+        self.level: Level = "unknown"
+        self.reasons: tuple[str, ...] = ()
+        self.engagement: Course = deque(maxlen=KEPT)
+        self.mtbce: Course = deque(maxlen=KEPT)
+
+
+def _add(course: Course, at: Seconds, value: float | None) -> None:
+    if value is None:
+        return
+    if len(course) > 1 and at - course[-2][0] < APART:
+        course.pop()  # too near to the one before it: the newest counts
+    course.append((at, value))

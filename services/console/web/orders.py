@@ -1,0 +1,205 @@
+"""Orders: what a page sends when somebody takes part, and which right each needs. Pure.
+
+`seat`: to be a person. `speak`: to drive the robot by hand. `steer`: to hold and stop it. `faults`: to switch faults
+of a simulated body.
+"""
+
+from typing import Annotated, ClassVar, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.perception import LONGEST_TEXT
+from engage_hri.schemas.units import Coordinate
+
+Right = Literal["seat", "speak", "steer", "faults"]
+RIGHTS: dict[str, tuple[Right, ...]] = {
+    "operator": ("steer", "faults"),
+    "wizard": ("seat", "speak", "steer", "faults"),
+}
+"""Rights by role; no other role has any."""
+Name = Annotated[str, Meta(max_length=80)]
+Id = Annotated[str, Meta(max_length=200)]
+Text = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
+
+
+class Order(Struct, frozen=True, kw_only=True, tag_field="do", omit_defaults=True):
+    """Order of a page. needs: the right that it takes; empty: none."""
+
+    needs: ClassVar[Right | Literal[""]] = ""
+
+
+class Drawn(Order, frozen=True, kw_only=True, tag="drawn"):
+    """Said after each frame: it is on the screen."""
+
+
+class SeatOrder(Order, frozen=True, kw_only=True):
+    """Order of somebody who is a person, or wants to be."""
+
+    needs: ClassVar[Right] = "seat"
+
+
+class Sit(SeatOrder, frozen=True, kw_only=True, tag="sit"):
+    """Become a person. name: id of the person; empty: one is made up."""
+
+    name: Name = ""
+
+
+class Leave(SeatOrder, frozen=True, kw_only=True, tag="leave"):
+    """Stand up and go."""
+
+
+class LookAt(SeatOrder, frozen=True, kw_only=True, tag="look"):
+    """Look at an entity; empty: away from everything."""
+
+    target: Id = ""
+
+
+class PointAt(SeatOrder, frozen=True, kw_only=True, tag="point"):
+    """Point at an entity."""
+
+    target: Id
+
+
+class MoveHead(SeatOrder, frozen=True, kw_only=True, tag="head"):
+    """Nod, or shake the head."""
+
+    how: Literal["nod", "shake"] = "nod"
+
+
+class Move(SeatOrder, frozen=True, kw_only=True, tag="move"):
+    """Take a thing, and lay it there."""
+
+    thing: Id
+    x: Coordinate
+    y: Coordinate
+
+
+class Speak(SeatOrder, frozen=True, kw_only=True, tag="speak"):
+    """Begin or end to speak, without words."""
+
+    on: bool
+
+
+class Type(SeatOrder, frozen=True, kw_only=True, tag="type"):
+    """Say words."""
+
+    text: Text
+
+
+class WizardOrder(Order, frozen=True, kw_only=True):
+    """Order of somebody who drives the robot by hand. by: who it is, for the log."""
+
+    needs: ClassVar[Right] = "speak"
+    by: Name = ""
+
+
+class Tell(WizardOrder, frozen=True, kw_only=True, tag="tell"):
+    """Say words, and then what the target is, if there is one. asks: the person is to answer.
+
+    addressee: id of the person; empty: the only one.
+    """
+
+    text: Annotated[str, Meta(max_length=LONGEST_TEXT)] = ""
+    target: Id = ""
+    asks: bool = False
+    addressee: Id = ""
+
+
+class Prepared(WizardOrder, frozen=True, kw_only=True, tag="prepared"):
+    """Perform a fragment of the script. number: its place there, from 0."""
+
+    number: Annotated[int, Meta(ge=0)]
+
+
+class Backchannel(WizardOrder, frozen=True, kw_only=True, tag="backchannel"):
+    """Show that the robot listens. how: by a nod or a word."""
+
+    how: Literal["nod", "uh-huh"] = "nod"
+
+
+class InhibitGaze(WizardOrder, frozen=True, kw_only=True, tag="inhibit"):
+    """Keep the gaze from what fragments want, or let it go. target: with mode `target`."""
+
+    on: bool
+    mode: Literal["hold", "release", "target"] = "hold"
+    target: Id = ""
+
+
+class Condition(WizardOrder, frozen=True, kw_only=True, tag="condition"):
+    """Note which condition of a study begins, in the log of this window."""
+
+    name: Name
+
+
+class SteerOrder(Order, frozen=True, kw_only=True, tag="steer"):
+    """Hold, continue or stop all that the robot performs."""
+
+    needs: ClassVar[Right] = "steer"
+    to: Literal["hold", "continue", "stop"]
+    by: Name = ""
+
+
+class SwitchOrder(Order, frozen=True, kw_only=True, tag="faults"):
+    """Switch on exactly these faults of the body."""
+
+    needs: ClassVar[Right] = "faults"
+    faults: Annotated[tuple[BodyFault, ...], Meta(max_length=50)] = ()
+    by: Name = ""
+
+
+AnyOrder = (
+    Drawn | Sit | Leave | LookAt | PointAt | MoveHead | Move | Speak | Type
+    | Tell | Prepared | Backchannel | InhibitGaze | Condition | SteerOrder | SwitchOrder
+)  # fmt: skip
+_decoder: "msgspec.json.Decoder[AnyOrder]" = msgspec.json.Decoder(AnyOrder)
+
+
+def decoded(text: str | bytes) -> AnyOrder:
+    """Read an order. Raises InputRefused for what is none."""
+    try:
+        return _decoder.decode(text)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputRefused(Fault(reason=str(error), where="order", advice="reload the page")) from error
+
+
+def missing(order: Order, role: str, trusted: bool) -> str:
+    """Say why this order is not carried out; empty: it may be. trusted: the page was called with the token."""
+    return denied(role, trusted).get(order.needs, "") if order.needs else ""
+
+
+def denied(role: str, trusted: bool) -> dict[str, str]:
+    """The rights that a page does not have, each with the reason."""
+    rights: tuple[Right, ...] = ("seat", "speak", "steer", "faults")
+    if role in RIGHTS and not trusted:
+        reason = "this address lacks the token: open the one that `engage console` has printed"
+        return dict[str, str].fromkeys(rights, reason)
+    found: dict[str, str] = {}
+    for right in rights:
+        if right not in RIGHTS.get(role, ()):
+            able = " or ".join(name for name, has in RIGHTS.items() if right in has)
+            found[right] = f"the window has the role {role}; start it with `--role` {able}"
+    return found
+
+
+def written(order: Order) -> str:
+    """An order in words, for the log, without what is said."""
+    match order:
+        case Tell(text=text, target=target, asks=asks):
+            about = f" about {target}" if target else ""
+            return f"{'asks' if asks else 'says'} {len(text)} letters{about}"
+        case Prepared(number=number):
+            return f"performs fragment {number + 1} of the script"
+        case Backchannel(how=how):
+            return f"backchannel: {how}"
+        case InhibitGaze(on=on, mode=mode, target=target):
+            return f"inhibits the gaze: {mode} {target}".rstrip() if on else "lets the gaze go"
+        case Condition(name=name):
+            return f"condition: {name}"
+        case SteerOrder(to=to):
+            return to
+        case SwitchOrder(faults=faults):
+            return f"faults: {', '.join(each.kind for each in faults) or 'none'}"
+    return ""

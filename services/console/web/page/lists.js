@@ -1,0 +1,182 @@
+// Panels of text: words, the owner of the head, references, services, notes, and what is wrong.
+import { clock, element, seconds } from "./look.js";
+
+export function words(panel) {
+  const list = panel.querySelector(".words");
+  let follows = true; // until somebody scrolls up
+  list.addEventListener("scroll", () => (follows = list.scrollHeight - list.scrollTop - list.clientHeight < 40));
+  new ResizeObserver(() => follows && (list.scrollTop = list.scrollHeight)).observe(list);
+  return {
+    take(state, changed) {
+      if (!changed.has("words")) return;
+      const shown = state.words.filter((said) => said.words || said.open);
+      while (list.children.length > shown.length) list.lastChild.remove();
+      shown.forEach((said, index) => {
+        const item = list.children[index] ?? list.appendChild(element("li"));
+        const key = `${said.actor}|${said.since}|${said.words}|${said.open}`;
+        if (item.dataset.key === key) return;
+        item.dataset.key = key;
+        item.className = `${said.actor === state.robot ? "robot" : "person"}${said.open ? " open" : ""}`;
+        item.replaceChildren(
+          element("span", { class: "who" }, `${said.actor} ${clock(said.since)}`),
+          element("span", { class: "text" }, said.words || (said.open ? "speaks" : "(spoke)")),
+        );
+      });
+      if (follows) list.scrollTop = list.scrollHeight;
+    },
+  };
+}
+
+const claim = (each) => [each.kind, each.target].filter(Boolean).join(" → ");
+
+export function head(panel) {
+  const place = panel.querySelector(".head");
+  const told = element("p", { class: "owner", "aria-live": "polite" });
+  const since = element("span", { class: "since" });
+  const waiting = element("ol", { class: "waiting" });
+  place.replaceChildren(told, waiting);
+  let from = 0;
+  return {
+    take(state, changed) {
+      if (!changed.has("head")) return;
+      const { owner } = state.head;
+      from = state.head.since;
+      told.replaceChildren(
+        element("strong", {}, owner ? claim(owner) : "nobody"), " ", since,
+        element("span", { class: "why" }, owner?.reason ? `because: ${owner.reason}` : ""),
+      );
+      waiting.replaceChildren(
+        ...state.head.waiting.map((each) => element("li", {}, element("strong", {}, claim(each)), " waits",
+          element("span", { class: "why" }, each.reason ? `because: ${each.reason}` : ""))),
+      );
+      if (!state.head.waiting.length) waiting.replaceChildren(element("li", { class: "none" }, "nobody waits for it"));
+    },
+    tick(state) {
+      const text = state.head?.owner ? `for ${Math.max(0, state.now() - from).toFixed(1)} s` : "";
+      if (since.textContent !== text) since.textContent = text;
+    },
+  };
+}
+
+const GESTURES = {
+  none: "nothing", gaze: "glance", directed_gaze: "look until they look", directed_gaze_with_pointing: "look and point",
+};
+
+function table(choice) {
+  const rows = choice.pairs.map((pair) => element("tr", { class: pair.chosen ? "chosen" : pair.feasible ? "" : "not" },
+    element("td", {}, pair.chosen ? "▶" : ""), element("td", {}, GESTURES[pair.gesture] ?? pair.gesture),
+    element("td", {}, pair.phrase || "(none)"),
+    element("td", { title: pair.distractors.join(", ") }, String(pair.distractors.length)),
+    element("td", {}, pair.channel.toFixed(2)), element("td", {}, pair.reliability.toFixed(3)),
+    element("td", {}, pair.minimum.toFixed(2)), element("td", {}, seconds(pair.cost)),
+    element("td", {}, pair.chosen ? `chosen: ${pair.reason ?? ""}` : pair.reason ?? "")));
+  const names = ["", "gesture", "phrase", "|D|", "r", "R", "Rmin", "cost", "verdict"];
+  return element("div", { class: "scroll", tabindex: "0" }, element("table", {},
+    element("thead", {}, element("tr", {}, ...names.map((name) => element("th", { scope: "col" }, name)))),
+    element("tbody", {}, ...rows)));
+}
+
+export function references(panel) {
+  const place = panel.querySelector(".references");
+  const shown = new Map();
+  return {
+    take(state, changed) {
+      if (!changed.has("references")) return;
+      const keys = new Set();
+      for (const choice of state.references) {
+        const key = `${choice.fragment}:${choice.reference}`;
+        keys.add(key);
+        if (shown.has(key)) continue;
+        const details = element("details", {}, element("summary", {},
+          element("strong", {}, choice.target), ` “${choice.phrase}” by ${GESTURES[choice.gesture] ?? choice.gesture}`,
+          element("span", { class: "why" }, `R ${choice.reliability.toFixed(2)}, ${seconds(choice.cost)}; ${key}`)));
+        details.addEventListener("toggle", () => {
+          if (details.open && details.children.length === 1) details.append(table(choice));
+        });
+        shown.set(key, details);
+        place.prepend(details);
+      }
+      for (const [key, details] of shown) {
+        if (!keys.has(key)) {
+          details.remove();
+          shown.delete(key);
+        }
+      }
+      if (!shown.size) place.replaceChildren(element("p", { class: "none" }, "The table behind each reference, once one was made."));
+      else place.querySelector(":scope > .none")?.remove();
+    },
+  };
+}
+
+export function health(panel) {
+  const list = panel.querySelector(".health");
+  return {
+    take(state, changed) {
+      if (!changed.has("health")) return;
+      list.replaceChildren(...state.health.map((each) => {
+        const fine = each.here && each.serves && !each.warnings.length;
+        return element("li", { class: fine ? "fine" : each.here ? "doubtful" : "gone" },
+          element("span", { class: "sign", "aria-hidden": "true" }, fine ? "✓" : each.here ? "!" : "✗"),
+          element("strong", {}, each.name), " ",
+          element("span", { class: "why" }, each.warnings.join("; ") || each.facts.join(", ") || "here"));
+      }));
+    },
+  };
+}
+
+export function notes(panel) {
+  const list = panel.querySelector(".notes");
+  return {
+    take(state, changed) {
+      if (!changed.has("notes")) return;
+      const signs = { fault: "✗", warning: "!", news: "·" };
+      list.replaceChildren(...state.notes.toReversed().map((note) => element("li", { class: note.level },
+        element("span", { class: "sign", "aria-hidden": "true" }, signs[note.level]),
+        element("span", { class: "since" }, clock(note.at)), " ", note.text)));
+    },
+  };
+}
+
+export function switched(place) {
+  return {
+    take(state, changed) {
+      if (!changed.has("switched")) return;
+      const { held, faults } = state.switched;
+      const told = [
+        held.length ? `Held: ${held.join(", ")}.` : "",
+        faults.length ? `Faults of the body that are on: ${faults.join(", ")}.` : "",
+      ].filter(Boolean).join(" ");
+      place.hidden = !told;
+      place.textContent = told;
+    },
+  };
+}
+
+// What is wrong with the window itself: no link to it, or none of it to the robot.
+export function away(place) {
+  let linked = true;
+  let missing = null;
+  function show() {
+    let text = "";
+    if (!linked) {
+      text = "The window does not answer: `engage console` has ended, or this page cannot reach it. The picture below is the last one. It is called again every second.";
+    } else if (missing?.length) {
+      text = missing.length === 4
+        ? "No robot is on the bus. The picture below is the last one. `engage up` starts a robot; a robot elsewhere takes `engage console --connect`."
+        : `Not on the bus: ${missing.join(", ")}. The robot does without.`;
+    }
+    if (place.textContent !== text) place.textContent = text;
+    place.hidden = !text;
+  }
+  return {
+    link(there) {
+      linked = there;
+      show();
+    },
+    take(state, changed) {
+      if (!changed.has("health")) return;
+      missing = state.health.filter((each) => each.service && !each.here).map((each) => each.name);
+      show();
+    },
+  };
+}

@@ -1,0 +1,87 @@
+// The page's state: sections as they come with frames, and a clock that runs between frames.
+import { follow } from "./link.js";
+import { map } from "./map.js";
+import { space } from "./space.js";
+import { behaviorLanes, eventLanes } from "./lanes.js";
+import { net } from "./net.js";
+import { measures } from "./measures.js";
+import { part } from "./part.js";
+import { wizard } from "./wizard.js";
+import { away, head, health, notes, references, switched, words } from "./lists.js";
+
+const EACH = ["block/", "net/"]; // sections that there are several of
+
+export function begin(root, robot) {
+  const at = (id) => root.querySelector(`#${id}`);
+  const state = { robot, blocks: new Map(), layouts: new Map(), now: () => 0 };
+  let send = () => {};
+  const order = (what) => send(what);
+  const drawn = [
+    space(at("scene"), order), map(at("above"), order), part(at("part"), order), wizard(at("wizard"), order), words(at("said")), head(at("head")), eventLanes(at("events")),
+    behaviorLanes(at("behaviors")), net(at("net")), measures(at("measures")), references(at("references")),
+    health(at("health")), notes(at("notes")), switched(root.querySelector(".switched")),
+  ];
+  const warning = away(root.querySelector(".away"));
+  const clock = runningClock();
+  state.now = clock.now;
+
+  function take(frame) {
+    clock.hear(frame.now);
+    const changed = new Set();
+    for (const [name, value] of Object.entries(frame.sections ?? {})) {
+      if (name.startsWith(EACH[0])) {
+        state.blocks.set(name.slice(EACH[0].length), value);
+        changed.add("blocks");
+      } else if (name.startsWith(EACH[1])) {
+        state.layouts.set(name.slice(EACH[1].length), value);
+        changed.add("layouts");
+      } else {
+        state[name] = value;
+        changed.add(name);
+      }
+    }
+    if (frame.you) {
+      state.you = frame.you;
+      changed.add("you");
+    }
+    if (frame.told?.length) {
+      state.told = frame.told;
+      changed.add("told");
+    }
+    for (const name of frame.gone ?? []) {
+      state.blocks.delete(name.slice(EACH[0].length));
+      state.layouts.delete(name.slice(EACH[1].length));
+    }
+    for (const part of drawn) part.take(state, changed);
+    warning.take(state, changed);
+    root.dataset.frames = Number(root.dataset.frames ?? 0) + 1;
+  }
+
+  let running = true;
+  function tick() {
+    if (!running) return;
+    for (const part of drawn) part.tick?.(state);
+    requestAnimationFrame(tick);
+  }
+  requestAnimationFrame(tick);
+  const link = follow(take, warning.link);
+  send = link.send;
+  window.engage = { state, send: link.send }; // for who looks into the page with the browser's tools
+  return () => {
+    running = false;
+    link.end();
+  };
+}
+
+// Seconds of the picture, between frames by the browser's own clock. Frames come late, never early.
+function runningClock() {
+  let behind = null;
+  const own = () => performance.now() / 1000;
+  return {
+    hear(now) {
+      const measured = own() - now;
+      behind = behind === null || measured < behind || measured > behind + 1 ? measured : behind + (measured - behind) * 0.01;
+    },
+    now: () => (behind === null ? 0 : own() - behind),
+  };
+}

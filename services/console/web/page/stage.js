@@ -1,0 +1,40 @@
+// The part of the page that is drawn from frames: where its panels stand. What they show is drawn by the other modules.
+import { begin } from "engage-window/main.js";
+
+const MAIN = [
+  ["scene", "Scene", `<div class="space" role="img" aria-label="The scene in 3D"></div>
+    <div class="views" role="group" aria-label="Where you look from"></div>`],
+  ["above", "From above", `<svg class="map" role="group" aria-label="The table from above"></svg>`],
+  ["events", "Connection events", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
+  ["behaviors", "Behaviors: planned and measured", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
+  ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0"></div>`],
+  ["references", "References", `<div class="references"></div>`],
+  ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" tabindex="0"></ul>`],
+];
+const SIDE = [
+  ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
+  ["wizard", "The robot by hand", `<div class="wizard"></div>`],
+  ["said", "Words", `<ol class="words" role="log" aria-live="polite" tabindex="0"></ol>`],
+  ["head", "Who owns the head", `<div class="head"></div>`],
+  ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="reasons"></p>`],
+  ["health", "Services", `<ul class="health"></ul>`],
+];
+
+const panels = (all) => all.map(([id, title, inside]) => `<section id="${id}" aria-labelledby="${id}-title">
+  <h2 id="${id}-title">${title}</h2>${inside}</section>`).join("\n");
+
+export default {
+  props: { robot: String },
+  template: `<div class="window">
+    <p class="away" role="alert" hidden></p>
+    <p class="switched" role="status" hidden></p>
+    <div class="column main">${panels(MAIN)}</div>
+    <div class="column side">${panels(SIDE)}</div>
+  </div>`,
+  mounted() {
+    this.end = begin(this.$el, this.robot);
+  },
+  unmounted() {
+    this.end();
+  },
+};

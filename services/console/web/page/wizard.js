@@ -1,0 +1,114 @@
+// The robot by hand: words, references, questions, signs of listening, its gaze, what is held, faults of the body.
+import { element } from "./look.js";
+
+export function wizard(panel, order) {
+  const place = panel.querySelector(".wizard");
+  const by = input("by", "Your name, for the log", { maxlength: "40" });
+  const send = (what) => order({ ...what, by: by.field.value.trim() });
+  const button = (text, act, attributes = {}) => {
+    const made = element("button", { type: "button", ...attributes }, text);
+    made.addEventListener("click", act);
+    return made;
+  };
+
+  const text = input("tell", "Say", { maxlength: "1000" });
+  const target = choice("target", "about");
+  const whom = choice("whom", "to");
+  const tell = (asks) => {
+    const said = { do: "tell", text: text.field.value.trim(), target: target.field.value, addressee: whom.field.value, asks };
+    send(said);
+    text.field.value = "";
+  };
+  const form = element("form", { class: "row" }, ...text.parts, ...target.parts, ...whom.parts,
+    element("button", { type: "submit", class: "main" }, "Say it"), button("Ask it", () => tell(true)));
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    tell(false);
+  });
+  const gaze = choice("keep", "Keep the gaze");
+  const inhibit = button("Keep", () => {
+    const on = inhibit.getAttribute("aria-pressed") !== "true";
+    const at = gaze.field.value;
+    send({ do: "inhibit", on, mode: at ? "target" : "hold", target: at });
+  }, { "aria-pressed": "false" });
+  const signs = element("div", { class: "row" }, button("Nod", () => send({ do: "backchannel", how: "nod" })),
+    button("Uh-huh", () => send({ do: "backchannel", how: "uh-huh" })), ...gaze.parts, inhibit);
+  const steer = element("div", { class: "row", role: "group", "aria-label": "What the robot performs" },
+    button("Stop", () => send({ do: "steer", to: "stop" }), { class: "stop" }),
+    button("Hold", () => send({ do: "steer", to: "hold" })), button("Go on", () => send({ do: "steer", to: "continue" })));
+  const script = element("ol", { class: "script" });
+  const faults = element("div", { class: "row faults", role: "group", "aria-label": "Faults of the body" });
+  const condition = input("condition", "Condition of a study", { maxlength: "40" });
+  const note = element("form", { class: "row" }, ...condition.parts, element("button", { type: "submit" }, "Note it"));
+  note.addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (condition.field.value.trim()) send({ do: "condition", name: condition.field.value.trim() });
+  });
+  const speaks = element("div", {}, element("div", { class: "row" }, ...by.parts), form, signs, script, note);
+  const refused = element("p", { class: "why" });
+  place.replaceChildren(refused, speaks, steer, faults);
+  document.addEventListener("keydown", (event) => {
+    const busy = event.target.closest?.("input, select, textarea, button, [tabindex]") || event.ctrlKey || event.metaKey || event.altKey;
+    const number = Number(event.key) - 1;
+    if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) send({ do: "prepared", number });
+  });
+
+  let on = [];
+  return {
+    take(state, changed) {
+      if (changed.has("you")) {
+        const { denied = {}, script: titles = [], faults: kinds = [], inhibits } = state.you;
+        refused.textContent = denied.steer ? `Only watched here: ${denied.steer}.` : "";
+        speaks.hidden = Boolean(denied.speak);
+        steer.hidden = Boolean(denied.steer);
+        faults.hidden = Boolean(denied.faults) || !kinds.length;
+        inhibit.setAttribute("aria-pressed", String(Boolean(inhibits)));
+        inhibit.textContent = inhibits ? "Let go" : "Keep";
+        script.replaceChildren(...titles.map((title, number) => element("li", {},
+          button(`${number < 9 ? `${number + 1}  ` : ""}${title}`, () => send({ do: "prepared", number })))));
+        switches(kinds);
+      }
+      if (changed.has("switched")) {
+        on = state.switched.kinds;
+        for (const each of faults.querySelectorAll("button")) each.setAttribute("aria-pressed", String(on.includes(each.dataset.kind)));
+      }
+      if (changed.has("scene")) {
+        const { things, people } = state.scene;
+        options(target.field, "(nothing)", things.filter((each) => each.kind === "object").map((each) => each.id));
+        options(whom.field, "(whoever is there)", people.filter((each) => each.at).map((each) => each.id));
+        options(gaze.field, "where it is", [...people.filter((each) => each.at), ...things.filter((each) => each.kind === "object")].map((each) => each.id));
+      }
+    },
+  };
+
+  function switches(kinds) {
+    if (faults.dataset.kinds === kinds.join()) return;
+    faults.dataset.kinds = kinds.join();
+    faults.replaceChildren(element("span", {}, "Faults of the body"), ...kinds.map((kind) => button(kind, () => {
+      const now = on.includes(kind) ? on.filter((each) => each !== kind) : [...on, kind];
+      send({ do: "faults", faults: now.map((each) => ({ kind: each, ...PARTS[each] })) });
+    }, { "aria-pressed": String(on.includes(kind)), "data-kind": kind })));
+  }
+}
+
+// What a fault needs to be told besides its kind, where the kind has no usual one.
+const PARTS = { stall: { amount: 2 }, displaced: { part: "neck_yaw", amount: 15 } };
+
+function input(id, name, attributes) {
+  const field = element("input", { type: "text", id: `wizard-${id}`, autocomplete: "off", ...attributes });
+  return { field, parts: [element("label", { for: field.id }, name), field] };
+}
+
+function choice(id, name) {
+  const field = element("select", { id: `wizard-${id}` });
+  return { field, parts: [element("label", { for: field.id }, name), field] };
+}
+
+function options(field, none, ids) {
+  const key = ids.join();
+  if (field.dataset.ids === key) return;
+  field.dataset.ids = key;
+  const chosen = field.value;
+  field.replaceChildren(element("option", { value: "" }, none), ...ids.map((id) => element("option", { value: id }, id)));
+  field.value = ids.includes(chosen) ? chosen : "";
+}

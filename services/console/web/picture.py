@@ -1,0 +1,288 @@
+"""Picture of the whole system, as the page in the browser shows it. Pure: messages and instants in, sections out.
+
+`feed(message, at, now)` takes messages of any source: a running bus, or a recording that is played. `versions` says
+which sections there are, and which have changed; `section(name)` gives one as JSON.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from engage_hri.schemas.actions import OngoingActions
+from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.body import Capabilities, RobotState, WordSpoken
+from engage_hri.schemas.body_faults import BodyFaults, words
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.holds import Held
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.status import Status
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.console import nets, view, wording
+from engage_hri.services.console.web import net_layout, people, scene
+from engage_hri.services.console.web.health import HealthBoard
+from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
+from engage_hri.services.console.web.measures import Measures
+from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
+
+CHOICES_KEPT = 40
+NOTES_KEPT = 40
+SECTIONS = (
+    "scene",
+    "words",
+    "head",
+    "events",
+    "nets",
+    "tokens",
+    "measures",
+    "references",
+    "health",
+    "notes",
+    "switched",
+)
+"""Names of the sections that are always there; `sections.py` has their fields."""
+BLOCK, NET = "block/", "net/"
+"""Beginnings of the names of the sections that each block, and each net, has for itself: `block/step-3`."""
+SLOWLY: dict[str, Seconds] = {"measures": 1.0}
+"""Sections that are told at most so often: they are large, and nobody sees the difference."""
+
+
+class Picture:
+    """The picture. robot: its actor id. began: the instant that counts as zero."""
+
+    def __init__(self, robot: str, began: Seconds) -> None:
+        self.began = began
+        self.now = began
+        self._scene = view.empty(robot, began)
+        self._world: World | None = None
+        self._state: RobotState | None = None
+        self._body: Capabilities | None = None
+        self._head_since = began
+        self._events = EventLanes()
+        self._blocks = BlockLanes()
+        self._nets: nets.Nets = {}
+        self._structures: dict[str, object] = {}
+        self._measures = Measures()
+        self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
+        self._health = HealthBoard()
+        self._notes: deque[Note] = deque(maxlen=NOTES_KEPT)
+        self.versions = dict.fromkeys(SECTIONS, 1)
+        """Number of the newest state of each section."""
+        self._number = 1
+        self._encoded: dict[str, tuple[int, bytes]] = {}
+        self._late: dict[str, Seconds] = {}
+        """Sections that have changed and are told slowly, and when they may be told."""
+
+    @property
+    def world(self) -> World:
+        """The world as it was told last; empty before."""
+        return self._world or World(entities=())
+
+    @property
+    def body(self) -> Capabilities | None:
+        """The body as it described itself; None: not yet."""
+        return self._body
+
+    def zero(self, at: Seconds) -> Seconds:
+        """Seconds of the picture at a local instant."""
+        return round(at - self.began, 3)
+
+    # -- what is told ---------------------------------------------------------------------------------------------
+
+    def feed(self, message: Message, at: Seconds, now: Seconds) -> None:
+        """Take a message. at: local instant that it tells of. now: local time, which never goes back."""
+        self.now = max(self.now, now)
+        self._see(message, at)
+        match message:
+            case World():
+                self._world = message
+                self._changed("scene")
+            case RobotState():
+                self._state = message
+                self._changed("scene")
+            case Capabilities():
+                self._body = message
+                self._changed("scene")
+            case HeadOwner():
+                self._head_since = at
+                self._changed("head")
+            case ConnectionEvent(retold=False):
+                self._events.feed(message, at)
+                self._changed("events", *(("measures",) if self._measures.feed(message, at) else ()))
+            case Statistics():
+                self._measures.feed(message, at)
+                self._changed("measures")
+            case BlockProgress() | SyncPointProgress() | PredictionFeedback():
+                self._take_block(message, at)
+            case NetPlanned() | NetMarked() | NetWaiting():
+                self._take_net(message, at)
+            case FragmentOutcome():
+                self._take_choices(message)
+            case PeerAlive() | PeerGone() | Status():
+                self._health.feed(message)
+                self._changed("health")
+            case Held() | BodyFaults():
+                self._changed("switched")
+        self._note(message, at)
+
+    def _see(self, message: Message, at: Seconds) -> None:
+        before = self._scene
+        if isinstance(message, OngoingActions):
+            self._scene = people.caught_up(before, message, at)
+        else:
+            self._scene = view.feed(before, message, at)
+        if isinstance(message, WordSpoken) or self._scene.said != before.said:
+            self._changed("words")
+        if self._scene.actors != before.actors:
+            self._changed("scene")
+
+    def _take_net(self, message: NetPlanned | NetMarked | NetWaiting, at: Seconds) -> None:
+        if isinstance(message, NetPlanned):
+            self._take_block(message, at)
+        self._nets = nets.feed(self._nets, message, at, self.now)
+        if isinstance(message, NetMarked):
+            self._changed("tokens")
+        elif (net := self._nets.get(message.block)) is not None:
+            self._lay_out(net)
+
+    def _take_block(
+        self, message: BlockProgress | SyncPointProgress | PredictionFeedback | NetPlanned, at: Seconds
+    ) -> None:
+        if id := self._blocks.feed(message, at):
+            self._changed(f"{BLOCK}{id}")
+
+    def _lay_out(self, net: nets.NetInView) -> None:
+        """Lay out a net, unless its structure is the one that it had."""
+        structure = (net.transitions, net.places, net.waits_for, net.began)
+        if self._structures.get(net.block) != structure:
+            self._structures[net.block] = structure
+            self._changed(f"{NET}{net.block}")
+        self._changed("nets", "tokens")
+
+    def _take_choices(self, outcome: FragmentOutcome) -> None:
+        for made in outcome.choices:
+            self._choices.append(
+                Choice(
+                    fragment=outcome.fragment, reference=made.reference, target=made.target, gesture=made.gesture,
+                    phrase=made.phrase, reliability=made.reliability, cost=made.cost, pairs=made.pairs,
+                )
+            )  # fmt: skip
+        if outcome.choices:
+            self._changed("references")
+
+    def _note(self, message: Message, at: Seconds) -> None:
+        text, level = "", "warning"
+        match message:
+            case WarningFeedback():
+                text = wording.warning(message).removeprefix("! ")
+            case Fault():
+                text, level = f"{message.service or 'fault'}: {message}", "fault"
+            case PeerGone(participant=name):
+                text, level = f"{name} has left the bus", "news"
+            case PeerAlive(participant=name):
+                text, level = f"{name} has come onto the bus", "news"
+        if text:
+            self.note(text, at, level)
+
+    def note(self, text: str, at: Seconds, level: str = "news") -> None:
+        """Add a note that no message tells. level: fault, warning or news."""
+        self._notes.append(Note(self.zero(at), level, text))
+        self._changed("notes")
+
+    def silence(self, names: frozenset[str], now: Seconds) -> None:
+        """Say which participants have not answered a question for their status."""
+        self.now = max(self.now, now)
+        if self._health.silence(names):
+            self._changed("health")
+
+    # -- what is shown --------------------------------------------------------------------------------------------
+
+    def advance(self, now: Seconds) -> None:
+        """Let time pass: forget what is over, and tell what is told slowly."""
+        self.now = max(self.now, now)
+        for id in self._blocks.forget(now):
+            self._drop(f"{BLOCK}{id}")
+        left = self._latest_shown(nets.without_old(self._nets, now))
+        if left.keys() != self._nets.keys():
+            for block in self._nets.keys() - left.keys():
+                self._structures.pop(block, None)
+                self._drop(f"{NET}{block}")
+            self._nets = left
+            self._changed("nets", "tokens")
+        for name in [name for name, due in self._late.items() if now >= due]:
+            del self._late[name]
+            self._number += 1
+            self.versions[name] = self._number
+
+    def _latest_shown(self, left: nets.Nets) -> nets.Nets:
+        """The nets that are left, and the newest that is not of a mere look: it stays, to be studied."""
+        others = [net for net in self._nets.values() if not net.block.startswith(view.OWN_BLOCKS)]
+        if not others or others[-1].block in left:
+            return left
+        last = others[-1]
+        return {last.block: last if last.is_over else replace(last, is_over=True), **left}
+
+    def section(self, name: str) -> bytes:
+        """A section as JSON. It is made once for each version."""
+        version = self.versions[name]
+        known = self._encoded.get(name)
+        if known is None or known[0] != version:
+            known = self._encoded[name] = (version, msgspec.json.encode(self._made(name)))
+        return known[1]
+
+    def _made(self, name: str) -> Any:
+        if name.startswith(BLOCK):
+            return self._blocks.shown(name.removeprefix(BLOCK), self.zero)
+        if name.startswith(NET):
+            return net_layout.laid_out(self._nets[name.removeprefix(NET)], self.zero)
+        made: dict[str, Callable[[], Any]] = {
+            "scene": lambda: scene.section(self._scene, self._world, self._state, self._body),
+            "words": self._words,
+            "head": self._head,
+            "events": lambda: self._events.shown(self.zero),
+            "nets": lambda: list(self._nets),
+            "tokens": lambda: [net_layout.tokens(net) for net in self._nets.values()],
+            "measures": lambda: self._measures.shown(self.zero),
+            "references": lambda: list(self._choices),
+            "health": self._health.shown,
+            "notes": lambda: list(self._notes),
+            "switched": self._switched,
+        }
+        return made[name]()
+
+    def _words(self) -> list[Utterance]:
+        said = sorted(self._scene.said, key=lambda each: each.began)
+        return [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in said]
+
+    def _head(self) -> HeadSection:
+        def shown(claim: Claim) -> ClaimShown:
+            return ClaimShown(claim.kind, claim.priority, claim.target, claim.reason)
+
+        owner = self._scene.owner
+        waiting = tuple(map(shown, self._scene.waiting))
+        return HeadSection(None if owner is None else shown(owner), self.zero(self._head_since), waiting)
+
+    def _switched(self) -> Switched:
+        held = tuple(wording.held(each.hold) for each in self._scene.held)
+        kinds = dict.fromkeys(each.kind for each in self._scene.faults)
+        return Switched(held, tuple(map(words, self._scene.faults)), tuple(kinds))
+
+    def _changed(self, *names: str) -> None:
+        for name in names:
+            if (pause := SLOWLY.get(name)) is not None:
+                self._late.setdefault(name, self.now + pause)
+                continue
+            self._number += 1
+            self.versions[name] = self._number
+
+    def _drop(self, name: str) -> None:
+        self.versions.pop(name, None)
+        self._encoded.pop(name, None)

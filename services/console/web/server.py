@@ -1,0 +1,132 @@
+"""Server of the page: the page itself by NiceGUI, and the frames over a WebSocket of their own."""
+
+import asyncio
+import contextlib
+import secrets
+import socket
+from collections.abc import AsyncIterator, Iterator, Sequence
+from urllib.parse import urlsplit
+
+import uvicorn
+from fastapi import FastAPI, WebSocket, WebSocketDisconnect
+from nicegui import ui
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.web.frames import Viewer
+from engage_hri.services.console.web.page import build
+from engage_hri.services.console.web.service import Window
+from engage_hri.services.console.web.visitor import Visitor
+
+TICK: Seconds = 1 / 15
+"""Least time between two frames of a browser."""
+FRAMES = "/frames"
+"""Path of the WebSocket."""
+
+
+def application(window: Window, hosts: Sequence[str], token: str) -> FastAPI:
+    """The page and its frames, for requests that name one of these hosts; `*` stands for all.
+
+    A page of somebody else's in the same browser may call 127.0.0.1, too: the name that it calls, and the page that a
+    WebSocket is from, have to be ours. token: who takes part has it in the address of the page.
+    """
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts])
+
+    @app.websocket(FRAMES)
+    async def frames(browser: WebSocket) -> None:
+        if urlsplit(browser.headers.get("origin", "")).netloc != browser.headers.get("host"):
+            await browser.close(4403, "the page is from elsewhere")
+            return
+        await browser.accept()
+        with contextlib.suppress(WebSocketDisconnect):
+            given = browser.query_params.get("token", "")
+            await _show(window, browser, Visitor(window, secrets.compare_digest(given.encode(), token.encode())))
+
+    @ui.page("/", title=f"Engage: {window.bus.robot}")
+    def page() -> None:
+        build(window)
+
+    ui.run_with(
+        app, dark=None, language="en-US", tailwind=False, show_welcome_message=False, storage_secret=None,
+        reconnect_timeout=10.0, binding_refresh_interval=None, gzip_middleware_factory=None,
+    )  # fmt: skip
+    return app
+
+
+async def _show(window: Window, browser: WebSocket, visitor: Visitor) -> None:
+    """Send frames until the browser has gone. Raises WebSocketDisconnect then."""
+    viewer, drawn = Viewer(), asyncio.Event()
+    drawn.set()
+
+    async def listen() -> None:
+        while True:
+            if visitor.take(await browser.receive_text()):
+                drawn.set()
+
+    window.viewers += 1
+    listening = asyncio.create_task(listen(), name="browser")
+    try:
+        while not listening.done():
+            window.picture.advance(window.bus.now())
+            frame = viewer.frame(window.picture, window.bus.now(), visitor.you, visitor.told())
+            if frame is not None:
+                drawn.clear()
+                await browser.send_text(frame.decode())
+                waiting = asyncio.ensure_future(drawn.wait())
+                await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
+                waiting.cancel()
+            await asyncio.sleep(TICK)
+        listening.result()
+    finally:
+        window.viewers -= 1
+        listening.cancel()
+        await visitor.leave()
+
+
+class _Quiet(uvicorn.Server):
+    """The server without its own ways with signals: the process has its own. stands: set when it serves."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.stands = asyncio.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self.stands.set()
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+@contextlib.asynccontextmanager
+async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
+    """Serve while the body of `async with` runs. port: 0: any that is free. Returns the port.
+
+    Raises OSError if the port is taken.
+    """
+    config = uvicorn.Config(
+        app, log_level="warning", access_log=False, ws="websockets-sansio", ws_per_message_deflate=False,
+        timeout_graceful_shutdown=1, lifespan="on",
+    )  # fmt: skip
+    listening = _bound(host, port)
+    server = _Quiet(config)
+    running = asyncio.create_task(server.serve(sockets=[listening]), name="web server")
+    try:
+        standing = asyncio.create_task(server.stands.wait())
+        await asyncio.wait((standing, running), return_when=asyncio.FIRST_COMPLETED)
+        standing.cancel()
+        if running.done():
+            running.result()
+        yield listening.getsockname()[1]
+    finally:
+        server.should_exit = True
+        server.force_exit = True
+        await asyncio.wait([running])
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    """A socket that listens there. Raises OSError if it cannot."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family)

@@ -1,0 +1,122 @@
+"""The window: follows the bus, keeps the picture, and shows it to browsers.
+
+Each browser gets a frame, draws it, says so, and gets the next one: a slow one misses frames and slows nothing.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from itertools import count
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import Capabilities, DescribeBody
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.client.robot import Robot
+from engage_hri.services.console.follow import FOLLOWED, following
+from engage_hri.services.console.web.health import NOTABLE
+from engage_hri.services.console.web.picture import Picture
+from engage_hri.services.console.web.script import Script
+
+PATTERNS = (
+    *FOLLOWED, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
+    keys.ANY_PERCEIVED_ONGOING,
+)  # fmt: skip
+"""Expressions for all that the window shows."""
+ASKED_EVERY: Seconds = 3.0
+"""Time between two questions for the status of all services, while somebody looks."""
+PATIENCE: Seconds = 1.0
+"""Time that they have to answer."""
+
+
+class Window:
+    """The picture of a robot's bus, kept up to date, and what people need who take part.
+
+    viewers: number of browsers; while there is none, services are not asked how they are.
+    """
+
+    def __init__(self, hub: Hub, bus: Bus, robot: Robot, script: Script) -> None:
+        self.hub = hub
+        self.bus = bus
+        self.robot = robot
+        self.script = script
+        self.picture = Picture(bus.robot, bus.now())
+        self.viewers = 0
+        self._here: set[str] = set()
+        self._numbers = count(1)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        """Take a message. at: its local instant."""
+        match message:
+            case PeerAlive(participant=name):
+                self._here.add(name)
+            case PeerGone(participant=name):
+                self._here.discard(name)
+        self.picture.feed(message, at, self.bus.now())
+
+    def new_id(self) -> str:
+        """Make an id for a fragment that somebody makes at the page."""
+        return f"by-hand-{self.bus.run[:4]}-{next(self._numbers)}"
+
+    def log(self, text: str) -> None:
+        """Write what somebody has ordered to the log, and show it to all who look."""
+        self.bus.log.info("%s", text)
+        self.picture.note(text, self.bus.now())
+
+    async def look_after(self) -> None:
+        """Ask the services how they are, again and again, and the body once what it is; until cancelled."""
+        described = False
+        while True:
+            if self.viewers:
+                await self._ask()
+            if not described and "control" in self._here:
+                described = await self._describe()
+            await asyncio.sleep(ASKED_EVERY if described or "control" not in self._here else PATIENCE)
+
+    async def _ask(self) -> None:
+        there = [name for name in NOTABLE if name in self._here]
+        answers = await asyncio.gather(
+            *(self.bus.query(keys.status(name), AskStatus(), PATIENCE) for name in there), return_exceptions=True
+        )
+        silent = set()
+        for name, answer in zip(there, answers, strict=True):
+            if isinstance(answer, Status):
+                self.picture.feed(answer, self.bus.now(), self.bus.now())
+            elif isinstance(answer, EngageError):
+                silent.add(name)
+            elif isinstance(answer, BaseException):
+                raise answer
+        self.picture.silence(frozenset(silent), self.bus.now())
+
+    async def _describe(self) -> bool:
+        try:
+            body = await self.bus.query(keys.DESCRIBE, DescribeBody(), PATIENCE)
+        except EngageError:
+            return False
+        if isinstance(body, Capabilities):
+            self.picture.feed(body, self.bus.now(), self.bus.now())
+        return True
+
+
+@asynccontextmanager
+async def window(hub: Hub, bus: Bus, script: Script) -> AsyncIterator[Window]:
+    """Follow the bus while the body of `async with` runs. bus: the window's own, with its role."""
+    async with Robot.on(bus) as robot:
+        shown = Window(hub, bus, robot, script)
+        async with _following(shown):
+            yield shown
+
+
+@asynccontextmanager
+async def _following(shown: Window) -> AsyncIterator[None]:
+    async with following(shown.bus, (shown,), patterns=PATTERNS):
+        looking = asyncio.create_task(shown.look_after(), name="status")
+        try:
+            yield
+        finally:
+            looking.cancel()
+            await asyncio.wait([looking])

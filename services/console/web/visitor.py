@@ -1,0 +1,213 @@
+"""Visitors: each is somebody at a browser, whose orders are carried out here."""
+
+import asyncio
+from collections import deque
+from collections.abc import Coroutine
+from typing import Any
+
+from msgspec.structs import replace
+
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.summary import summary
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.client.inputs import fragment_in
+from engage_hri.services.client.perceive import perceive
+from engage_hri.services.client.perceived_person import PerceivedPerson
+from engage_hri.services.console.web import orders, script
+from engage_hri.services.console.web.frames import You
+from engage_hri.services.console.web.laying import laid
+from engage_hri.services.console.web.service import Window
+
+REACH: Seconds = 0.9
+"""Time that a person takes to lay a thing elsewhere."""
+PATIENCE: Seconds = 5.0
+"""Time that the robot has to accept what it is asked for."""
+TOLD_KEPT = 8
+
+
+class Visitor:
+    """The one at a browser. trusted: the page was called with the token of the window."""
+
+    def __init__(self, window: Window, trusted: bool) -> None:
+        self._window = window
+        self._trusted = trusted
+        self._denied = orders.denied(window.bus.role, trusted)
+        self._told: deque[str] = deque(maxlen=TOLD_KEPT)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._person: PerceivedPerson | None = None
+        self._stands_up = asyncio.Event()
+        self._lets_go = asyncio.Event()
+        self._inhibits = False
+        self._acting: asyncio.Task[None] | None = None
+
+    @property
+    def you(self) -> You:
+        body = self._window.picture.body
+        return You(
+            person=self._person.id if self._person else "",
+            denied=self._denied,
+            script=self._window.script.titles,
+            faults=body.faults if body else (),
+            inhibits=self._inhibits,
+        )
+
+    def told(self) -> tuple[str, ...]:
+        """News of the orders since this was asked last."""
+        news = tuple(self._told)
+        self._told.clear()
+        return news
+
+    def take(self, text: str) -> bool:
+        """Carry out an order, or begin to. Returns True if it says that a frame was drawn; what fails is told."""
+        try:
+            order = orders.decoded(text)
+            if reason := orders.missing(order, self._window.bus.role, self._trusted):
+                raise InputRefused(Fault(reason=reason, where="not allowed"))
+            if isinstance(order, orders.Drawn):
+                return True
+            if isinstance(order, orders.SeatOrder):
+                self._be(order)
+            else:
+                self._drive(order)
+        except EngageError as error:
+            self._told.append(str(error))
+        return False
+
+    async def leave(self) -> None:
+        """End all that this visitor does. The person leaves, and a lease on the gaze ends."""
+        for task in self._tasks:
+            task.cancel()
+        if self._tasks:
+            await asyncio.wait(self._tasks)
+
+    # -- a person -------------------------------------------------------------------------------------------------
+
+    def _be(self, order: orders.SeatOrder) -> None:
+        if isinstance(order, orders.Sit):
+            if self._person is None:
+                self._stands_up.clear()
+                self._begin(self._sit(self._free_name(order.name.strip())))
+            return
+        if self._person is None:
+            raise InputRefused(Fault(reason="you have no seat", advice="take a seat first"))
+        match order:
+            case orders.Leave():
+                self._stands_up.set()
+            case orders.LookAt(target=target):
+                self._person.begin("look", target)
+            case orders.PointAt(target=target):
+                self._begin(self._person.point_at(target))
+            case orders.MoveHead(how=how):
+                self._begin(self._person.nod() if how == "nod" else self._person.shake())
+            case orders.Speak(on=on):
+                self._person.begin("speak") if on else self._person.end("speak")
+            case orders.Type(text=text):
+                self._begin(self._person.type(text))
+            case orders.Move(thing=thing, x=x, y=y):
+                self._lay(self._person, thing, x, y)
+
+    def _free_name(self, wanted: str) -> str:
+        taken = {each.id for each in self._window.picture.world.people}
+        if wanted:
+            if wanted in taken:
+                raise InputRefused(Fault(reason=f"{wanted!r} is there already", advice="take another name"))
+            return wanted
+        names = ("visitor", *(f"visitor-{number}" for number in range(2, len(taken) + 3)))
+        return next(name for name in names if name not in taken)
+
+    async def _sit(self, name: str) -> None:
+        try:
+            async with perceive(name, hub=self._window.hub) as person:
+                self._person = person
+                person.begin("look", self._window.bus.robot)
+                await self._stands_up.wait()
+        finally:
+            self._person = None
+
+    def _lay(self, person: PerceivedPerson, thing: str, x: float, y: float) -> None:
+        if self._acting is not None and not self._acting.done():
+            raise InputRefused(Fault(reason="your hand is on its way", advice="one thing after the other"))
+        there = laid(self._window.picture.world, thing, x, y)
+        if there is None:
+            raise InputRefused(Fault(reason=f"{thing!r} is nothing that can be moved", where=person.id))
+
+        async def act() -> None:
+            person.begin("look", thing)
+            await person.act(thing, to=there.position, seconds=REACH)
+            now = next((each for each in person.world if each.id == thing), there)
+            if now.yaw != there.yaw:
+                person.bring(replace(now, position=there.position, yaw=there.yaw))
+
+        self._acting = self._begin(act())
+
+    # -- the robot by hand ----------------------------------------------------------------------------------------
+
+    def _drive(self, order: orders.Order) -> None:
+        by = getattr(order, "by", "") or "somebody"
+        self._window.log(f"{by}: {orders.written(order)}")
+        robot = self._window.robot
+        match order:
+            case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
+                if not text.strip() and not target:
+                    raise InputRefused(Fault(reason="nothing to say", advice="write words, or choose an object"))
+                self._begin(self._perform(script.told(text, target, asks, addressee)))
+            case orders.Prepared(number=number):
+                if number >= len(self._window.script):
+                    raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))
+                self._begin(self._perform(self._window.script.take(number)))
+            case orders.Backchannel(how=how):
+                self._begin(self._perform(script.backchannel(how)))
+            case orders.InhibitGaze(on=True, mode=mode, target=target):
+                if not self._inhibits:
+                    self._lets_go.clear()
+                    self._begin(self._inhibit(mode, target))
+            case orders.InhibitGaze():
+                self._lets_go.set()
+            case orders.SteerOrder(to="hold"):
+                self._begin(_done(robot.hold(timeout=PATIENCE)))
+            case orders.SteerOrder(to="continue"):
+                self._begin(_done(robot.resume(timeout=PATIENCE)))
+            case orders.SteerOrder(to="stop"):
+                self._begin(_done(robot.stop(timeout=PATIENCE)))
+            case orders.SwitchOrder(faults=faults):
+                self._begin(_done(robot.switch_faults(faults, timeout=PATIENCE)))
+
+    async def _perform(self, thing: Any) -> None:
+        if isinstance(thing, Block):
+            await self._window.robot.realize(thing, timeout=PATIENCE)
+            return
+        fragment = fragment_in(thing, self._window.new_id())
+        outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
+        if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
+            self._told.append("; ".join(problems))
+
+    async def _inhibit(self, mode: Any, target: str) -> None:
+        async with self._window.robot.inhibit_gaze(mode, target=target, timeout=PATIENCE):
+            self._inhibits = True
+            try:
+                await self._lets_go.wait()
+            finally:
+                self._inhibits = False
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        async def contained() -> None:
+            try:
+                await work
+            except EngageError as error:
+                self._told.append(str(error))
+
+        task = asyncio.create_task(contained(), name="visitor")
+        self._tasks.add(task)
+        task.add_done_callback(self._ended)
+        return task
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._window.bus.failed(error, "an order of the page")
+
+
+async def _done(work: Coroutine[Any, Any, Any]) -> None:
+    await work

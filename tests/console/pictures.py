@@ -1,0 +1,52 @@
+"""Take the pictures of docs/console.md: `python -m tests.console.pictures`, on a machine with Chromium. A minute."""
+
+import asyncio
+import tempfile
+from pathlib import Path
+
+from tests.bus.places import free_endpoint
+from tests.console import browser
+from tests.console.browser import waited
+from tests.console.test_window import URL, engage
+
+FOLDER = Path(__file__).parents[2] / "docs" / "console"
+SIZES = ((1920, 1200), (1280, 1000), (400, 1400))
+
+
+async def take(url: str, port: int) -> None:
+    """Watch the tangram until the robot has asked for two pieces, then write a picture for each size and colour."""
+    async with browser.at_port(port) as running, running.page() as page:
+        await page.look(1920, 1200)
+        await page.go(url)
+        await page.until("window.engage?.state.references?.length > 3", 120)
+        await page.until("document.querySelector('#above .pointed')", 60)
+        for width, height in SIZES:
+            for dark in (False, True):
+                await page.look(width, height, dark=dark)
+                await page.until(f"document.documentElement.clientWidth === {width}")
+                await page.until("document.querySelector('#above .looked')", 60)
+                await page.value("new Promise((done) => setTimeout(done, 1000))")
+                name = f"{width}-{'dark' if dark else 'light'}.png"
+                (FOLDER / name).write_bytes(await page.picture(whole=False))
+        await page.look(1280, 800)
+        await page.value("document.querySelector('#net').scrollIntoView()")
+        await page.until("document.querySelectorAll('.net svg:not(.over) .fired').length > 4", 60)
+        (FOLDER / "net.png").write_bytes(await page.picture(whole=False))
+
+
+def main() -> None:
+    """Run a robot, its window and a browser, and take the pictures."""
+    FOLDER.mkdir(exist_ok=True)
+    endpoint = free_endpoint()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        up = ("up", "--task", "--in-one", "--listen", endpoint)
+        console = ("console", "--connect", endpoint, "--port", "0", "--role", "wizard")
+        with engage(folder / "console", *console) as window, engage(folder / "up", *up):
+            url = waited(window, folder / "console", URL)
+            with browser.running(folder) as port:
+                asyncio.run(take(url, port))
+
+
+if __name__ == "__main__":
+    main()

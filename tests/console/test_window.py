@@ -1,0 +1,296 @@
+"""The window in a real browser, on a running robot. One robot, one window and one browser serve all tests here."""
+
+import asyncio
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import aiohttp
+import pytest
+
+from tests.bus.places import free_endpoint
+from tests.console import browser
+from tests.console.browser import Page, waited
+
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="the extra `console` is not installed"),
+]
+needs_browser = pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium on this machine")
+SCRIPT = [{"turn_status": "full", "turn_index": 3, "parts": [{"say": "Good morning to you."}]}]
+NAMELESS = """
+[...document.querySelectorAll(".window button, .window input, .window select, .window canvas, .window [role=img]")]
+  .filter((each) => each.offsetParent || each.tagName === "svg")
+  .filter((each) => !(each.textContent.trim() || each.getAttribute("aria-label") || each.labels?.length
+    || each.closest("[role=img][aria-label]")))
+  .map((each) => each.outerHTML.slice(0, 90))
+"""
+"""What a screen reader could not name."""
+URL = rb"(http://[^\s]+)"
+
+
+class Place(NamedTuple):
+    """Addresses of a robot's bus and its window, and the port of a browser; 0: there is none."""
+
+    endpoint: str
+    url: str
+    port: int
+
+
+@contextmanager
+def engage(told: Path, *arguments: str, **settings: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """`engage` as a process that writes what it says to a file."""
+    with told.open("wb") as log:
+        process = subprocess.Popen(
+            (sys.executable, "-m", "engage_hri", *arguments), stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **settings},
+        )  # fmt: skip
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    """A robot with a table and nobody before it, a window in the role of the wizard, and a browser."""
+    folder, endpoint = tmp_path_factory.mktemp("window"), free_endpoint()
+    (folder / "script.json").write_text(json.dumps(SCRIPT))
+    (folder / "browser").mkdir()
+    up = ("up", "--in-one", "--listen", endpoint, "--set", "simulation.human=none")
+    shown = (
+        "console", "--connect", endpoint, "--port", "0", "--role", "wizard", "--script", str(folder / "script.json"),
+        "--log", str(folder / "log"),
+    )  # fmt: skip
+    with engage(folder / "up", *up) as robot, engage(folder / "console", *shown) as window:
+        waited(robot, folder / "up", b"(all services are up)")
+        url = waited(window, folder / "console", URL)
+        if browser.CHROMIUM is None:
+            yield Place(endpoint, url, 0)
+        else:
+            with browser.running(folder / "browser") as port:
+                yield Place(endpoint, url, port)
+
+
+@asynccontextmanager
+async def opened(place: Place, url: str = "") -> AsyncIterator[Page]:
+    """The window's page, once it shows the robot. It complains of nothing, and asks nobody else for anything."""
+    url = url or place.url
+    async with browser.at_port(place.port) as running, running.page() as page:
+        await page.look(1280, 1400)
+        await page.go(url)
+        await page.until("window.engage?.state.scene?.body && window.engage.state.you", 60)
+        yield page
+        home = url.split("/")[2]
+        strangers = [each for each in page.requests if not each.startswith("data:") and each.split("/")[2] != home]
+        assert page.errors == []
+        assert strangers == []
+
+
+async def press(page: Page, text: str, within: str = "body") -> None:
+    """Click the button with this text."""
+    found = f"[...document.querySelectorAll('{within} button')].find((each) => each.textContent.includes('{text}'))"
+    await page.until(f"{found} && !{found}.disabled")
+    await page.value(f"{found}.click()")
+
+
+async def sit(page: Page, name: str) -> None:
+    await page.value(f"document.querySelector('#your-name').value = '{name}'")
+    await press(page, "Take a seat")
+    await page.until(f"window.engage.state.you.person === '{name}'")
+
+
+@needs_browser
+async def test_a_fragment_from_the_form_is_said_to_the_visitor_and_the_tokens_of_its_net_move(place: Place) -> None:
+    async with opened(place) as page:
+        await sit(page, "ann")
+        await page.until("window.engage.state.scene.people.some((each) => each.id === 'ann' && each.at)")
+        before = await page.value("JSON.stringify(window.engage.state.scene.body.gaze)")
+        await page.until(
+            "[...document.querySelector('#wizard-target').options].some((each) => each.value === 'blue-square')"
+        )
+        await page.value("document.querySelector('#wizard-tell').value = 'Please take'")
+        await page.value("document.querySelector('#wizard-target').value = 'blue-square'")
+        await press(page, "Ask it", "#wizard")
+
+        await page.until("document.querySelector('.words').textContent.includes('Please take')")
+        await page.until(
+            "document.querySelectorAll('.net .token').length && document.querySelectorAll('.net .fired').length > 3"
+        )
+        where = "[...document.querySelectorAll('.net .token')].map((each) => each.getAttribute('cx')).join()"
+        first = await page.value(where)
+        await page.until(f"{where} !== '{first}'")
+        assert await page.value("JSON.stringify(window.engage.state.scene.body.gaze)") != before
+
+        await page.value("window.engage.send({ do: 'look', target: 'blue-square' })")
+        await page.until(
+            "window.engage.state.events.some((each) => each.kind === 'directed_gaze' && each.state === 'succeeded')"
+        )
+        await page.until("document.querySelector('.references summary')?.textContent.includes('blue-square')")
+        await page.value("document.querySelector('.references summary').click()")
+        await page.until("document.querySelectorAll('.references tr').length > 3")
+
+
+@needs_browser
+async def test_a_fault_is_switched_on_and_off_and_everybody_sees_it(place: Place) -> None:
+    async with opened(place) as page:
+        await page.until("document.querySelector('[data-kind=slow]')")
+        await press(page, "slow", ".faults")
+        await page.until("document.querySelector('.switched').textContent.includes('slow 2')")
+        await page.until("document.querySelector('[data-kind=slow]').getAttribute('aria-pressed') === 'true'")
+
+        await press(page, "slow", ".faults")
+        await page.until("document.querySelector('.switched').hidden")
+        assert "faults: slow" in await page.value("document.querySelector('.notes').textContent")
+
+
+@needs_browser
+async def test_two_visitors_in_two_windows_are_two_people(place: Place) -> None:
+    async with opened(place) as one, opened(place) as other:
+        await sit(one, "bob")
+        await sit(other, "eve")
+        both = "window.engage.state.scene.people.filter((each) => each.at && each.present).map((each) => each.id)"
+        await one.until(f"{both}.includes('bob') && {both}.includes('eve')")
+        await other.until(f"{both}.includes('bob') && {both}.includes('eve')")
+
+        await other.value("document.querySelector('#your-words').value = 'Hello there'")
+        await press(other, "Send", "#part")
+        await one.until("document.querySelector('.words').textContent.includes('Hello there')")
+
+        x, y = await one.value(
+            "window.engage.state.scene.things.find((each) => each.id === 'green-square').at.slice(0, 2)"
+        )
+        await other.value(f"window.engage.send({{ do: 'move', thing: 'green-square', x: {x + 0.25}, y: {y + 0.1} }})")
+        green = "window.engage.state.scene.things.find((each) => each.id === 'green-square').at[0]"
+        await one.until(f"{green} > {x + 0.2}")
+
+        await press(other, "Leave", "#part")
+        await one.until(f"!{both}.includes('eve')")
+
+
+@needs_browser
+async def test_a_prepared_fragment_is_said_at_a_key(place: Place) -> None:
+    async with opened(place) as page:
+        await sit(page, "kim")
+        await page.value("document.activeElement.blur()")
+        await page.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: '1' }))")
+
+        await page.until("document.querySelector('.words').textContent.includes('Good morning to you.')")
+
+
+@needs_browser
+async def test_without_the_token_one_only_looks_and_is_told_why(place: Place) -> None:
+    async with opened(place, place.url.partition("?")[0]) as page:
+        await page.until("document.querySelector('#part').textContent.includes('token')")
+        await page.value("window.engage.send({ do: 'steer', to: 'stop' })")
+
+        await page.until("document.querySelector('.told').textContent.includes('token')")
+        assert await page.value("document.querySelector('#part .row').hidden")
+
+
+@needs_browser
+async def test_the_page_fits_every_width_in_both_colours_and_names_all_it_has(place: Place) -> None:
+    async with opened(place) as page:
+        for width, dark in ((400, False), (400, True), (1280, False), (1280, True), (1920, False), (1920, True)):
+            await page.look(width, 1000, dark=dark)
+            await page.until(f"document.body.classList.contains('body--dark') === {str(dark).lower()}")
+            await page.until(f"document.documentElement.clientWidth === {width}")
+
+            assert await page.value("document.documentElement.scrollWidth") <= width
+            assert len(await page.picture()) > 20_000
+        assert await page.value(NAMELESS) == []
+
+
+# -- without a browser ---------------------------------------------------------------------------------------------
+
+
+async def test_who_does_not_draw_gets_one_frame_and_nobody_else_waits(place: Place) -> None:
+    frames = place.url.replace("http", "ws").replace("/?", "/frames?")
+    origin = {"Origin": place.url.rpartition("/")[0]}
+    async with (
+        aiohttp.ClientSession() as session,
+        session.ws_connect(frames, headers=origin) as slow,
+        session.ws_connect(frames, headers=origin) as quick,
+    ):
+        for _ in range(4):
+            await quick.receive_json(timeout=20)
+            await quick.send_str('{"do": "drawn"}')
+        first = await slow.receive_json(timeout=20)
+        with pytest.raises(TimeoutError):
+            await slow.receive(timeout=0.3)
+        await slow.send_str('{"do": "drawn"}')
+        second = await slow.receive_json(timeout=20)
+
+    assert set(first["sections"]) > set(second.get("sections", {}))
+    assert second["now"] > first["now"] + 0.3
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "", "http://localhost:1"])
+async def test_a_page_from_elsewhere_gets_no_frames(place: Place, origin: str) -> None:
+    frames = place.url.replace("http", "ws").replace("/?", "/frames?")
+    async with aiohttp.ClientSession() as session:
+        with pytest.raises(aiohttp.WSServerHandshakeError):
+            await session.ws_connect(frames, headers={"Origin": origin} if origin else {})
+        async with session.get(place.url, headers={"Host": "evil.example"}) as answer:
+            assert answer.status == 400
+
+
+async def test_what_is_no_order_is_told_and_ends_nothing(place: Place) -> None:
+    frames = place.url.replace("http", "ws").replace("/?", "/frames?")
+    origin = {"Origin": place.url.rpartition("/")[0]}
+    async with aiohttp.ClientSession() as session, session.ws_connect(frames, headers=origin) as socket:
+        for text in ("nonsense", '{"do": "look"}', '{"do": "steer", "to": "continue"}'):
+            await socket.send_str(text)
+        told: list[Any] = []
+        async with asyncio.timeout(20):
+            while len(told) < 2:
+                frame = await socket.receive_json()
+                told += frame.get("told", [])
+                await socket.send_str('{"do": "drawn"}')
+
+    assert "reload the page" in told[0]
+    assert "take a seat first" in told[1]
+
+
+@needs_browser
+async def test_a_window_whose_robot_has_gone_says_so_and_then_that_it_is_gone_itself(
+    tmp_path: Path, place: Place
+) -> None:
+    endpoint = free_endpoint()
+    up = ("up", "--in-one", "--listen", endpoint, "--set", "simulation.human=none")
+    console = ("console", "--connect", endpoint, "--port", "0")
+    with engage(tmp_path / "console", *console) as window, engage(tmp_path / "up", *up) as robot:
+        waited(robot, tmp_path / "up", b"(all services are up)")
+        url = waited(window, tmp_path / "console", URL)
+        async with browser.at_port(place.port) as running, running.page() as page:
+            away = "document.querySelector('.away')"
+            await page.go(url)
+            await page.until(f"{away}?.hidden && window.engage.state.scene?.body", 40)
+            robot.terminate()
+            robot.wait(30)
+            await page.until(f"{away}.textContent.includes('No robot is on the bus')", 40)
+            window.terminate()
+            window.wait(30)
+            await page.until(f"{away}.textContent.includes('does not answer')", 40)
+
+
+@needs_browser
+async def test_the_demo_shows_itself_and_takes_its_window_with_it(tmp_path: Path, place: Place) -> None:
+    with engage(tmp_path / "demo", "demo", "--window", BROWSER="true %s") as demo:
+        url = waited(demo, tmp_path / "demo", rb"the window: (http://[^\s]+)")
+        async with opened(place, url) as page:
+            gaze = "JSON.stringify(window.engage.state.scene.body.gaze)"
+            first = await page.value(gaze)
+            await page.until(f"{gaze} !== '{first}'", 40)
+            await page.until("document.querySelector('.words').textContent.includes('tangram')", 40)
+            await page.until("document.querySelectorAll('.net .fired').length", 40)
+            demo.terminate()
+            assert demo.wait(30) == 143
+            await page.until("document.querySelector('.away').textContent.includes('does not answer')", 40)
