@@ -35,19 +35,22 @@ PURE_MACHINERY = {
     "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
     "services/client/chunking.py",
     "services/client/event_stream.py",
+    "services/bus/samples.py", "services/bus/payloads.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
 """Packages of `services` that are no service: they put services together and may import all of them."""
-SHARED = {"bus", "requests", "runtime", "client", "tangram"}
+SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording"}
 """Packages of `services` that are no service, and that services may import."""
+PURE_SHARED = {"recording"}
+"""Those of them whose files are pure, as those of a service are."""
 LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
-    " simulation study > client > requests > runtime > bus > tangram",
-    "services/bus": "memory zenoh > interface payloads > answering config journal keyring",
+    " simulation study > client > recording > requests > runtime > bus > tangram",
+    "services/bus": "memory zenoh > interface > payloads subscription > samples > answering config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions estimates refusals switching told unheard waiting > live > body"
@@ -181,7 +184,7 @@ def _is_pure(place: PurePosixPath) -> bool:
     return (
         place.parts[0] == "services"
         and len(place.parts) > 2
-        and place.parts[1] not in COMPOSERS | SHARED
+        and place.parts[1] not in COMPOSERS | (SHARED - PURE_SHARED)
         and place.name != "service.py"
         and "testing" not in place.parts  # tests that are installed
         and str(place) not in SHELLS
