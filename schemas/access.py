@@ -124,6 +124,7 @@ TABLE: tuple[Row, ...] = (
         heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
     ),
+    Row("recognition", "publishes", keys.TAKEN, "told while somebody records"),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,
         keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD,),
@@ -147,6 +148,7 @@ TABLE: tuple[Row, ...] = (
                     keys.ANY_PERCEIVED_ONGOING)
     ),
     Row("observer", "subscribes", keys.WORLD, "looked at by `engage doctor`"),
+    *(Row("observer", "subscribes", key, "recorded by `engage record`") for key in (keys.TAKEN, keys.ROBOT_SEEN)),
     *_watches("operator", "what an operator sees"),
     Row("operator", "subscribes", keys.NET, "what an operator sees"),
     *_commands("operator", "robot", "faults"),

@@ -43,6 +43,8 @@ ROBOT_ACTION = f"{PREFIX}/evt/control/action"
 PERCEIVED_ACTION = f"{PREFIX}/evt/perception/action"
 RECOGNIZED_ACTION = f"{PREFIX}/evt/recognition/action"
 """Actions that recognition finds in raw perception; the same messages as on `PERCEIVED_ACTION`."""
+TAKEN = f"{PREFIX}/evt/recognition/taken"
+"""Ledger of what recognition took, while somebody listens."""
 ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"

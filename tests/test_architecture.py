@@ -58,7 +58,7 @@ LAYERS = {
     "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"
     " > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
-    "services/recognition": "service > recognizer > perceive statistics > events > config",
+    "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what
 stands further right, and nothing beside it or further left."""

@@ -69,17 +69,17 @@ class Line(Struct, frozen=True):
 
 
 class Sealed(Struct):
-    """A chunk that is not in the file yet. index: its offsets count from its own beginning. lines: new in it."""
+    """A chunk that is not in the file yet. index: its offsets count from its own beginning. lines: new in it.
+
+    messages: number of those of the bus.
+    """
 
     data: bytes
     index: ChunkIndex
     counts: Counter[int]
+    messages: int
     lines: tuple[Line, ...]
     has_schema: bool
-
-    @property
-    def messages(self) -> int:
-        return self.counts.total()
 
 
 class Writer:
@@ -87,6 +87,7 @@ class Writer:
 
     def __init__(self) -> None:
         self.waiting = 0
+        self._of_bus = 0
         self._chunk = RecordBuilder()
         self._compressor = zstandard.ZstdCompressor(level=LEVEL)
         self._indices: dict[int, MessageIndex] = {}
@@ -128,6 +129,7 @@ class Writer:
         self._first = min(self._first, log_time) if self.waiting else log_time
         self._last = max(self._last, log_time) if self.waiting else log_time
         self.waiting += 1
+        self._of_bus += bool(line.key)
         number = sequence & 0xFFFFFFFF
         message = Message(
             channel_id=channel, sequence=number, log_time=log_time, publish_time=publish_time, data=data
@@ -180,10 +182,11 @@ class Writer:
                 message_index_offsets=offsets, uncompressed_size=len(plain),
             ),
             Counter({channel: len(index.records) for channel, index in self._indices.items()}),
+            self._of_bus,
             tuple(self._new),
             self._schema is not None and any(self._channels[line].schema_id for line in self._new),
         )  # fmt: skip
-        self._indices, self.waiting, self._new = {}, 0, []
+        self._indices, self.waiting, self._of_bus, self._new = {}, 0, 0, []
         return sealed
 
     def placed(self, sealed: Sealed, offset: int) -> None:
