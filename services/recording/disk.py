@@ -152,7 +152,7 @@ def repair(path: Path) -> int:
 
 
 def _sync_folder(path: Path) -> None:
-    """Have the file's name on the disk, too."""
+    """Put the name of the file on the disk, too."""
     folder = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(folder)

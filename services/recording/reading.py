@@ -124,6 +124,10 @@ class Recording:
         channel = self._channels[self._of_channel[number]]
         return self.sample(number).key if channel.topic == MORE else str(channel.metadata.get("key", ""))
 
+    def life(self, number: int) -> str:
+        """Life that a message came from."""
+        return str(self._channels[self._of_channel[number]].metadata.get("life", ""))
+
     def sample(self, number: int) -> Sample:
         """Return a message as it came, to the byte. at: on the clock of the recorder."""
         channel, message = self._channels[self._of_channel[number]], self._message(number)

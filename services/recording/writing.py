@@ -10,6 +10,7 @@ import zlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -46,7 +47,7 @@ SCHEMA = 1
 
 
 class Line(Struct, frozen=True):
-    """Which messages share a channel: of one key, sender, life, clock, encoding, and either past or not.
+    """Messages that share a channel: of one key, sender, life, clock, encoding, and either past or not.
 
     sender: participant. is_past: from before the recording. form: encoding of its messages in the file.
     """
@@ -250,6 +251,7 @@ def end(contents: Contents, offset: int) -> bytes:
     return data + summary + told + footer + MCAP0_MAGIC
 
 
+@cache
 def _schema() -> Schema:
     """The JSON Schema of any message. Viewers want to hear that it is an object."""
     whole = {**bundle(), "type": "object", "properties": {"type": {"type": "string"}}}
