@@ -8,7 +8,7 @@
 Times called `at` count from the beginning of the recording; `now` is any clock that runs evenly.
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 
 from engage_hri.schemas import keys
@@ -48,14 +48,11 @@ class Timeline:
 
     def until(self, at: Seconds) -> int:
         """Number of messages that came up to and including a time."""
-        low, high = 0, len(self.recording)
-        while low < high:
-            middle = (low + high) // 2
-            if self.recording.time(middle) <= at:
-                low = middle + 1
-            else:
-                high = middle
-        return low
+        return bisect_right(range(len(self.recording)), at, key=self.recording.time)
+
+    def before(self, at: Seconds) -> int:
+        """Number of messages that came before a time."""
+        return bisect_left(range(len(self.recording)), at, key=self.recording.time)
 
     def standing(self, count: int) -> list[Sample]:
         """What somebody gets who comes after the first `count` messages: who is there, and the last states.
@@ -131,10 +128,14 @@ class Player:
         return [sample for sample in samples if sample.key]
 
     def seek(self, at: Seconds, now: Seconds) -> list[Sample]:
-        """Go to a time, to and fro. Returns what stands then; what comes later follows by `advance`."""
+        """Go to a time, to and fro. Returns what stood before it; what came then, or later, follows by `advance`."""
         self._at, self._since = min(max(0.0, at), self.end), now
-        self._next = self.timeline.until(self._at)
+        self._next = self.timeline.before(self._at)
         return self.timeline.standing(self._next)
+
+    def finish(self) -> None:
+        """Take the end for reached."""
+        self.end, self._next = -1.0, max(self._next, self.timeline.until(self.end))
 
     def pause(self, now: Seconds) -> None:
         self._at, self._since, self.is_paused = self.at(now), now, True

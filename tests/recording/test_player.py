@@ -74,11 +74,11 @@ def test_wherever_it_goes_it_gives_what_a_scan_gives(samples: list[Sample], ways
     for to, while_ in ways:
         place = min(to, player.end)
         stood = player.seek(to, now)
-        assert stood == standing([one for one in samples if one.at <= place])
+        assert stood == standing([one for one in samples if one.at < place])
 
         now += while_
         until = min(player.end, place + while_)
-        assert player.advance(now) == [one for one in samples if place < one.at <= until]
+        assert player.advance(now) == [one for one in samples if place <= one.at <= until]
 
 
 @given(stories(), st.sampled_from([0.25, 1.0, 3.0, 7.0]))
@@ -127,3 +127,4 @@ def test_the_number_until_a_time_is_that_of_a_count() -> None:
 
     for at in (-1.0, 0.0, 0.25, 0.5, 1.0, 2.0, 3.0):
         assert timeline.until(at) == len([one for one in samples if one.at <= at])
+        assert timeline.before(at) == len([one for one in samples if one.at < at])
