@@ -65,6 +65,7 @@ class Ledger:
         self._began = began
         self._steps: list[Step] = []
         self._first = 1
+        self._is_heard = False
         self.deadline: Seconds | None = None
         """Time at which the steps are to be told."""
 
@@ -83,6 +84,7 @@ class Ledger:
         if not self._steps:
             return None
         if not is_heard:
+            self._is_heard = False
             if now - self._began > FIRST or len(self._steps) >= MOST:
                 self._first += len(self._steps)
                 self._steps = []
@@ -91,8 +93,9 @@ class Ledger:
             return None
         told = Taken(
             session=self._session, at=Stamp(self._clock, now), first=self._first, steps=tuple(self._steps),
-            settings=self._settings if self._first == 1 else "",
+            settings="" if self._is_heard else self._settings,
         )  # fmt: skip
+        self._is_heard = True
         self._first += len(self._steps)
         self._steps = []
         return told

@@ -128,6 +128,10 @@ class Recording:
         """Life that a message came from."""
         return str(self._channels[self._of_channel[number]].metadata.get("life", ""))
 
+    def number(self, number: int) -> int:
+        """Number of a message in its life, modulo 2 ** 32; 0: it has none."""
+        return self._message(number).sequence
+
     def sample(self, number: int) -> Sample:
         """Return a message as it came, to the byte. at: on the clock of the recorder."""
         channel, message = self._channels[self._of_channel[number]], self._message(number)
