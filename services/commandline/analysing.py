@@ -107,16 +107,21 @@ def _doubts(recording: Recording, lives: Counter[str], before: int) -> Iterable[
 
 
 class Compared(Struct, frozen=True, kw_only=True):
-    """One life of recognition, live and again. live, again: changes of events. differing: pairs that differ."""
+    """One life of recognition, live and again. live, again: changes of events.
+
+    sure: number of changes that have to be there live. What the last steps led to comes after them, and the recording
+    may have ended, or recognition may have been killed, in between.
+    """
 
     session: str
     live: tuple[ConnectionEvent, ...]
     again: tuple[ConnectionEvent, ...]
     lack: Lack
+    sure: int
 
     @property
     def is_same(self) -> bool:
-        return self.live == self.again
+        return self.live == self.again[: len(self.live)] and len(self.live) >= self.sure
 
     def differences(self) -> list[tuple[ConnectionEvent | None, ConnectionEvent | None]]:
         """Changes that only one side has, or that differ: of one event and state together."""
@@ -134,6 +139,7 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
     """Recognize once more, each life of recognition for itself."""
     found: dict[str, tuple[Again, list[ConnectionEvent]]] = {}
     live: dict[str, list[ConnectionEvent]] = {}
+    sure: dict[str, int] = {}
     numbers = _numbers(recording)
 
     def find(life: str, number: int) -> Received | None:
@@ -152,9 +158,10 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
                 config = choose(settings_of(message) or RecognitionConfig())
                 found[message.session] = (Again(recording.robot, message.session, message.at.clock, config), [])
             life, events = found[message.session]
+            sure[message.session] = len(events)
             events += events_in(life.take(message, find))
     return [
-        Compared(session=name, live=tuple(live.get(name, ())), again=tuple(events), lack=life.lack)  # fmt: skip
+        Compared(session=name, live=tuple(live.get(name, ())), again=tuple(events), lack=life.lack, sure=sure[name])
         for name, (life, events) in found.items()
     ]
 

@@ -138,7 +138,8 @@ SIMULATED = Compared(
     title="Hypotheses of the thesis (5.2.2), in simulation", baseline="oper.", other="degr.",
     how="Sessions of the same seed are compared as pairs, though they are hardly more alike than others. p: "
     "two-sided permutation test of their differences (signs flipped), corrected for the number of questions (Holm). "
-    "95 %: the differences that the test does not reject, uncorrected. d: mean / standard deviation of the differences.",
+    "95 %: the differences that the test does not reject, uncorrected. d: mean / standard deviation of the "
+    "differences.",
     caveat=CAVEAT,
 )  # fmt: skip
 _TESTED = (
