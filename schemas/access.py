@@ -131,6 +131,7 @@ TABLE: tuple[Row, ...] = (
                keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
     ),
+    Row("recognition", "publishes", keys.TAKEN, "told while somebody records"),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,
         keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD,),
@@ -152,6 +153,7 @@ TABLE: tuple[Row, ...] = (
     *_watches("observer"),
     *_looks("observer", keys.WORLD),
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
+    *(Row("observer", "subscribes", key, "recorded by `engage record`") for key in (keys.TAKEN, keys.ROBOT_SEEN)),
     *_watches("operator", "what an operator sees"),
     *_looks("operator", keys.WORLD),
     *_commands("operator", "robot", "faults"),

@@ -45,6 +45,8 @@ UTTERANCE = f"{PREFIX}/evt/perception/utterance"
 """`Utterance`: the words of people."""
 RECOGNIZED_ACTION = f"{PREFIX}/evt/recognition/action"
 """Actions that recognition finds in raw perception; the same messages as on `PERCEIVED_ACTION`."""
+TAKEN = f"{PREFIX}/evt/recognition/taken"
+"""Ledger of what recognition took, while somebody listens."""
 ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"

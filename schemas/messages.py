@@ -40,6 +40,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
 from engage_hri.schemas.holds import BodyHeld, Held
+from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.limits import LARGEST
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
@@ -70,7 +71,7 @@ Message = (
     | SwitchFaults | FaultsSwitched | BodyFaults | DescribeBody | Capabilities | EstimateBehaviors | Estimates
     | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | Utterance
     | World | HeadPose | VoiceActivity
-    | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics
+    | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics | Taken
     | AskStatus | Status | PeerAlive | PeerGone
 )  # fmt: skip
 """Union of all messages. The field `type` of the encoded form says which one it is."""

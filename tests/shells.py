@@ -37,6 +37,8 @@ SHELLS = {
     "services/control/voice/pipe.py",  # runs the process of a player
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
+    "services/recording/replay.py",  # says what was said
+    "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
     "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
     "services/hostile/visitor.py",  # an honest client

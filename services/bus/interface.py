@@ -9,182 +9,26 @@ import logging
 import platform
 import time
 from abc import ABC, abstractmethod
-from collections import Counter, deque
-from collections.abc import Callable, Coroutine, Iterable, Iterator
-from enum import Enum, auto
-from typing import Any, Generic, Self, TypeVar
-
-from msgspec import Struct
+from collections.abc import Callable, Coroutine, Iterator
+from typing import Any, Self
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Request, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
+from engage_hri.services.bus.subscription import CAPACITY as CAPACITY
+from engage_hri.services.bus.subscription import Keep as Keep
+from engage_hri.services.bus.subscription import Reading as Reading
+from engage_hri.services.bus.subscription import Received as Received
+from engage_hri.services.bus.subscription import Sample as Sample
+from engage_hri.services.bus.subscription import Subscription as Subscription
+from engage_hri.services.bus.subscription import Tap as Tap
 
 LOG = logging.getLogger("engage")
 """Log of all that is not one participant's. A line at level ERROR is a bug, and fails a test that expects none."""
-
-
-class Keep(Enum):
-    """Messages that a subscription keeps while its reader is busy."""
-
-    EVERY = auto()
-    LATEST = auto()
-    """Keep only the newest message of each key."""
-
-
-class Received(Struct, frozen=True):
-    """A message as it arrived. source: the participant that published it. at: local time of arrival.
-
-    life: of the process or connection that it came from, where that is known. past: the message is from before the
-    subscription, given to a late subscriber as the class of its key says.
-    """
-
-    key: str
-    message: Message
-    source: str
-    at: Seconds
-    past: bool = False
-    life: str = ""
-
-
-T = TypeVar("T")
-
-
-class Reading(ABC, Generic[T]):
-    """Items read one by one: with `next`, or with `async for` until there are no more; `with` closes the reading."""
-
-    @abstractmethod
-    async def next(self, until: Seconds | None = None, /) -> T | None:
-        """Wait for the next item; None if there is none by `until`, or after the end."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """End the reading: no items come any more."""
-
-    def __aiter__(self) -> Self:
-        return self
-
-    async def __anext__(self) -> T:
-        one = await self.next()
-        if one is None:
-            raise StopAsyncIteration
-        return one
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        self.close()
-
-
-KEYS_KEPT = 1024
-"""Number of keys of which a subscription knows the pattern: clients come and go, each with its own."""
-
-
-class Subscription(Reading[Received]):
-    """A bounded queue of received messages, in order across all its keys; read it with `async for` or `next`.
-
-    Used by one task at a time. When full, the oldest message of the process that has most in it is dropped and
-    counted in `overflowed`: a flood costs nobody else anything. Who comes and goes is never dropped.
-    """
-
-    def __init__(
-        self, patterns: Iterable[str], keep: Keep, capacity: int, on_close: Callable[["Subscription"], None]
-    ) -> None:
-        self.patterns = tuple(patterns)
-        self.keep, self.capacity, self.overflowed = keep, capacity, 0
-        self._queue: deque[Received] = deque()
-        self._lives = Counter[str]()
-        self._waiting: asyncio.Future[None] | None = None
-        self._on_close, self._closed = on_close, False
-        self._carriers: dict[str, str | None] = {}
-
-    def wants(self, key: str) -> bool:
-        """True if a pattern includes the key."""
-        try:  # a shorter way, for this is asked for every message and subscription
-            return self._carriers[key] is not None
-        except KeyError:
-            return self.carrier(key) is not None
-
-    def carrier(self, key: str) -> str | None:
-        """The first pattern that includes the key: each message comes once, however many patterns include it."""
-        if keys.is_presence(key):  # Each who comes and goes has a key, which is hardly ever asked for again.
-            return keys.first(self.patterns, key)
-        if key not in self._carriers:
-            if len(self._carriers) >= KEYS_KEPT:
-                self._carriers.clear()
-            self._carriers[key] = keys.first(self.patterns, key)
-        return self._carriers[key]
-
-    def offer(self, received: Received) -> None:
-        """Put a message in the queue; called by the bus."""
-        if self._closed:
-            return
-        self._lives[received.life] += 1
-        if self.keep is Keep.LATEST:
-            for index, queued in enumerate(self._queue):
-                if queued.key == received.key:
-                    self._remove(index)
-                    break
-        elif len(self._queue) >= self.capacity:
-            self._make_room()
-        self._queue.append(received)
-        self._wake()
-
-    def _make_room(self) -> None:
-        for life, _ in self._lives.most_common():
-            for index, queued in enumerate(self._queue):
-                if queued.life == life and not isinstance(queued.message, PeerAlive | PeerGone):
-                    self._remove(index)
-                    self.overflowed += 1
-                    return
-
-    def _remove(self, index: int) -> Received:
-        received = self._queue[index]
-        del self._queue[index]
-        self._lives[received.life] -= 1
-        if not self._lives[received.life]:
-            del self._lives[received.life]
-        return received
-
-    def _wake(self) -> None:
-        if self._waiting is not None and not self._waiting.done():
-            self._waiting.set_result(None)
-
-    def __len__(self) -> int:
-        return len(self._queue)
-
-    @property
-    def is_over(self) -> bool:
-        """True if the subscription is closed and read to its end: `next` does not wait any more."""
-        return self._closed and not self._queue
-
-    async def next(self, deadline: Seconds | None = None) -> Received | None:
-        """Wait for the next message; None if there is none by loop time `deadline`, or after `close`."""
-        loop = asyncio.get_running_loop()
-        while not self._queue and not self._closed:
-            if deadline is not None and loop.time() >= deadline:
-                return None
-            self._waiting = waiting = loop.create_future()
-            timer = None if deadline is None else loop.call_at(deadline, self._wake)
-            try:
-                await waiting
-            finally:
-                self._waiting = None
-                if timer is not None:
-                    timer.cancel()
-        return self._remove(0) if self._queue else None
-
-    def close(self) -> None:
-        if not self._closed:
-            self._closed = True
-            self._on_close(self)
-            self._wake()
 
 
 Answer = Callable[[Message], Message | Coroutine[Any, Any, Message]]
@@ -296,6 +140,13 @@ class Bus(ABC):
         """Queue all messages of these key expressions. Past ones come first, as the class of each key says.
 
         A pattern of class `alive` delivers `PeerAlive` for all participants that are there, then every change.
+        """
+
+    @abstractmethod
+    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
+        """Queue all messages of these key expressions as they travel, undecoded; past ones as `subscribe` does.
+
+        Messages that nobody can read are among them. capacity: bytes of the payloads that wait.
         """
 
     @abstractmethod

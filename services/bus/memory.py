@@ -12,13 +12,23 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.messages import Message, decode, encode, published
+from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.answering import Answering
-from engage_hri.services.bus.interface import Answer, Bus, Hub, Keep, Received, Subscription
+from engage_hri.services.bus.interface import (
+    CAPACITY,
+    Answer,
+    Bus,
+    Hub,
+    Keep,
+    Received,
+    Sample,
+    Subscription,
+    Tap,
+)
 from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
 
 
@@ -27,6 +37,7 @@ class Past(NamedTuple):
 
     number: int
     received: Received
+    sample: Sample
 
 
 DOCUMENTS = (PerformBlock, PerformFragment)
@@ -86,14 +97,15 @@ class MemoryHub(Hub):
         if isinstance(message, LOCAL):
             raise TypeError(f"{type(message).__name__} is never sent")
         payload, encoding = published(message)
+        now, life = self._loop.time(), self._buses[sender].run
+        sample = Sample(key, payload, encoding, sender, now, life=life, number=self.sent + 1, clock="loop", sent=now)
         if self._decodes or isinstance(message, DOCUMENTS):
             try:
                 message = decode(payload, encoding)
             except InputRefused as error:  # as on a wire: the receivers refuse it, not the sender
-                self._refuse(key, error, payload, encoding, self._buses[sender].run)
+                self._refuse(error, sample)
                 return
-        life = self._buses[sender].run
-        self._pass_on(sender, Received(key, message, sender, self._loop.time(), life=life))
+        self._pass_on(sender, Received(key, message, sender, now, life=life, number=self.sent + 1), sample)
 
     def carried(self, message: Message) -> Message:
         """The question or answer as its receiver gets it. Raises what makes it impossible to send."""
@@ -102,31 +114,36 @@ class MemoryHub(Hub):
 
     def wants(self, key: str) -> bool:
         """Tell whether any participant has subscribed to `key`."""
-        return any(bus.wants(key) for bus in self._buses.values())
+        return any(bus.wants(key) or bus.taps(key) for bus in self._buses.values())
 
     def inject(self, key: str, payload: bytes, encoding: str, life: str = "") -> None:
         """Send a payload from outside, as another program would. A bad one is answered with a Fault.
 
         life: of the connection that it comes by.
         """
+        sample = Sample(key, payload, encoding, "", self._loop.time(), life=life)
         try:
             message = read_payload(payload, encoding, key, "")
         except InputRefused as error:
-            self._refuse(key, error, payload, encoding, life)
+            self._refuse(error, sample)
         else:
-            self._pass_on("", Received(key, message, "", self._loop.time(), life=life))
+            self._pass_on("", Received(key, message, "", self._loop.time(), life=life), sample)
 
-    def _refuse(self, key: str, error: InputRefused, payload: bytes, encoding: str, life: str = "") -> None:
+    def _refuse(self, error: InputRefused, sample: Sample) -> None:
+        key = sample.key
+        self.sent += 1
+        for bus in tuple(self._buses.values()):
+            bus.show(sample, self.sent)
         for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
             bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
-        refused = unreadable(error, key, payload, encoding)
+        refused = unreadable(error, key, sample.payload, sample.encoding)
         if refused is not None and (server := self._buses.get(keys.server_of(key))):
             self.sent += 1
-            server.deliver(Received(key, refused, "", self._loop.time(), life=life), self.sent)
+            server.deliver(Received(key, refused, "", self._loop.time(), life=sample.life), self.sent)
 
-    def _pass_on(self, sender: str, received: Received) -> None:
+    def _pass_on(self, sender: str, received: Received, sample: Sample) -> None:
         self.sent += 1
-        past = Past(self.sent, received)
+        past = Past(self.sent, received, sample)
         kind = keys.key_class(received.key)
         if kind == "state":
             self._state[received.key] = past
@@ -138,21 +155,29 @@ class MemoryHub(Hub):
 
     def _carry(self, past: Past, sender: str, bus: "MemoryBus") -> None:
         bus.deliver(past.received, past.number)
+        bus.show(past.sample, past.number)
 
     def _is_cut(self, one: str, other: str) -> bool:
         return (one in self._cut) != (other in self._cut)
 
-    def replay(self, name: str, subscription: Subscription) -> int:
+    def replay(self, name: str, reader: Subscription | Tap) -> int:
         """Offer a late subscriber the participants, then the past in order; returns its last number."""
         now = self._loop.time()
         for bus in self._buses.values():
-            if bus.is_alive and subscription.wants(key := keys.alive(bus.name)):
-                subscription.offer(Received(key, PeerAlive(participant=bus.name, run=bus.run), bus.name, now))
+            if bus.is_alive and reader.wants(key := keys.alive(bus.name)):
+                message = PeerAlive(participant=bus.name, run=bus.run)
+                if isinstance(reader, Tap):
+                    reader.offer(_presence(key, message, bus.name, now))
+                else:
+                    reader.offer(Received(key, message, bus.name, now))
         recent = [past for past in self._past if now - past.received.at <= keys.HISTORY_MAX_AGE]
         for past in sorted((*recent, *self._state.values()), key=lambda past: past.number):
-            received = past.received
-            if subscription.wants(received.key) and not self._is_cut(name, received.source):
-                subscription.offer(msgspec.structs.replace(received, at=now, past=True))
+            if not reader.wants(past.received.key) or self._is_cut(name, past.received.source):
+                continue
+            if isinstance(reader, Tap):
+                reader.offer(msgspec.structs.replace(past.sample, at=now, past=True))
+            else:
+                reader.offer(msgspec.structs.replace(past.received, at=now, past=True))
         return self.sent
 
     @property
@@ -161,8 +186,10 @@ class MemoryHub(Hub):
 
     def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
         journal.note_presence(message)
+        key, now = keys.alive(name), self._loop.time()
         for bus in list(self._buses.values()):
-            bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
+            bus.deliver(Received(key, message, name, now), self.sent + 1)
+            bus.show(_presence(key, message, name, now), self.sent + 1)
 
     async def answerer(self, key: str, asker: str, deadline: Seconds) -> "MemoryBus | None":
         """Wait for a participant that serves the key; None at the deadline."""
@@ -196,6 +223,10 @@ class MemoryHub(Hub):
         self._state = {key: past for key, past in self._state.items() if past.received.source != name}
 
 
+def _presence(key: str, message: PeerAlive | PeerGone, name: str, now: Seconds) -> Sample:
+    return Sample(key, encode(message), encoding_of(message), name, now)
+
+
 class MemoryBus(Bus):
     """A participant's view of the bus in memory."""
 
@@ -207,6 +238,7 @@ class MemoryBus(Bus):
         self._hub = hub
         self._subscriptions: dict[Subscription, int] = {}
         """Subscriptions, and the number of the last message that was replayed to each."""
+        self._taps: dict[Tap, int] = {}
         self._overflowed = 0
 
     @property
@@ -215,7 +247,8 @@ class MemoryBus(Bus):
 
     @property
     def health(self) -> BusHealth:
-        overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
+        readers: list[Subscription | Tap] = [*self._subscriptions, *self._taps]
+        overflowed = self._overflowed + sum(reader.overflowed for reader in readers)
         peers, passed = self._hub.alive, self._hub.sent
         return BusHealth(peers=peers, passed=passed, overflowed=overflowed, failures=self.failures)
 
@@ -239,6 +272,10 @@ class MemoryBus(Bus):
     def wants(self, key: str) -> bool:
         return any(subscription.wants(key) for subscription in self._subscriptions)
 
+    def taps(self, key: str) -> bool:
+        """Tell whether a tap of this participant wants `key`."""
+        return any(tap.wants(key) for tap in self._taps)
+
     def deliver(self, received: Received, number: int) -> None:
         key = received.key
         for subscription, replayed in self._subscriptions.items():
@@ -255,6 +292,22 @@ class MemoryBus(Bus):
     def _drop(self, subscription: Subscription) -> None:
         if self._subscriptions.pop(subscription, None) is not None:
             self._overflowed += subscription.overflowed
+
+    def show(self, sample: Sample, number: int) -> None:
+        """Offer a sample to the taps."""
+        for tap, replayed in self._taps.items():
+            if number > replayed and tap.wants(sample.key):
+                tap.offer(sample)
+
+    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
+        tap = Tap(patterns, capacity, self._drop_tap)
+        if not self._gone:
+            self._taps[tap] = self._hub.replay(self.name, tap)
+        return tap
+
+    def _drop_tap(self, tap: Tap) -> None:
+        if self._taps.pop(tap, None) is not None:
+            self._overflowed += tap.overflowed
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         await asyncio.sleep(0)
@@ -296,8 +349,9 @@ class MemoryBus(Bus):
             self._hub.announce(self.name, PeerAlive(participant=self.name, run=self.run))
 
     async def leave(self) -> None:
-        for subscription in list(self._subscriptions):
-            subscription.close()
+        readers: list[Subscription | Tap] = [*self._subscriptions, *self._taps]
+        for reader in readers:
+            reader.close()
         self.vanish()
 
     def vanish(self) -> None:
@@ -306,6 +360,7 @@ class MemoryBus(Bus):
         self._gone = True
         self.under_way.end()
         self._subscriptions.clear()
+        self._taps.clear()
         self._hub.forget(self.name)
         if self.is_alive:
             self.is_alive = False

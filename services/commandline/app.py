@@ -29,6 +29,10 @@ COMMANDS = {
     "watch": "Follow a running system: connection events, the open ones first, feedback, claims on the head, "
     "as they come.",
     "console": "Show a running robot in the browser: the scene in 3D, lanes of events and behaviors, the Petri net.",
+    "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
+    "replay": "Play a recording on a bus, at any speed, to and fro. Exit 2 if a live robot of its name is there.",
+    "export": "Turn a recording into annotations (ELAN, Praat, CSV), or pictures of the scene.",
+    "analyse": "Make the tables of a study of recordings of people, or recognize them once more (--again).",
     "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or everything. "
     "Exit 2 if it is not being performed.",
     "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. "

@@ -86,7 +86,7 @@ class Options(Configured):
 
 
 def main(options: Options) -> int:
-    draw = _plotting()
+    draw = plotting()
     orders = orders_of(options)
     folder = Folder(options.out, FILES, overwrite=options.overwrite)
     console = Terminal(quiet=options.quiet)
@@ -118,7 +118,7 @@ def main(options: Options) -> int:
     return DONE if all(one.record.finished for one in played) else FAILED
 
 
-def _plotting() -> Draw:
+def plotting() -> Draw:
     """Import the function that draws. Raises InputRefused without matplotlib, before any session is played."""
     try:
         from engage_hri.services.study.plots import draw

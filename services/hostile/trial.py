@@ -24,7 +24,7 @@ from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.interface import LOG, Hub, Received
+from engage_hri.services.bus.interface import LOG, Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.hostile.audit import REFUSED, Audit, Entry
@@ -104,7 +104,7 @@ class _AuditedHub(MemoryHub):
         self.words = Words()
         self._services = services
 
-    def _pass_on(self, sender: str, received: Received) -> None:
+    def _pass_on(self, sender: str, received: Received, sample: Sample) -> None:
         key, message = received.key, received.message
         self.words.hear(message)
         server = keys.server_of(key)
@@ -112,7 +112,7 @@ class _AuditedHub(MemoryHub):
         is_foreign = sender not in self._services
         now = self._loop.time()
         self.audit.hear(key, message, sender, received.life, now, arrives=arrives, is_foreign=is_foreign)
-        super()._pass_on(sender, received)
+        super()._pass_on(sender, received, sample)
 
 
 class _FailureLog(logging.Handler):

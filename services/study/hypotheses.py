@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Probability
 from engage_hri.services.study.conditions import BASELINE, DEGRADED
-from engage_hri.services.study.permutation import LEVEL, Paired, holm, paired
+from engage_hri.services.study.permutation import LEVEL, Paired, holm, paired, separate
 from engage_hri.services.study.records import SessionRecord
 
 Measure = Callable[[SessionRecord], float | None]
@@ -19,6 +19,16 @@ CAVEAT = (
     "recognition a part of 6 and 7, and most of 11, is what is not seen. With enough sessions any difference, "
     "however small, gets a small p: read the difference and its interval first."
 )
+
+
+PEOPLE_CAVEAT = (
+    "The hypotheses are those of the thesis, for a robot whose policies were degraded; whether they are yours, this "
+    "command cannot know. It does not know either who was given which condition and why, what differed besides the "
+    "condition, or what became of those who are not among these files. Order and practice are left out of account. "
+    "All is counted by recognition, through the perception of each session: where perception differed, part of a "
+    "difference is what was not seen. Read the difference and its interval first: with few people no test shows much."
+)
+"""What the numbers of recorded people cannot say."""
 
 
 class Hypothesis(Struct, frozen=True, kw_only=True):
@@ -89,20 +99,32 @@ class Finding(Struct, frozen=True, kw_only=True):
     verdict: str
 
 
-def findings(records: Sequence[SessionRecord]) -> list[Finding]:
-    """Test every hypothesis in every degraded condition, with the finished sessions."""
+def findings(
+    records: Sequence[SessionRecord],
+    *,
+    baseline: str = BASELINE,
+    others: Sequence[str] = DEGRADED,
+    is_paired: bool = True,
+) -> list[Finding]:
+    """Test every hypothesis in every other condition, with the finished sessions.
+
+    is_paired: sessions of one number belong together; else all are of different people.
+    """
     values = {(record.condition, record.session): record for record in records if record.finished}
     conditions = {record.condition for record in records}
-    operational = BASELINE in conditions
+    operational = baseline in conditions
     asked = [
-        (hypothesis, condition, *_samples(hypothesis, condition, values))
-        for condition in DEGRADED
+        (hypothesis, condition, *_samples(hypothesis, condition, values, baseline, is_paired=is_paired))
+        for condition in others
         if condition in conditions
         for hypothesis in HYPOTHESES
         if operational or not hypothesis.baseline
     ]
     tests = [
-        paired([worse - base for base, worse in zip(bases, degraded, strict=True)]) for _, _, bases, degraded in asked
+        paired([worse - base for base, worse in zip(bases, degraded, strict=True)])
+        if is_paired or not hypothesis.baseline
+        else separate(bases, degraded)
+        for hypothesis, _, bases, degraded in asked
     ]
     corrected = holm([test.p for test in tests])
     return [
@@ -117,14 +139,24 @@ def findings(records: Sequence[SessionRecord]) -> list[Finding]:
 
 
 def _samples(
-    hypothesis: Hypothesis, condition: str, records: dict[tuple[str, int], SessionRecord]
+    hypothesis: Hypothesis,
+    condition: str,
+    records: dict[tuple[str, int], SessionRecord],
+    baseline: str,
+    *,
+    is_paired: bool,
 ) -> tuple[list[float], list[float]]:
-    """Measurements of operational and degraded sessions with the same seeds, without pairs that lack one."""
+    """Measurements of sessions in both conditions: of pairs, without those that lack one; or of all."""
+    if not is_paired and hypothesis.baseline:
+        measured = {name: [hypothesis.value(one) for (of, _), one in sorted(records.items()) if of == name]
+                    for name in (baseline, condition)}  # fmt: skip
+        known = {name: [value for value in values if value is not None] for name, values in measured.items()}
+        return known[baseline], known[condition]
     bases, degraded = [], []
     for (name, session), record in sorted(records.items()):
         if name != condition:
             continue
-        twin = records.get((BASELINE, session))
+        twin = records.get((baseline, session))
         base = (hypothesis.value(twin) if twin else None) if hypothesis.baseline else 0.0
         value = hypothesis.value(record)
         if base is not None and value is not None:

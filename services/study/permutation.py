@@ -6,7 +6,9 @@ Nothing is assumed about the distribution, and small samples get the large p the
 seed.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 from msgspec import Struct
@@ -98,6 +100,72 @@ class _SignFlips:
             else:
                 outside = middle
         return inside
+
+
+def separate(first: Sequence[float], second: Sequence[float]) -> Paired:
+    """Test whether two samples of different people have the same mean; the difference is second - first.
+
+    If the conditions did the same, each person could as well have been in the other. Counted are the divisions into
+    groups of these sizes, all of them or `DRAWS`, whose means are as far apart. n: of all together. effect: of the
+    deviation within groups (Cohen's d).
+    """
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    n = len(a) + len(b)
+    if not len(a) or not len(b):
+        return Paired(n=n)
+    test = _Divisions(a, b)
+    mean = float(b.mean() - a.mean())
+    within = float(((a - a.mean()) ** 2).sum() + ((b - b.mean()) ** 2).sum())
+    spread = (within / (n - 2)) ** 0.5 if n > 2 else 0.0
+    varies = spread > 1e-9 * float(np.abs(np.concatenate([a, b])).max())
+    low, high = (_end(test.p, mean, test.widest, side) for side in (-1, +1)) if test.can_reject else (None, None)
+    return Paired(n=n, mean=mean, low=low, high=high, effect=mean / spread if varies else None, p=test.p(0.0))
+
+
+class _Divisions:
+    """Divisions of two samples into groups of their sizes: all, or many. They are rows of weights of a mean."""
+
+    def __init__(self, a: Array, b: Array) -> None:
+        self._a, self._b = a, b
+        n, k = len(a) + len(b), len(b)
+        self._number = math.comb(n, k)
+        if self._number <= DRAWS:
+            chosen = np.array(list(combinations(range(n), k)))
+        else:
+            drawn = np.random.default_rng(0).random((DRAWS, n)).argsort(axis=1)[:, :k]
+            # The sample itself is one of the divisions, so that p is never zero.
+            chosen = np.vstack([np.arange(n - k, n), drawn])
+        self._weights = np.full((len(chosen), n), -1.0 / (n - k))
+        np.put_along_axis(self._weights, chosen, 1.0 / k, axis=1)
+        self.widest = float(np.ptp(np.concatenate([a, b]))) * 2 + 1.0
+        """More than any difference of means that is not rejected."""
+
+    @property
+    def can_reject(self) -> bool:
+        """True if samples of these sizes can be significant; of equal sizes two divisions are always as extreme."""
+        extreme = 2 if len(self._a) == len(self._b) else 1
+        return extreme / self._number < LEVEL
+
+    def p(self, shift: float) -> Probability:
+        """Two-sided p of the hypothesis that the true difference is `shift`."""
+        values = np.concatenate([self._a, self._b - shift])
+        slack = 1e-9 * float(np.abs(values).sum() + 1e-12)  # means that are equal but for rounding
+        observed = abs(float(self._b.mean() - shift - self._a.mean()))
+        return float((np.abs(self._weights @ values) >= observed - slack).mean())
+
+
+def _end(p: Callable[[float], Probability], middle: float, widest: float, side: int) -> float:
+    """Lower (-1) or upper (+1) end of the differences that a test does not reject."""
+    inside, outside = middle, middle + side * widest
+    if p(outside) >= LEVEL:
+        return outside
+    for _ in range(STEPS):
+        between = (inside + outside) / 2
+        if p(between) >= LEVEL:
+            inside = between
+        else:
+            outside = between
+    return inside
 
 
 def holm(ps: Sequence[Probability | None]) -> list[Probability | None]:

@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import KindStatistics
-from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, Finding
+from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, PEOPLE_CAVEAT, Finding
 from engage_hri.services.study.records import SessionRecord
 
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
@@ -121,7 +121,45 @@ _MEASURES: tuple[tuple[str, int, Callable[[SessionRecord], float | None]], ...] 
 )
 
 
-def hypotheses(found: Sequence[Finding]) -> Table:
+class Compared(Struct, frozen=True, kw_only=True):
+    """Words about a comparison. baseline: name of the condition that others are compared with, short.
+
+    how: which sessions are compared with which, and by what test. caveat: what it cannot say.
+    """
+
+    title: str
+    baseline: str
+    other: str
+    how: str
+    caveat: str
+
+
+SIMULATED = Compared(
+    title="Hypotheses of the thesis (5.2.2), in simulation", baseline="oper.", other="degr.",
+    how="Sessions of the same seed are compared as pairs, though they are hardly more alike than others. p: "
+    "two-sided permutation test of their differences (signs flipped), corrected for the number of questions (Holm). "
+    "95 %: the differences that the test does not reject, uncorrected. d: mean / standard deviation of the "
+    "differences.",
+    caveat=CAVEAT,
+)  # fmt: skip
+_TESTED = (
+    "corrected for the number of questions (Holm). 95 %: the differences that the test does not reject, uncorrected."
+)
+WITHIN = Compared(
+    title="Hypotheses of the thesis (5.2.2), in these recordings", baseline="base", other="other",
+    how="Sessions of the same participant are compared as pairs; participants who lack one of the two are left out. "
+    f"p: two-sided permutation test of their differences (signs flipped), {_TESTED} d: mean / standard deviation of "
+    "the differences.", caveat=PEOPLE_CAVEAT,
+)  # fmt: skip
+BETWEEN = Compared(
+    title=WITHIN.title, baseline="base", other="other",
+    how="Sessions of different people are compared; n is of both together. p: two-sided permutation test (people "
+    f"divided anew), {_TESTED} d: difference of the means / standard deviation within conditions. 11a looks at one "
+    "condition alone, by signs flipped.", caveat=PEOPLE_CAVEAT,
+)  # fmt: skip
+
+
+def hypotheses(found: Sequence[Finding], compared: Compared = SIMULATED) -> Table:
     """Table with a row for each finding."""
     rows = (
         (
@@ -133,18 +171,16 @@ def hypotheses(found: Sequence[Finding]) -> Table:
         for finding in found
     )  # fmt: skip
     return Table(
-        title="Hypotheses of the thesis (5.2.2), in simulation",
-        columns=("", "degraded", "n", "oper.", "degr.", "diff.", "95 %", "d", "p", "verdict"),
+        title=compared.title,
+        columns=("", "condition" if compared is not SIMULATED else "degraded", "n", compared.baseline, compared.other,
+                 "diff.", "95 %", "d", "p", "verdict"),
         rows=tuple(rows),
         notes=(
             *(f"{one.name}: {one.claim} ({one.measure}, {one.unit})." for one in HYPOTHESES),
-            "Sessions of the same seed are compared as pairs, though they are hardly more alike than others. p: "
-            "two-sided permutation test of their differences (signs flipped), corrected for the number of questions "
-            "(Holm). 95 %: the differences that the test does not reject, uncorrected. d: mean / standard deviation "
-            "of the differences.",
-            CAVEAT,
+            compared.how,
+            compared.caveat,
         ),
-    )
+    )  # fmt: skip
 
 
 def _interval(low: float | None, high: float | None) -> str:

@@ -14,7 +14,7 @@ from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.status import AskStatus
-from engage_hri.services.bus.interface import Received
+from engage_hri.services.bus.interface import Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.config import load
@@ -67,9 +67,9 @@ class Recording(MemoryHub):
         super().__init__(decodes=decodes)
         self.log: list[tuple[str, str, bytes]] = []
 
-    def _pass_on(self, sender: str, received: Received) -> None:
+    def _pass_on(self, sender: str, received: Received, sample: Sample) -> None:
         self.log.append((sender, received.key, published(received.message)[0]))
-        super()._pass_on(sender, received)
+        super()._pass_on(sender, received, sample)
 
 
 async def performed(*, decodes: bool) -> list[tuple[str, str, bytes]]:

@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Subscription
 from engage_hri.services.bus.memory import MemoryBus
 from engage_hri.services.client.perceived_actions import PerceivedActions
-from engage_hri.services.recognition import service
+from engage_hri.services.recognition import intake, service
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.recognizer import Recognizer
@@ -128,7 +128,7 @@ class Stage:
                 super().__init__(*args, **named)
                 stage.sessions.append(self.session)
 
-        monkeypatch.setattr(service, "Recognizer", Watched)
+        monkeypatch.setattr(intake, "Recognizer", Watched)
         self.world = hub.join("world")
         self.world.publish(keys.WORLD, world("nobody"))
 

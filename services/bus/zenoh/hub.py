@@ -8,7 +8,7 @@ import asyncio
 from collections.abc import Sequence
 from importlib.metadata import version
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import zenoh
@@ -19,14 +19,14 @@ from engage_hri.schemas.messages import Message, decode, encode, encoding_of, pu
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
-from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Keep, Received, Subscription
+from engage_hri.services.bus.interface import CAPACITY, LOG, Answer, Bus, Hub, Keep, Subscription, Tap
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.answers import Answers
 from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.history import History, pack
 from engage_hri.services.bus.zenoh.links import Links
-from engage_hri.services.bus.zenoh.order import Envelope, SentLog
+from engage_hri.services.bus.zenoh.order import Envelope, SentLog, Written
 from engage_hri.services.bus.zenoh.own_clock import own_clock
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.publishers import Publishers
@@ -51,6 +51,7 @@ ASK_AGAIN: Seconds = 0.5
 """Time without an answer after which a question is asked once more."""
 VACANCY: Seconds = 4.0
 """Time that a dead participant may seem to be there: the lease of a silent link, and as long again."""
+Reader = TypeVar("Reader", Subscription, Tap)
 QUIET: Seconds = 0.25
 """Time without a change after which all peers are known, also those found through others."""
 
@@ -216,15 +217,15 @@ class ZenohHub(Hub):
             if not self._sent.number:
                 self._history.begin()
             written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now, stamp)
-            envelope = written.envelope
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
-            envelope = Envelope(bus.name, self.clocks.own, now)
+            written = Written(key, encoding, payload, Envelope(bus.name, self.clocks.own, now))
+        attachment = pack(written.envelope)
         self._publishers.of(key, ordered).put(
-            payload, encoding=encoding, attachment=pack(envelope), timestamp=stamp, source_info=self._source
+            payload, encoding=encoding, attachment=attachment, timestamp=stamp, source_info=self._source
         )
-        self.readers.offer(Received(key, message, bus.name, now, life=self.run))
+        self.readers.offer(written, message)
 
     def withdraw(self, key: str) -> None:
         """Forget a state that this process has published."""
@@ -250,7 +251,7 @@ class ZenohBus(Bus):
     def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: list[Subscription | Tap] = []
         self._answers = Answers(self, hub.session, hub.bridge, hub.run)
         self._overflowed = 0
         self._token: Any = None
@@ -281,15 +282,21 @@ class ZenohBus(Bus):
         return self._hub.is_heard(key)
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
-        if self._hub.rights is not None:
-            for pattern in patterns:
-                self._hub.rights.check(self.name, "subscribes", pattern)
-        subscription = Subscription(patterns, keep, capacity, self._drop)
-        self._subscriptions.append(subscription)
-        self._hub.readers.attach(self, subscription)
-        return subscription
+        return self._attached(Subscription(patterns, keep, capacity, self._drop))
 
-    def _drop(self, subscription: Subscription) -> None:
+    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
+        return self._attached(Tap(patterns, capacity, self._drop))
+
+    def _attached(self, reader: Reader) -> Reader:
+        """Attach a reader. Raises InputRefused for a pattern that the keys do not allow."""
+        if self._hub.rights is not None:
+            for pattern in reader.patterns:
+                self._hub.rights.check(self.name, "subscribes", pattern)
+        self._subscriptions.append(reader)
+        self._hub.readers.attach(self, reader)
+        return reader
+
+    def _drop(self, subscription: Subscription | Tap) -> None:
         if subscription in self._subscriptions:
             self._subscriptions.remove(subscription)
             self._overflowed += subscription.overflowed

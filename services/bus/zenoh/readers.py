@@ -10,12 +10,12 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.messages import Message
+from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.interface import LOG, Bus, Received, Subscription
+from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
 from engage_hri.services.bus.payloads import read_payload, unreadable
 from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
 from engage_hri.services.bus.zenoh.order import Counts, Envelope, Follower, Missing, Past, SentLog, Written
@@ -41,7 +41,7 @@ class _Reader:
     kept: those of its patterns that have a past.
     """
 
-    def __init__(self, bus: Bus, subscription: Subscription) -> None:
+    def __init__(self, bus: Bus, subscription: Subscription | Tap) -> None:
         self.bus = bus
         self.subscription = subscription
         self.kept = tuple(filter(keys.has_past, subscription.patterns))
@@ -98,17 +98,25 @@ class Readers:
         for declared in self._declared:
             declared.undeclare()
 
-    def offer(self, received: Received) -> None:
+    def offer(self, written: Written, message: Message) -> None:
         """Deliver what this process has published itself."""
+        envelope, now = written.envelope, self._loop.time()
+        received = Received(
+            written.key, message, envelope.source, now, life=self._sent.run, number=envelope.number
+        )  # fmt: skip
         for reader in self._readers:
-            if reader.subscription.wants(received.key):
+            if not reader.subscription.wants(received.key):
+                continue
+            if isinstance(reader.subscription, Tap):
+                reader.subscription.offer(_sample(written, self._sent.run, now))
+            else:
                 reader.subscription.offer(received)
 
     def want(self, key: str) -> bool:
         """Tell whether any subscription of this process wants `key`."""
         return any(reader.subscription.wants(key) for reader in self._readers)
 
-    def attach(self, bus: Bus, subscription: Subscription) -> None:
+    def attach(self, bus: Bus, subscription: Subscription | Tap) -> None:
         reader = _Reader(bus, subscription)
         self._readers.append(reader)
         for name, runs in self._peers.names.items():
@@ -125,7 +133,7 @@ class Readers:
             self._carriers[pattern][1].append(reader)
         self._ask(reader, {run: self._follower(reader, run) for run in self._peers.publishers})
 
-    def detach(self, subscription: Subscription) -> None:
+    def detach(self, subscription: Subscription | Tap) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
         for pattern in subscription.patterns:
             carrier, readers = self._carriers.get(pattern, (None, []))
@@ -194,6 +202,9 @@ class Readers:
         return "" if sample.stamped_by in passed_on_by else sample.stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
+        if isinstance(reader.subscription, Tap):
+            reader.subscription.offer(_sample(written, run, self._loop.time(), past=past))
+            return
         # One sample often has several readers: it is decoded once.
         if self._decoded is None or self._decoded[0] is not written:
             self._decoded = (written, self._decode(reader.bus, written))
@@ -202,7 +213,9 @@ class Readers:
             return
         if message is not None:
             envelope = written.envelope
-            received = Received(written.key, message, envelope.source, self._loop.time(), past, run)
+            received = Received(
+                written.key, message, envelope.source, self._loop.time(), past, run, envelope.number
+            )  # fmt: skip
             reader.subscription.offer(received)
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
@@ -321,5 +334,18 @@ class Readers:
 
     def _offer_presence(self, reader: _Reader, message: PeerAlive | PeerGone) -> None:
         key = keys.alive(message.participant)
-        if reader.subscription.wants(key):
+        if not reader.subscription.wants(key):
+            return
+        if isinstance(reader.subscription, Tap):
+            told = Written(key, encoding_of(message), encode(message), Envelope(message.participant, "", 0.0))
+            reader.subscription.offer(_sample(told, "", self._loop.time()))
+        else:
             reader.subscription.offer(Received(key, message, message.participant, self._loop.time()))
+
+
+def _sample(written: Written, run: str, now: Seconds, *, past: bool = False) -> Sample:
+    sent = written.envelope
+    return Sample(
+        written.key, written.payload, written.encoding, sent.source, now, past, run,
+        sent.number, sent.clock, sent.sent,
+    )  # fmt: skip

@@ -1,0 +1,133 @@
+"""Command `engage export`: a recording as annotations for ELAN or Praat, as a table, or as pictures of the scene."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.kept import opened
+from engage_hri.services.commandline.process import DONE
+
+if TYPE_CHECKING:
+    from engage_hri.services.recording.reading import Recording
+
+ENDINGS = {
+    "elan": ".eaf", "textgrid": ".TextGrid", "csv": ".csv", "sheet": ".png", "film": ".mp4", "lines": ".jsonl",
+}  # fmt: skip
+RATE = 10.0
+"""Pictures a second of a film."""
+PICTURES = 16
+"""Pictures on a sheet."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of `engage record`.", show_default=False)]
+    elan: Annotated[bool, typer.Option("--elan", help="Tiers for ELAN, FILE.eaf.")] = False
+    textgrid: Annotated[bool, typer.Option("--textgrid", help="Tiers for Praat, FILE.TextGrid.")] = False
+    csv: Annotated[bool, typer.Option("--csv", help="Tiers as a table, FILE.csv.")] = False
+    lines: Annotated[bool, typer.Option("--lines", help="The lines of `engage watch --json`, FILE.jsonl.")] = False
+    sheet: Annotated[bool, typer.Option("--sheet", help="Pictures of the scene from above, FILE.png.")] = False
+    film: Annotated[bool, typer.Option("--film", help="A film of it, FILE.mp4, or FILE.gif without ffmpeg.")] = False
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Another name for the one file.", show_default=False)
+    ] = None
+    speed: Annotated[float, typer.Option(metavar="X", min=0.1, max=100, help="Of the film.")] = 1.0
+    until: Annotated[
+        Seconds | None, typer.Option(metavar="S", min=0, help="End of the film.", show_default=False)
+    ] = None
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False
+
+
+def main(options: Options) -> int:
+    wanted = [name for name in ENDINGS if getattr(options, name)]
+    if not wanted:
+        known = ", ".join(f"--{name}" for name in ENDINGS)
+        raise InputRefused(Fault(reason="nothing is to be made", advice=f"say what: {known}"))
+    if options.out is not None and len(wanted) > 1:
+        raise InputRefused(Fault(reason="is a name for one file", where="--out", advice="leave it out"))
+    paths = {name: _path(options, name) for name in wanted}
+    for path in paths.values():
+        if path.exists() and not options.overwrite:
+            raise InputRefused(Fault(reason="there is such a file", where=str(path), advice="--overwrite"))
+    recording = opened(options.file)
+    for name, path in paths.items():
+        try:
+            path = _make(name, path, recording, options)
+        except OSError as error:
+            raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
+        print(path)
+    return DONE
+
+
+def _path(options: Options, name: str) -> Path:
+    if options.out is not None:
+        return options.out
+    ending = ENDINGS[name]
+    if name == "film" and not _has_ffmpeg():
+        ending = ".gif"
+    return options.file.with_suffix(ending)
+
+
+def _has_ffmpeg() -> bool:
+    try:
+        import imageio_ffmpeg
+
+        return bool(imageio_ffmpeg.get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        return False
+
+
+def _make(name: str, path: Path, recording: "Recording", options: Options) -> Path:
+    """Make one file. Returns where it is."""
+    from engage_hri.services.recording import annotations, tiers
+
+    match name:
+        case "elan":
+            date = recording.facts.get("began at", time.strftime("%Y-%m-%dT%H:%M:%S+00:00", time.gmtime(0)))
+            film = path.with_suffix(".mp4")
+            media = film.name if options.film or film.exists() else ""
+            path.write_bytes(annotations.eaf(tiers.tiers(recording), date=date, media=media))
+        case "textgrid":
+            text = annotations.textgrid(tiers.tiers(recording), recording.duration)
+            path.write_text(text, encoding="utf-8")
+        case "csv":
+            path.write_text(annotations.table(tiers.tiers(recording)), encoding="utf-8")
+        case "lines":
+            path.write_text(lines_of(recording), encoding="utf-8")
+        case _:
+            _draw(name, path, recording, options)
+    return path
+
+
+def lines_of(recording: "Recording") -> str:
+    """The messages that have a line, as `engage watch --json` would have printed them."""
+    from engage_hri.schemas import lines
+    from engage_hri.services.recording.tiers import messages
+
+    told = (lines.line(received.message) for received, _ in messages(recording) if not received.past)
+    return "".join(f"{line}\n" for line in told if line is not None)
+
+
+def _draw(name: str, path: Path, recording: "Recording", options: Options) -> None:
+    try:
+        from engage_hri.services.recording.drawing import sheet, times_of_film, write_film
+    except ImportError as error:
+        fault = Fault(reason=f"pictures need matplotlib: {error}", advice="pip install 'engage-hri[study]'")
+        raise InputRefused(fault) from error
+    from engage_hri.services.recording.scenes import scenes, spread
+
+    if name == "sheet":
+        times = spread(recording.duration, PICTURES)
+        path.write_bytes(sheet(list(scenes(recording, times)), path.suffix.removeprefix(".") or "png"))
+        return
+    times = times_of_film(recording.duration, RATE, options.speed, options.until)
+    try:
+        write_film(path, list(scenes(recording, times)), RATE)
+    except ImportError as error:
+        fault = Fault(reason=f"a film needs more: {error}", advice="pip install pillow imageio-ffmpeg, or --sheet")
+        raise InputRefused(fault) from error

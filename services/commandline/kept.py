@@ -1,0 +1,38 @@
+"""Recordings that commands are given: the extra that they need, and what to say of one that is not whole."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.commandline.patient import complain
+
+if TYPE_CHECKING:
+    from engage_hri.services.recording.reading import Recording
+
+
+def needed() -> None:
+    """Check that recordings can be read and written. Raises InputRefused."""
+    try:
+        import mcap.records  # noqa: F401
+        import zstandard  # noqa: F401
+    except ImportError as error:
+        fault = Fault(reason=f"recordings need mcap: {error}", advice="pip install 'engage-hri[record]'")
+        raise InputRefused(fault) from error
+
+
+def opened(path: Path) -> "Recording":
+    """Open a recording, and say on standard error what it lacks. Raises InputRefused."""
+    needed()
+    from engage_hri.services.recording.disk import read
+
+    recording = read(path)
+    if not recording.is_whole:
+        complain(
+            f"{path}: its recorder did not end in order; {len(recording)} messages until {recording.duration:.2f} s"
+            f" are whole, {recording.lost_bytes} bytes behind them are not"
+        )
+    for chunk in recording.damaged:
+        complain(f"{path}: a damaged chunk at byte {chunk.offset} is left out: {chunk.reason}")
+    if recording.losses.total:
+        complain(f"{path}: {recording.losses.total} messages are missing, as its recorder says")
+    return recording

@@ -1,0 +1,94 @@
+"""Command `engage record`: all that a robot says on its bus, into a file that outlives its recorder."""
+
+import asyncio
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from engage_hri.schemas import access, keys
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.kept import needed
+from engage_hri.services.commandline.options import Connected
+from engage_hri.services.commandline.patient import complain
+from engage_hri.services.commandline.process import DONE, FAILED, run_until_signal, unique_name
+from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.runtime.service import installed_version
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Connected):
+    file: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="Where to; without it ROBOT-DATE-TIME.mcap.")
+    ] = None
+    condition: Annotated[str, typer.Option(metavar="NAME", help="Condition of a study, for `engage analyse`.")] = ""
+    participant: Annotated[str, typer.Option(metavar="ID", help="Who takes part, for `engage analyse`.")] = ""
+    note: Annotated[
+        list[str] | None, typer.Option(metavar="TEXT", help="Anything worth knowing later; may be repeated.")
+    ] = None
+    seconds: Annotated[
+        Seconds | None, typer.Option(metavar="S", min=0, help="End by itself after so long.", show_default=False)
+    ] = None
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if there is one.")] = False
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Give FILE, whose recorder was killed, the end that it lacks.")
+    ] = False
+
+
+def main(options: Options) -> int:
+    needed()
+    if options.repair:
+        return _repair(options.file)
+    config = options.read(RobotConfig, elsewhere=ELSEWHERE)
+    path = options.file or Path(f"{config.bus.robot}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
+    return run_until_signal(_record(options, config, path))
+
+
+def _repair(path: Path | None) -> int:
+    from engage_hri.services.recording.disk import read, repair
+
+    if path is None:
+        raise InputRefused(Fault(reason="needs a FILE", where="--repair"))
+    if read(path).is_whole:
+        print(f"{path}: nothing to repair")
+        return DONE
+    cut = repair(path)
+    print(f"{path}: {len(read(path))} messages; {cut} bytes at the end were no whole record and are cut off")
+    return DONE
+
+
+async def _record(options: Options, config: RobotConfig, path: Path) -> int:
+    from engage_hri.services.bus.zenoh.neighbors import hinting
+    from engage_hri.services.recording.service import opened, record
+
+    async with await options.open(config.bus, "viewer") as hub:
+        bus = hub.join(unique_name("record"), "observer")
+        patterns = access.rows(bus.role, "subscribes") if config.bus.keys else (keys.EVERYTHING,)
+        recorder, file, tap = opened(
+            bus, path, time.time_ns(), patterns, _facts(options), overwrite=options.overwrite
+        )
+        complain(f"recording {config.bus.robot} into {path}; Ctrl-C ends it")
+        try:
+            bus.declare_alive()
+            async with asyncio.timeout(options.seconds), hinting(bus, config.bus.connect):
+                await record(bus, tap, recorder, file)
+        except TimeoutError:
+            pass
+        finally:
+            is_whole = recorder.close()
+            complain(f"{path}: {recorder.messages} messages, {file.written / 1e6:.1f} MB")
+            if recorder.losses.total:
+                complain(f"{path}: {recorder.losses.total} messages are missing; `recording/lost` in it says when")
+    return DONE if is_whole and not recorder.losses.disk else FAILED
+
+
+def _facts(options: Options) -> dict[str, str]:
+    """Facts for the beginning of the file that only its user knows, and the version."""
+    told = {
+        "engage": installed_version(), "condition": options.condition, "participant": options.participant,
+        "notes": "\n".join(options.note or ()), "began at": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+    }  # fmt: skip
+    return {name: value for name, value in told.items() if value}

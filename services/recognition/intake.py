@@ -1,0 +1,295 @@
+"""Recognition between bus and recognizer, pure: messages as they come in, what is to be published out.
+
+    intake = Intake("robot", config, clock, session="7a4d6501")
+    outputs = intake.take(input, now)           # a message, of which `reads` is true
+    outputs = intake.advance(now)               # whenever `deadline` has been reached
+
+Given the same inputs in the same order, at the same instants and by the same clocks, the outputs are the same
+(`again.py`). So nothing in here reads a clock, and the service notes in a ledger all that it passes on.
+"""
+
+from collections.abc import Iterable
+from math import inf, isnan
+from typing import Protocol, TypeGuard
+
+from msgspec import Struct
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.ledger import TAKEN, Content
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import World
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.history import Latest
+from engage_hri.services.recognition.events.machine import Forgotten, Mishap
+from engage_hri.services.recognition.events.open_events import OpenEventTracker
+from engage_hri.services.recognition.events.scene import GoesOn, Worded
+from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
+from engage_hri.services.recognition.perceive.reporters import OLDEST, Reporters
+from engage_hri.services.recognition.perceive.reports import Told
+from engage_hri.services.recognition.perceive.words import HeardWords
+from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
+from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent
+
+STRANGERS_KEPT = 256
+"""Number of programs of others whose name as a reporter is remembered."""
+COMPLAINTS = 100
+"""Number of bad ids that are reported as faults."""
+
+
+class Clock(Protocol):
+    """Clocks of machines, as one step sees them. name: of the own one."""
+
+    @property
+    def name(self) -> str: ...
+
+    def local(self, stamp: Stamp, now: Seconds) -> Seconds:
+        """Convert a stamp to the own clock; one of a clock that is not known reads as now."""
+        ...
+
+    def error(self, clock: str) -> Seconds:
+        """Greatest error of that; inf if nothing is known of the clock."""
+        ...
+
+
+class Input(Struct, frozen=True):
+    """A message that recognition takes: as `Received`. The id of a request is its name at this server."""
+
+    key: str
+    message: Content
+    source: str
+    at: Seconds
+    past: bool = False
+    life: str = ""
+
+
+class Publish(Struct, frozen=True):
+    """Publish this message under this key."""
+
+    key: str
+    message: Message
+
+
+class Withdraw(Struct, frozen=True):
+    """Withdraw the states under these keys."""
+
+    states: tuple[str, ...]
+
+
+class Answer(Struct, frozen=True):
+    """Answer a request."""
+
+    answer: Accepted | Refused | EventOutcome | TurnOutcome
+
+
+class Mistake(Struct, frozen=True):
+    """Tell a bug of ours that has shown. request: name of the request that cannot be served for it; or empty."""
+
+    error: BaseException
+    what: str
+    request: str = ""
+
+
+Output = Publish | Withdraw | Answer | Mistake
+
+
+def reads(message: object) -> TypeGuard[Content]:
+    """True for a message that recognition takes into account."""
+    return isinstance(message, TAKEN)
+
+
+class Intake:
+    """All of recognition but its requests' lives. session: first part of the ids of its events."""
+
+    def __init__(self, robot: str, config: RecognitionConfig, clock: Clock, session: str) -> None:
+        self._robot = robot
+        self._clock = clock
+        self._now: Seconds = -inf
+        self._bad_ids: set[str] = set()
+        self._reporters = Reporters(robot, config.report_grace, clock.name, self._instant)
+        self._strangers: Latest[str, str] = Latest(STRANGERS_KEPT)
+        """Names of reporters whose messages name no participant, by their life."""
+        self._clock_errors = ClockErrors(robot)
+        self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
+        self._open_events = OpenEventTracker(robot, session)
+        self._statistics = PublishedStatistics(robot, config, clock.name)
+        self._outputs: list[Output] = []
+
+    @property
+    def deadline(self) -> Seconds | None:
+        times = (self._recognizer.deadline, self._statistics.deadline, self._reporters.deadline)
+        return min((at for at in times if at is not None), default=None)
+
+    def begin(self, now: Seconds) -> list[Output]:
+        """Statistics of all, so that those who ask before the first event get an answer."""
+        return [Publish(keys.statistics("all"), self._statistics.overall(now))]
+
+    def advance(self, now: Seconds) -> list[Output]:
+        """Take all steps that are due by now."""
+        self._now = now
+        self._tell(self._reporters.advance(now))
+        self._note(self._recognizer.advance(now))
+        return self._take()
+
+    def take(self, input: Input, now: Seconds) -> list[Output]:
+        """Take a message."""
+        self._now = now
+        message = input.message
+        if isinstance(message, Cancel):
+            self._feed(message, now)
+        elif self._is_credible(input):
+            self._tell(self._reporters.advance(now))
+            if isinstance(message, OngoingActions | ActionEvent):
+                name, life = self._reporter(input)
+                self._tell(self._reporters.hear(message, name, life, now, past=input.past))
+            elif isinstance(message, PeerAlive | PeerGone):
+                self._tell(self._reporters.feed(message, now))
+            elif isinstance(message, Utterance):
+                self._hear(message)
+            else:
+                self._feed(message, self._when(message, input.at))
+        return self._take()
+
+    def _take(self) -> list[Output]:
+        outputs, self._outputs = self._outputs, []
+        return outputs
+
+    def _hear(self, said: Utterance) -> None:
+        began, at = self._instant(said.began), self._instant(said.at)
+        ended = at if said.ended is None else self._instant(said.ended)
+        self._note_error(said.actor, said.began, began)
+        words = HeardWords(
+            actor=said.actor, id=said.id, text=said.text, began=began, ended=ended, final=said.final,
+            confidence=said.confidence,
+        )  # fmt: skip
+        self._feed(words, at)
+
+    def _reporter(self, input: Input) -> tuple[str, str]:
+        """Name and life of who tells of actions. The robot's are told by its body, whoever speaks for it."""
+        is_perceived = input.key == keys.PERCEIVED_ACTION
+        name = input.source if is_perceived else keys.reporter_of(input.key) or "control"
+        if input.source:
+            return name, input.life if name == input.source else ""
+        if is_perceived:
+            return self._strangers.get(input.life, ""), ""
+        if input.life and name != "control":
+            self._strangers[input.life] = name
+        return name, ""
+
+    def _tell(self, told: Iterable[Told]) -> None:
+        """Feed what reporters say, or what follows from it."""
+        for observation, at, is_sure in told:
+            if not isinstance(observation, GoesOn):
+                self._note_error(observation.actor, observation.at, at, is_sure=is_sure)
+            self._feed(observation, at)
+
+    def _feed(self, observation: Perceived, at: Seconds) -> None:
+        request = observation.id if isinstance(observation, RequestEvent | SignalTurn) else ""
+        self._note(self._recognizer.feed(observation, at, self._now), request)
+
+    def _is_credible(self, input: Input) -> bool:
+        """True if the message came from its proper sender: the robot's body for the robot, perception for people."""
+        match input.message:
+            case ActionBegan(actor=actor) | ActionEnded(actor=actor):
+                by_robot = actor == self._robot
+                return self._has_valid_id(actor) and by_robot == (input.key == keys.ROBOT_ACTION)
+            case ActorFound(actor=actor) | ActorLost(actor=actor) | Utterance(actor=actor):
+                return self._has_valid_id(actor) and actor != self._robot
+            case HeadPose(actor=actor):
+                return actor != self._robot and input.key == keys.head_pose(actor)
+            case VoiceActivity(actor=actor):
+                return actor != self._robot and input.key == keys.voice_activity(actor)
+            case OngoingActions(actor=actor):
+                return all(action.actor == actor for action in input.message.actions) and self._may_tell(input)
+            case World(people=people):
+                return all(self._has_valid_id(person.id) for person in people)
+        return True
+
+    def _may_tell(self, input: Input) -> bool:
+        """True if a state of ongoing actions is not too long, and on the key of its actor and its reporter."""
+        assert isinstance(input.message, OngoingActions)
+        if len(input.message.actions) > MOST:
+            return False
+        actor, reporter = input.message.actor, keys.reporter_of(input.key)
+        if not reporter:
+            return actor == self._robot
+        is_own = input.source in ("", reporter)
+        return is_own and actor != self._robot and input.key == keys.perceived_ongoing(reporter, actor)
+
+    def _has_valid_id(self, actor: str) -> bool:
+        """True if the id can be in a key; without that there are no events. A bad id is reported once."""
+        if keys.is_chunk(actor):
+            return True
+        if actor not in self._bad_ids and len(self._bad_ids) < COMPLAINTS:
+            self._bad_ids.add(actor)
+            fault = Fault(reason=f"{actor!r} can't be in a key", advice=keys.CHUNK, service="recognition")
+            self._outputs.append(Publish(keys.fault("recognition"), fault))
+        return False
+
+    def _when(self, observation: Perceived, arrived: Seconds) -> Seconds:
+        """Local time of what happened, at most now and at least `OLDEST` ago, whatever the stamp says."""
+        stamp: Stamp | None
+        match observation:
+            case HeadOwner(since=stamp) | World(at=stamp):
+                pass
+            case Cancel() | GoesOn() | Worded() | HeardWords():
+                stamp = None
+            case _:
+                stamp = observation.at
+        if stamp is None:
+            return arrived
+        at = self._instant(stamp)
+        if not isinstance(observation, HeadOwner | World):
+            actor = observation.actor if isinstance(observation, HeadPose | VoiceActivity) else self._robot
+            self._note_error(actor, stamp, at)
+        return at
+
+    def _instant(self, stamp: Stamp) -> Seconds:
+        """Local time of a stamp, at most now and at least `OLDEST` ago."""
+        now, told = self._now, self._clock.local(stamp, self._now)
+        return now if isnan(told) else max(min(told, now), now - OLDEST)
+
+    def _note_error(self, actor: str, stamp: Stamp, at: Seconds, *, is_sure: bool = True) -> None:
+        """Note how wrong an instant may be. actor: of whom it tells. at: local time that it is taken for."""
+        is_sure = is_sure and at <= self._clock.local(stamp, self._now)
+        self._clock_errors.heard(actor, at, self._clock.error(stamp.clock) if is_sure else inf)
+
+    def _note(self, results: Iterable[Result], request: str = "") -> None:
+        """Note what is to be published. request: the one that was fed; a bug ends it."""
+        changes: list[ConnectionEvent | Forgotten] = []
+        out = self._outputs
+        for result in results:
+            match result:
+                case ConnectionEvent():
+                    result = self._clock_errors.marked(result)
+                    changes.append(result)
+                    out.append(Publish(keys.connection_event(result.person(self._robot), result.kind), result))
+                case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+                    out.append(Publish(keys.RECOGNIZED_ACTION, result))
+                case Accepted() | Refused() | TurnOutcome():
+                    out.append(Answer(result))
+                case EventOutcome():
+                    out.append(Answer(self._clock_errors.marked_as(result, changes)))
+                case Forgotten(actor=actor):
+                    changes.append(result)
+                    self._reporters.forget(actor)
+                case Mishap(actor=actor, error=error):
+                    out.append(Mistake(error, f"what {actor or 'somebody'} does", request))
+        events = [change for change in changes if isinstance(change, ConnectionEvent)]
+        for message in self._open_events.feed(events, Stamp(self._clock.name, self._now)):
+            out.append(Publish(keys.open_events(message.actor), message))
+        counted = [change for change in changes if isinstance(change, Forgotten) or not change.retold]
+        for statistics in self._statistics.feed(counted, self._recognizer.session.busy, self._now):
+            if statistics.actor != "all":  # a person with this id would be taken for everybody
+                out.append(Publish(keys.statistics(statistics.actor or "all"), statistics))
+        if gone := [change.actor for change in changes if isinstance(change, Forgotten)]:
+            out.append(Withdraw(tuple(keys.open_events(actor) for actor in gone)))
+            out.append(Withdraw(tuple(keys.statistics(actor) for actor in gone if actor != "all")))

@@ -1,0 +1,162 @@
+"""File of a recording: chunks go to its end, and are on the disk when `write` returns. Nothing here raises later on.
+
+A disk that is full keeps chunks waiting, up to a limit; then the newest are dropped, and counted.
+"""
+
+import mmap
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.writing import Sealed, Writer, end, written
+
+WAITING = 32 * 1024 * 1024
+"""Bytes of chunks that may wait for room on the disk."""
+Tell = Callable[[str], None]
+
+
+class RecordingFile:
+    """A file that a recorder writes. dropped: messages that found no room. slowest: the longest wait for the disk.
+
+    written: bytes in the file. tell: takes a line about trouble with the disk.
+    """
+
+    def __init__(self, path: Path, facts: Mapping[str, str], tell: Tell, *, overwrite: bool = False) -> None:
+        """Raises InputRefused: it cannot be written, or there is one already."""
+        self.path = path
+        self.writer = Writer()
+        self.dropped = 0
+        self.written = 0
+        self.slowest: Seconds = 0.0
+        self._tell = tell
+        self._waiting: deque[Sealed] = deque()
+        self._trouble = ""
+        flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if overwrite else os.O_EXCL)
+        try:
+            self._file = os.open(path, flags | getattr(os, "O_CLOEXEC", 0), 0o644)
+        except FileExistsError as error:
+            fault = Fault(reason="there is such a file", where=str(path), advice="another name, or --overwrite")
+            raise InputRefused(fault) from error
+        except OSError as error:
+            raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
+        try:
+            self._append(self.writer.begin(facts))
+            _sync_folder(path)
+        except OSError as error:
+            os.close(self._file)
+            raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
+
+    def write(self) -> bool:
+        """Put everything that waits on the disk. Returns False if some of it still waits."""
+        if (sealed := self.writer.seal()) is not None:
+            if self._waiting and sum(len(each.data) for each in self._waiting) + len(sealed.data) > WAITING:
+                self.dropped += sealed.messages
+                self.writer.dropped(sealed)
+            else:
+                self._waiting.append(sealed)
+        began = time.monotonic()
+        try:
+            while self._waiting:
+                offset = self.written
+                self._append(self._waiting[0].data)
+                self.writer.placed(self._waiting.popleft(), offset)
+            os.fdatasync(self._file)
+        except OSError as error:
+            self._complain(error)
+            return False
+        finally:
+            self.slowest = max(self.slowest, time.monotonic() - began)
+        if self._trouble:
+            self._tell(f"{self.path}: there is room again; messages lost: {self.dropped}")
+            self._trouble = ""
+        return True
+
+    def close(self, note: Mapping[str, str]) -> bool:
+        """End the file in order, with a note about the recording. Returns False if it could not be written whole."""
+        try:
+            if not self.write():
+                self.dropped += sum(each.messages for each in self._waiting)
+                return False
+            self._append(self.writer.told("end", note, self.written))
+            self._append(self.writer.finish(self.written))
+            os.fdatasync(self._file)
+        except OSError as error:
+            self._complain(error)
+            return False
+        finally:
+            os.close(self._file)
+        return True
+
+    def _append(self, data: bytes) -> None:
+        """Write at the end, all of it or nothing."""
+        view = memoryview(data)
+        try:
+            while view:
+                view = view[os.write(self._file, view) :]
+        except OSError:
+            os.ftruncate(self._file, self.written)
+            os.lseek(self._file, self.written, os.SEEK_SET)
+            raise
+        self.written += len(data)
+
+    def _complain(self, error: OSError) -> None:
+        if error.strerror != self._trouble:
+            self._trouble = str(error.strerror)
+            self._tell(f"{self.path}: {self._trouble}; what comes waits in memory, at most {WAITING >> 20} MiB of it")
+
+
+def read(path: Path) -> Recording:
+    """Open a recording. Raises InputRefused: there is none."""
+    try:
+        with path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            data = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_READ) if size else b""
+    except OSError as error:
+        raise InputRefused(Fault(reason=f"cannot read: {error.strerror}", where=str(path))) from error
+    return Recording(data, str(path))  # type: ignore[arg-type]  # a map is read like bytes
+
+
+def repair(path: Path) -> int:
+    """Cut off what is no whole record, and write the end that is missing. Returns the bytes that were cut off.
+
+    Raises InputRefused: it is no recording, or cannot be written.
+    """
+    recording = read(path)
+    if recording.is_whole:
+        return 0
+    contents, until, tail = recording.contents, recording.end, b""
+    if contents.chunks:
+        last, indexes = contents.chunks[-1], recording.indexes(len(contents.chunks) - 1)
+        if len(last.message_index_offsets) < len(indexes):  # so nothing is behind them
+            until = last.chunk_start_offset + last.chunk_length
+            last.message_index_offsets = {}
+            for index in indexes:
+                last.message_index_offsets[index.channel_id] = until + len(tail)
+                tail += written(index)
+            last.message_index_length = len(tail)
+    try:
+        with path.open("r+b") as file:
+            file.truncate(until)
+            file.seek(until)
+            file.write(tail + end(contents, until + len(tail)))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
+    return recording.lost_bytes
+
+
+def _sync_folder(path: Path) -> None:
+    """Put the name of the file on the disk, too."""
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    except OSError:
+        pass
+    finally:
+        os.close(folder)

@@ -1,0 +1,59 @@
+"""Form of a message in a recording: as JSON where that gives back the very bytes that came, else those bytes. Pure.
+
+Viewers of MCAP files understand JSON. MessagePack turns into JSON and back without a change, as long as its writer
+uses the shortest forms, as ours does, and no number in it is infinite. This is tried for each message.
+"""
+
+from typing import Any, NamedTuple
+
+import msgspec
+
+from engage_hri.services.bus.samples import Sample
+
+JSON, MSGPACK, XML, BYTES = "json", "msgpack", "xml", ""
+"""Encodings of the messages of a channel, by the names that MCAP has for them."""
+_BAD = (msgspec.MsgspecError, UnicodeError, RecursionError, OverflowError, TypeError)
+
+
+class Form(NamedTuple):
+    """A payload as it is kept. encoding: one of those above."""
+
+    encoding: str
+    data: bytes
+
+
+def kept(sample: Sample) -> Form:
+    """Choose the form in which a message is kept."""
+    payload = sample.payload
+    match sample.encoding.partition(";")[0]:
+        case "application/msgpack":
+            try:
+                text = msgspec.json.encode(msgspec.msgpack.decode(payload))
+                if _packed(text) == payload:
+                    return Form(JSON, text)
+            except _BAD:
+                return Form(BYTES, payload)
+            return Form(MSGPACK, payload)
+        case "application/json":
+            return Form(JSON if _is_json(payload) else BYTES, payload)
+        case "application/xml" | "text/xml":
+            return Form(XML, payload)
+    return Form(BYTES, payload)
+
+
+def payload(form: Form, encoding: str) -> bytes:
+    """Give back the bytes that came. encoding: that of the sample."""
+    is_packed = form.encoding == JSON and encoding.partition(";")[0] == "application/msgpack"
+    return _packed(form.data) if is_packed else form.data
+
+
+def _packed(text: bytes) -> bytes:
+    return msgspec.msgpack.encode(msgspec.json.decode(text))
+
+
+def _is_json(data: bytes) -> bool:
+    try:
+        msgspec.json.decode(data, type=Any)
+    except _BAD:
+        return False
+    return True

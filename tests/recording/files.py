@@ -1,0 +1,63 @@
+"""Recordings made in tests: of samples, and of whole runs in memory and virtual time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.messages import Message, encode, encoding_of, published
+from engage_hri.services.bus.interface import Sample
+from engage_hri.services.recording.form import kept
+from engage_hri.services.recording.reading import BILLION, Recording
+from engage_hri.services.recording.writing import Line, Writer
+
+WALL = 1_700_000_000 * BILLION
+FACTS = {"format": "1", "robot": "robot", "clock": "loop", "began": "0.0", "wall": str(WALL)}
+
+
+def sample(
+    key: str, message: Message, at: float, *, source: str = "there", life: str = "1", number: int = 1
+) -> Sample:
+    payload, encoding = (encode(message), encoding_of(message)) if keys.is_presence(key) else published(message)
+    return Sample(key, payload, encoding, source, at, life=life, number=number, clock="loop", sent=at)
+
+
+def line(one: Sample, form: str) -> Line:
+    return Line(
+        topic=f"robot/{one.key}", form=form, key=one.key, sender=one.source, life=one.life, clock=one.clock,
+        encoding=one.encoding, is_past=one.past,
+    )  # fmt: skip
+
+
+def nanoseconds(at: float) -> int:
+    return WALL + round(at * BILLION)
+
+
+def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True) -> bytes:
+    """A file with these messages, in chunks of so many."""
+    writer = Writer()
+    data = writer.begin(FACTS)
+    for number, one in enumerate(samples, 1):
+        form = kept(one)
+        writer.add(line(one, form.encoding), form.data, nanoseconds(one.at), nanoseconds(one.sent), one.number)
+        if number % chunk == 0 or number == len(samples):
+            sealed = writer.seal()
+            assert sealed is not None
+            writer.placed(sealed, len(data))
+            data += sealed.data
+    if not is_whole:
+        return data
+    data += writer.told("end", {"messages": str(len(samples)), "lost": "0"}, len(data))
+    return data + writer.finish(len(data))
+
+
+def recording(samples: Sequence[Sample], chunk: int = 7) -> Recording:
+    return Recording(bytes_of(samples, chunk), "test")
+
+
+def all_of(recording: Recording) -> list[Sample]:
+    return [recording.sample(number) for number in range(len(recording))]
+
+
+def saved(path: Path, samples: Sequence[Sample], chunk: int = 7) -> Path:
+    path.write_bytes(bytes_of(samples, chunk))
+    return path

@@ -1,0 +1,178 @@
+"""Files of recordings: read back whole, cut off anywhere, with damaged chunks; by our reader, and by mcap's own."""
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+from mcap.reader import make_reader
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.presence import PeerAlive
+from engage_hri.services.bus.interface import Sample
+from engage_hri.services.recording.disk import read, repair
+from engage_hri.services.recording.reading import Recording
+from tests.recording.files import FACTS, WALL, all_of, bytes_of, nanoseconds, sample, saved
+
+XML = b"<bml id='b'/>"
+
+
+def told() -> list[Sample]:
+    """Fifty messages of every sort."""
+    found = [sample(keys.alive("there"), PeerAlive(participant="there", run="1"), 0.25)]
+    found += [
+        sample(keys.fault(f"service-{number % 3}"), Fault(reason=str(number)), 0.5 + number / 8, number=number)
+        for number in range(47)
+    ]
+    found.append(Sample(keys.FEEDBACK, b"\x00not a message", "application/json", "", 7.0, past=True, life="x"))
+    found.append(Sample(keys.BLOCK, XML, "application/xml", "", 7.5))
+    return found
+
+
+def test_all_messages_come_back_as_they_came() -> None:
+    recording = Recording(bytes_of(told()))
+
+    assert all_of(recording) == told()
+    assert (recording.is_whole, recording.lost_bytes, recording.damaged) == (True, 0, [])
+    assert (recording.robot, recording.clock, recording.began, recording.wall) == ("robot", "loop", 0.0, WALL)
+    assert recording.notes == {"end": {"messages": "50", "lost": "0"}}
+    assert recording.duration == 7.5
+
+
+def test_what_nobody_can_read_is_none_and_the_rest_is_decoded() -> None:
+    recording = Recording(bytes_of(told()))
+
+    unread = [number for number in range(len(recording)) if recording.received(number) is None]
+    assert [recording.sample(number).payload for number in unread] == [b"\x00not a message"]
+    first = recording.received(0)
+    assert first is not None
+    assert first.message == PeerAlive(participant="there", run="1")
+
+
+def test_the_library_of_mcap_reads_it_and_finds_its_checksums_right() -> None:
+    reader = make_reader(io.BytesIO(bytes_of(told())), validate_crcs=True)
+
+    summary = reader.get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert (summary.statistics.message_count, summary.statistics.chunk_count) == (50, 8)
+    found = list(reader.iter_messages())
+    assert [message.log_time for _, _, message in found] == sorted(nanoseconds(one.at) for one in told())
+    assert {channel.topic for _, channel, _ in found} == {f"robot/{one.key}" for one in told()}
+    middle = list(reader.iter_messages(starting_at=nanoseconds(2.0), ending_before=nanoseconds(3.0)))
+    assert len(middle) == len([one for one in told() if 2.0 <= one.at < 3.0])
+    assert next(each.metadata for each in reader.iter_metadata()) == FACTS
+
+
+def test_its_schema_describes_the_messages_in_it() -> None:
+    reader = make_reader(io.BytesIO(bytes_of(told())))
+
+    checked = 0
+    for schema, channel, message in reader.iter_messages():
+        if channel.message_encoding == "json" and schema is not None:
+            assert (schema.name, schema.encoding) == ("engage.Message", "jsonschema")
+            Draft202012Validator(json.loads(schema.data)).validate(json.loads(message.data))
+            checked += 1
+    assert checked == 48
+
+
+def test_a_file_cut_off_anywhere_gives_every_whole_chunk() -> None:
+    whole = told()
+    data = bytes_of(whole, is_whole=False)
+    ends = [0]
+    for count in range(1, len(whole) + 1):
+        if count % 7 == 0 or count == len(whole):
+            ends.append(len(bytes_of(whole[:count], is_whole=False)))
+    begin = ends[1] - 1
+    for cut in [*range(begin, len(data), 37), *(end + by for end in ends[1:] for by in (-1, 0, 1))]:
+        if cut > len(data):
+            continue
+        recording = Recording(data[:cut])
+        complete = max(number for number, end in enumerate(ends) if _chunk_ends(data, end) <= cut)
+
+        assert not recording.is_whole
+        assert all_of(recording) == whole[: min(7 * complete, len(whole))]
+        assert recording.end + recording.lost_bytes == cut
+
+
+def _chunk_ends(data: bytes, end: int) -> int:
+    """Where the chunk before this place ends: the indexes behind it may be missing."""
+    chunks = Recording(data).contents.chunks
+    return max(
+        (one.chunk_start_offset + one.chunk_length for one in chunks if one.chunk_start_offset < end), default=0
+    )
+
+
+def test_a_whole_file_cut_off_in_its_end_has_all_messages() -> None:
+    data, body = bytes_of(told()), bytes_of(told(), is_whole=False)
+    for cut in range(len(body), len(data), 991):
+        recording = Recording(data[:cut])
+
+        assert len(recording) == 50
+        assert not recording.is_whole
+
+
+def test_a_repaired_file_is_whole_for_everybody(tmp_path: Path) -> None:
+    data = bytes_of(told(), is_whole=False)
+    second = Recording(data).contents.chunks[1]
+    for cut in (
+        len(data),
+        len(data) - 3,
+        second.chunk_start_offset + second.chunk_length + 5,
+        second.chunk_start_offset + 9,
+    ):
+        path = tmp_path / f"{cut}.mcap"
+        path.write_bytes(data[:cut])
+        before = all_of(read(path))
+
+        lost = repair(path)
+
+        assert lost == cut - Recording(data[:cut]).end
+        assert read(path).is_whole
+        assert all_of(read(path)) == before
+        with path.open("rb") as file:
+            reader = make_reader(file, validate_crcs=True)
+            assert len(list(reader.iter_messages())) == len(before)
+            assert len(list(reader.iter_messages(starting_at=nanoseconds(1.0)))) == len(
+                [b for b in before if b.at >= 1]
+            )
+        assert repair(path) == 0
+
+
+def test_a_damaged_chunk_is_left_out_and_told(tmp_path: Path) -> None:
+    data = bytearray(bytes_of(told()))
+    second = Recording(bytes(data)).contents.chunks[1]
+    data[second.chunk_start_offset + 80] ^= 0xFF
+
+    recording = Recording(bytes(data))
+
+    assert [each.offset for each in recording.damaged] == [second.chunk_start_offset]
+    assert all_of(recording) == told()[:7] + told()[14:]
+    assert recording.is_whole
+
+
+def test_zeros_behind_a_crash_are_no_records() -> None:
+    recording = Recording(bytes_of(told(), is_whole=False) + bytes(4096))
+
+    assert len(recording) == 50
+    assert (recording.is_whole, recording.lost_bytes) == (False, 4096)
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [(b"", "no MCAP file"), (b"hello, world", "no MCAP file"), (bytes_of([])[:8], "nothing in it can be read")],
+)
+def test_what_is_no_recording_is_refused(tmp_path: Path, data: bytes, reason: str) -> None:
+    path = tmp_path / "some.mcap"
+    path.write_bytes(data)
+
+    with pytest.raises(InputRefused, match=reason):
+        read(path)
+
+
+def test_a_recording_of_nothing_opens(tmp_path: Path) -> None:
+    recording = read(saved(tmp_path / "empty.mcap", []))
+
+    assert (len(recording), recording.duration, recording.is_whole) == (0, 0.0, True)

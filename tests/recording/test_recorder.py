@@ -1,0 +1,175 @@
+"""The recorder on a bus in memory: all that a subscription gets is in the file, as it came."""
+
+import asyncio
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.status import Status
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.commandline.config import Config
+from engage_hri.services.recording import disk
+from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.service import FLUSH
+from engage_hri.services.simulation.config import SimulationConfig
+from tests.recording.files import all_of
+from tests.recording.runs import recording_to, tangram
+
+
+def faults_in(recording: Recording) -> list[str]:
+    """Reasons of all faults of `there`."""
+    found = [one for number in range(len(recording)) if (one := recording.received(number)) is not None]
+    return [one.message.reason for one in found if isinstance(one.message, Fault)]
+
+
+async def test_a_whole_task_is_in_the_file_message_for_message(tmp_path: Path) -> None:
+    live = await tangram(tmp_path / "task.mcap", Config(simulation=SimulationConfig(human="scripted")))
+
+    recording = read(tmp_path / "task.mcap")
+    kept = [received for number in range(len(recording)) if (received := recording.received(number)) is not None]
+    heard = [one for one in kept if keys.key_class(one.key) != "rpc" and one.source not in ("viewer", "recorder")]
+    numbers = {(one.life, one.number) for one in heard if one.number}
+    assert len(live) > 2000
+    assert [(one.key, one.message, one.source) for one in heard if one.number] == [
+        (one.key, one.message, one.source) for one in live if (one.life, one.number) in numbers
+    ]
+    assert not [one for one in live if one.number and (one.life, one.number) not in numbers and one.key != keys.TAKEN]
+    assert recording.is_whole
+    assert recording.losses.total == 0
+
+
+async def test_status_and_capabilities_of_those_who_come_are_asked_for(tmp_path: Path) -> None:
+    await tangram(tmp_path / "task.mcap", Config(simulation=SimulationConfig(human="scripted")))
+
+    recording = read(tmp_path / "task.mcap")
+    told = [recording.received(number) for number in range(len(recording))]
+    answers = [one for one in told if one is not None and keys.key_class(one.key) == "rpc"]
+    assert {one.source for one in answers if isinstance(one.message, Status)} >= set(keys.SERVICES)
+    assert [one.key for one in answers if isinstance(one.message, Capabilities)] == [keys.DESCRIBE]
+
+
+async def test_what_has_come_is_on_the_disk_half_a_second_later(tmp_path: Path) -> None:
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub):
+        there = hub.join("there")
+        for number in range(20):
+            there.publish(keys.fault("there"), Fault(reason=str(number)))
+            await asyncio.sleep(0.1)
+
+        on_disk = read(tmp_path / "a.mcap")  # as if the recorder were killed now
+        last = on_disk.received(len(on_disk) - 1)
+        assert last is not None
+        assert isinstance(last.message, Fault)
+        assert int(last.message.reason) >= 19 - round(FLUSH / 0.1)
+        assert not on_disk.is_whole
+
+
+async def test_a_late_recorder_has_the_states_and_who_is_there(tmp_path: Path) -> None:
+    async with MemoryHub() as hub:
+        there = hub.join("there")
+        there.declare_alive()
+        there.publish(keys.HEAD_OWNER, Fault(reason="old"))
+        there.publish(keys.HEAD_OWNER, Fault(reason="new"))
+        await asyncio.sleep(60)
+        async with recording_to(tmp_path / "a.mcap", hub):
+            await asyncio.sleep(0.1)
+
+    token, state = all_of(read(tmp_path / "a.mcap"))[:2]
+    assert (token.key, token.source) == (keys.alive("there"), "there")
+    assert token.encoding.endswith("PeerAlive/1")
+    assert (state.key, state.past, state.life) == (keys.HEAD_OWNER, True, there.run)
+
+
+async def test_a_name_that_is_taken_and_a_folder_that_is_not_there_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_text("mine")
+    async with MemoryHub() as hub:
+        with pytest.raises(InputRefused, match="there is such a file"):
+            async with recording_to(tmp_path / "a.mcap", hub):
+                pass
+        await hub.close()
+    async with MemoryHub() as hub:
+        with pytest.raises(InputRefused, match="cannot write: No such file or directory"):
+            async with recording_to(tmp_path / "none" / "a.mcap", hub):
+                pass
+    assert (tmp_path / "a.mcap").read_text() == "mine"
+
+
+class FullDisk:
+    """A disk that is full at times. Half of a chunk may still find room."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.is_full = False
+        self._write = os.write
+        monkeypatch.setattr(disk.os, "write", self.write)
+
+    def write(self, file: int, data: Any) -> int:
+        if self.is_full:
+            self._write(file, bytes(data[: len(data) // 2]))
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self._write(file, data)
+
+
+async def test_a_full_disk_keeps_messages_waiting_and_the_file_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    full = FullDisk(monkeypatch)
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub) as recorder:
+        there = hub.join("there")
+        for number in range(60):
+            full.is_full = 20 <= number < 40
+            there.publish(keys.fault("there"), Fault(reason=str(number)))
+            await asyncio.sleep(0.1)
+            if number == 39:
+                assert len(read(tmp_path / "a.mcap")) <= 22
+
+    recording = read(tmp_path / "a.mcap")
+    assert faults_in(recording) == [str(number) for number in range(60)]
+    assert recorder.losses.total == 0
+    told = [record.message.removeprefix(str(tmp_path)) for record in caplog.records if "a.mcap" in record.message]
+    assert told == [
+        "/a.mcap: No space left on device; what comes waits in memory, at most 32 MiB of it",
+        "/a.mcap: there is room again; messages lost: 0",
+    ]
+
+
+async def test_what_finds_no_room_for_long_is_lost_counted_and_told_in_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(disk, "WAITING", 1000)
+    full = FullDisk(monkeypatch)
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub) as recorder:
+        there, new = hub.join("there"), hub.join("new")
+        for number in range(100):
+            full.is_full = 20 <= number < 70
+            (new if number >= 30 else there).publish(keys.fault("there"), Fault(reason=f"{number:0>500}"))
+            await asyncio.sleep(0.1)
+
+    recording = read(tmp_path / "a.mcap")
+    found = [int(reason) for reason in faults_in(recording)]
+    assert found[:20] == [*range(20)]
+    assert found[-25:] == [*range(75, 100)]
+    assert recording.losses == recorder.losses
+    assert recording.losses.disk == 100 - len(found) > 0
+    assert recording.is_whole
+
+
+async def test_presence_is_kept_though_it_is_never_sent(tmp_path: Path) -> None:
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub):
+        there = hub.join("there")
+        there.declare_alive()
+        await asyncio.sleep(1.0)
+        await there.leave()
+        await asyncio.sleep(1.0)
+
+    recording = read(tmp_path / "a.mcap")
+    told = [one for number in range(len(recording)) if (one := recording.received(number)) is not None]
+    came, gone = [one for one in told if one.key == keys.alive("there")]
+    assert came.message == PeerAlive(participant="there", run=there.run)
+    assert gone.at - came.at == pytest.approx(1.0, abs=1e-9)

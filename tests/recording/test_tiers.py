@@ -1,0 +1,156 @@
+"""Tiers of a recorded task, and their files as other libraries read them."""
+
+import csv
+import io
+from pathlib import Path
+
+import praatio.textgrid
+import pympi
+import pytest
+import pytest_asyncio
+from hypothesis import given
+from hypothesis import strategies as st
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.commandline.config import Config
+from engage_hri.services.recording.annotations import eaf, table, textgrid
+from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.tiers import Annotation, Tier, _apart, tiers
+from engage_hri.services.simulation.config import SimulationConfig
+from tests.recording.files import recording, sample
+from tests.recording.runs import tangram
+
+DATE = "2026-11-24T17:00:00+00:00"
+
+
+@pytest_asyncio.fixture
+async def task(tmp_path: Path) -> Recording:
+    """The anchor scenario."""
+    await tangram(tmp_path / "a.mcap", Config(simulation=SimulationConfig(human="scripted")))
+    return read(tmp_path / "a.mcap")
+
+
+def events(task: Recording) -> dict[str, list[ConnectionEvent]]:
+    found: dict[str, list[ConnectionEvent]] = {}
+    for number in range(len(task)):
+        one = task.received(number)
+        if one is not None and isinstance(one.message, ConnectionEvent):
+            found.setdefault(one.message.id, []).append(one.message)
+    return found
+
+
+async def test_every_connection_event_is_an_annotation_with_its_times(task: Recording) -> None:
+    found = [one for tier in tiers(task) if tier.actor == "connection events" for one in tier.annotations]
+
+    lives = list(events(task).values())
+    assert len(found) == len(lives) > 80
+    assert sorted((round(one.begin, 6), round(one.end, 6)) for one in found) == sorted(
+        (round(life[0].started.seconds, 6), round(max(life[-1].at.seconds, life[0].started.seconds + 1e-3), 6))
+        for life in lives
+        if life[-1].state != "started"
+    )
+    succeeded = [one for one in found if one.value.startswith("succeeded")]
+    assert len(succeeded) == len([life for life in lives if any(event.state == "succeeded" for event in life)])
+
+
+async def test_looks_of_both_sides_are_those_that_were_told(task: Recording) -> None:
+    by_name = {tier.name: tier for tier in tiers(task)}
+    looks = by_name["human gaze"].annotations
+
+    told = [task.received(number) for number in range(len(task)) if task.key(number) == keys.PERCEIVED_ACTION]
+    begins = [one.message for one in told if one is not None and isinstance(one.message, ActionBegan)]
+    assert [one.begin for one in looks] == pytest.approx([b.at.seconds for b in begins if b.action == "look"])
+    assert by_name["robot words"].annotations[0].value
+    speech = " ".join(one.value for one in by_name["robot speech"].annotations)
+    assert " ".join(one.value for one in by_name["robot words"].annotations) == speech
+
+
+async def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
+    made = tiers(task)
+    (tmp_path / "a.eaf").write_bytes(eaf(made, date=DATE, media="a.mp4"))
+
+    document = pympi.Elan.Eaf(str(tmp_path / "a.eaf"))
+
+    assert list(document.get_tier_names()) == [tier.name for tier in made]
+    for tier in made:
+        found = sorted(document.get_annotation_data_for_tier(tier.name))
+        assert [(begin, end, value) for begin, end, value, *_ in found] == [
+            (round(one.begin * 1000), round(one.end * 1000), one.value) for one in tier.annotations
+        ]
+    assert document.get_linked_files()[0]["MEDIA_URL"] == "a.mp4"
+
+
+async def test_a_textgrid_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
+    made = tiers(task)
+    (tmp_path / "a.TextGrid").write_text(textgrid(made, task.duration), encoding="utf-8")
+
+    grid = praatio.textgrid.openTextgrid(str(tmp_path / "a.TextGrid"), includeEmptyIntervals=False)
+
+    assert list(grid.tierNames) == [tier.name for tier in made]
+    for tier in made:
+        found = grid.getTier(tier.name).entries
+        assert [one.label for one in found] == [one.value for one in tier.annotations]
+        assert [one.start for one in found] == pytest.approx([one.begin for one in tier.annotations], abs=2e-6)
+        assert [one.end for one in found] == pytest.approx([one.end for one in tier.annotations], abs=2e-6)
+
+
+async def test_a_table_has_a_row_for_each_annotation(task: Recording) -> None:
+    made = tiers(task)
+
+    header, *found = csv.reader(io.StringIO(table(made)))
+
+    assert header == ["tier", "actor", "begin", "end", "value"]
+    assert len(found) == sum(len(tier.annotations) for tier in made)
+    assert {row[0] for row in found} == {tier.name for tier in made}
+
+
+annotations = st.builds(
+    lambda begin, length: Annotation(begin / 1000, (begin + length) / 1000, "x"),
+    st.integers(0, 99),
+    st.integers(1, 9),
+)
+
+
+@given(st.lists(annotations, max_size=30))
+def test_nothing_overlaps_within_a_tier_and_nothing_is_lost(given: list[Annotation]) -> None:
+    apart = list(_apart("a", "b", given))
+
+    for tier in apart:
+        ends = [one.end for one in tier.annotations]
+        assert all(one.begin >= end - 1e-9 for one, end in zip(tier.annotations[1:], ends, strict=False))
+    kept = sorted((one.begin, one.end) for tier in apart for one in tier.annotations)
+    assert kept == sorted((one.begin, one.end) for one in given)
+
+
+@given(st.lists(annotations, max_size=10), st.text(max_size=20))
+def test_any_text_and_any_times_are_valid_files(given: list[Annotation], text: str) -> None:
+    made = [Tier(tier.name, "a", tuple(Annotation(one.begin, one.end, text) for one in tier.annotations))
+            for tier in _apart("a", "b", given)]  # fmt: skip
+
+    from lxml import etree
+
+    root = etree.fromstring(eaf(made, date=DATE))
+    assert len(root.findall(".//ANNOTATION")) == len(given)
+    assert textgrid(made, 1.0).count("text = ") >= len(given)
+
+
+def test_what_began_before_and_what_never_ended_are_cut_to_the_recording() -> None:
+    def look(at: float, target: str) -> ActionBegan:
+        return ActionBegan(actor="ann", action="look", at=Stamp("loop", at), targets=(target,))
+
+    told = [
+        sample(keys.PERCEIVED_ACTION, look(-2.0, "cup"), 0.5),
+        sample(keys.PERCEIVED_ACTION, look(1.0, "robot"), 1.5),
+        sample(keys.PERCEIVED_ACTION, look(1.0, "robot"), 1.6),  # twice, as after a cut
+        sample(keys.PERCEIVED_ACTION, ActionEnded(actor="bob", action="nod", at=Stamp("loop", 2.0)), 2.0),
+        sample(keys.fault("there"), Fault(reason="over"), 4.0),
+    ]
+
+    [gaze] = [tier for tier in tiers(recording(told)) if tier.name == "ann gaze"]
+
+    assert gaze.annotations == (Annotation(0.0, 1.0, "cup"), Annotation(1.0, 4.0, "robot"))
