@@ -1,4 +1,4 @@
-"""Where in a driver an error was raised, and what it was: for faults and findings."""
+"""Places in drivers where errors were raised, and words for what was raised: for faults and findings. Pure."""
 
 import traceback
 from collections.abc import Sequence
@@ -42,6 +42,6 @@ def place_of(error: BaseException, frames: Sequence[traceback.FrameSummary] = ()
 
 
 def seen_at(error: BaseException) -> str:
-    """Say where to look: `see /home/me/pan_tilt.py, line 14`; empty: it is not known."""
+    """Say where to look: `see drivers/pan_tilt.py, line 14`; empty: it is not known."""
     place = place_of(error)
     return f"see {place.file}, line {place.line}" if place else ""
