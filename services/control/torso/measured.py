@@ -1,4 +1,4 @@
-"""What the joints tell of a torso: its pose as a message, and the rays of its eyes and arms."""
+"""Measurements of a torso: its pose as a message, and the rays of its eyes and arms, as its joints tell them."""
 
 from collections.abc import Mapping
 
