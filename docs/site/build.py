@@ -20,7 +20,17 @@ SOURCE = ROOT / "build" / "docs-source"
 OUT = ROOT / "build" / "docs"
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "tests/README.md")
 CONTENTS = {
-    "Using it": ("commands", "configuration", "deploy", "security", "faults", "scenario", "study", "language-models"),
+    "Using it": (
+        "commands",
+        "configuration",
+        "deploy",
+        "security",
+        "faults",
+        "scenario",
+        "study",
+        "recordings",
+        "language-models",
+    ),
     "From other programs": ("reference", "connection-events", "protocol", "messages", "bml", "vocabulary"),
     "How it works": (
         "architecture",
