@@ -4,10 +4,11 @@
     python benchmarks/recording.py --kills 20
     python benchmarks/recording.py --play 60
 
-The first: the honest trip of sync_to_command.py, from a sync point to the next command, without and with `engage record`
-on the bus, each with processes of its own, in turns. `--kills`: so many recorders, killed (SIGKILL) at a time that
-chance picks, while a message comes every 5 ms: the age of the newest one that is in the file, at the kill. `--play`: a
-robot that plays the tangram with a person for so many seconds: bytes a minute, and the processor's time of the recorder.
+The first: the honest trip of sync_to_command.py, from a sync point to the next command, without and with `engage
+record` on the bus, each with processes of its own, in turns. `--kills`: so many recorders, killed (SIGKILL) at a time
+that chance picks, while a message comes every 5 ms: the age of the newest one that is in the file, at the kill.
+`--play`: a robot that plays the tangram with a person for so many seconds: bytes a minute, and the processor's time
+of the recorder.
 """
 
 import argparse

@@ -29,6 +29,7 @@ CONTENTS = {
         "faults",
         "scenario",
         "study",
+        "recordings",
         "language-models",
     ),
     "From other programs": (

@@ -1,6 +1,7 @@
 """Command `engage record`: all that a robot says on its bus, into a file that outlives its recorder."""
 
 import asyncio
+import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,9 @@ from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, FAILED, run_until_signal, unique_name
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.runtime.service import installed_version
+
+GIVES_WAY = 10
+"""Niceness of the recorder: where processors are few the robot goes first, and messages wait in front of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +47,7 @@ def main(options: Options) -> int:
     if options.repair:
         return _repair(options.file)
     config = options.read(RobotConfig, elsewhere=ELSEWHERE)
+    os.nice(GIVES_WAY)
     path = options.file or Path(f"{config.bus.robot}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
     return run_until_signal(_record(options, config, path))
 

@@ -29,7 +29,7 @@ def settings_of(taken: Taken) -> RecognitionConfig | None:
 
 
 class Lack(Struct, frozen=True, kw_only=True):
-    """What is missing, so that the same cannot come of it.
+    """Parts that are missing, so that the same cannot come of it.
 
     before: steps before the first that was told: recognition ran before the recording began. gaps: steps that were
     not told in between. messages: those that steps took, and that are not in the recording.
@@ -67,7 +67,7 @@ class Again:
         return [output for step in taken.steps for output in self._take(step, find)]
 
     def end(self, now: Seconds) -> list[Output]:
-        """Do what is due until the end of the recording."""
+        """Take the steps that are due until the end of the recording."""
         return self._intake.advance(now)
 
     def _take(self, step: Step, find: Find) -> list[Output]:

@@ -1,25 +1,29 @@
 """Form of a message in a recording: as JSON where that gives back the very bytes that came, else those bytes. Pure.
 
 Viewers of MCAP files understand JSON. MessagePack turns into JSON and back without a change, as long as its writer
-uses the shortest forms, as ours does, and no number in it is infinite. This is tried for each message.
+uses the shortest forms, and no number in it is infinite. This is tried for each message. Ours has a longer form for
+structs of many fields: those come back through their type.
 """
 
 from typing import Any, NamedTuple
 
 import msgspec
 
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.messages import decode, encode
 from engage_hri.services.bus.samples import Sample
 
 JSON, MSGPACK, XML, BYTES = "json", "msgpack", "xml", ""
 """Encodings of the messages of a channel, by the names that MCAP has for them."""
-_BAD = (msgspec.MsgspecError, UnicodeError, RecursionError, OverflowError, TypeError)
+_BAD = (msgspec.MsgspecError, InputRefused, UnicodeError, RecursionError, OverflowError, TypeError)
 
 
 class Form(NamedTuple):
-    """A payload as it is kept. encoding: one of those above."""
+    """A payload as it is kept. encoding: one of those above. is_typed: it comes back through the message's type."""
 
     encoding: str
     data: bytes
+    is_typed: bool = False
 
 
 def kept(sample: Sample) -> Form:
@@ -29,10 +33,14 @@ def kept(sample: Sample) -> Form:
         case "application/msgpack":
             try:
                 text = msgspec.json.encode(msgspec.msgpack.decode(payload))
-                if _packed(text) == payload:
-                    return Form(JSON, text)
             except _BAD:
                 return Form(BYTES, payload)
+            for is_typed in (False, True):
+                try:
+                    if _packed(text, is_typed=is_typed) == payload:
+                        return Form(JSON, text, is_typed)
+                except _BAD:
+                    pass
             return Form(MSGPACK, payload)
         case "application/json":
             return Form(JSON if _is_json(payload) else BYTES, payload)
@@ -44,11 +52,11 @@ def kept(sample: Sample) -> Form:
 def payload(form: Form, encoding: str) -> bytes:
     """Give back the bytes that came. encoding: that of the sample."""
     is_packed = form.encoding == JSON and encoding.partition(";")[0] == "application/msgpack"
-    return _packed(form.data) if is_packed else form.data
+    return _packed(form.data, is_typed=form.is_typed) if is_packed else form.data
 
 
-def _packed(text: bytes) -> bytes:
-    return msgspec.msgpack.encode(msgspec.json.decode(text))
+def _packed(text: bytes, *, is_typed: bool) -> bytes:
+    return encode(decode(text, "application/json")) if is_typed else msgspec.msgpack.encode(msgspec.json.decode(text))
 
 
 def _is_json(data: bytes) -> bool:

@@ -55,7 +55,7 @@ class Timeline:
         return bisect_left(range(len(self.recording)), at, key=self.recording.time)
 
     def standing(self, count: int) -> list[Sample]:
-        """What somebody gets who comes after the first `count` messages: who is there, and the last states.
+        """Messages that a listener gets who comes after the first `count`: who is there, and the last states.
 
         States of a life go when none of its participants is there any more, as they do on a bus.
         """

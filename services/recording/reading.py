@@ -139,8 +139,9 @@ class Recording:
             return msgspec.msgpack.decode(message.data, type=Sample)
         told = channel.metadata
         encoding, clock = told.get("encoding", ""), told.get("clock", "")
+        form = Form(channel.message_encoding, message.data, told.get("typed") == "true")
         return Sample(
-            key=told.get("key", ""), payload=payload(Form(channel.message_encoding, message.data), encoding),
+            key=told.get("key", ""), payload=payload(form, encoding),
             encoding=encoding, source=told.get("sender", ""), at=self.began + self.time(number),
             past=told.get("past") == "true", life=told.get("life", ""), number=message.sequence, clock=clock,
             sent=self.began + (message.publish_time - self.wall) / BILLION if clock else 0.0,

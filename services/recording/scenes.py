@@ -62,5 +62,5 @@ def scenes(recording: Recording, times: Sequence[Seconds]) -> Iterator[Scene]:
 
 
 def spread(end: Seconds, count: int) -> list[Seconds]:
-    """So many times over a recording, the same distance apart, the first and the last half of it from the ends."""
+    """Spread so many times over a recording: even, the first and the last half a step from its ends."""
     return [end * (2 * number + 1) / (2 * count) for number in range(count)]

@@ -46,12 +46,14 @@ class Recorder:
     def take(self, sample: Sample) -> None:
         """Put a message into the file's next chunk."""
         form = kept(sample)
-        name = (sample.key, sample.source, sample.life, sample.clock, sample.encoding, sample.past, form.encoding)
+        own = (form.encoding, form.is_typed)
+        name = (sample.key, sample.source, sample.life, sample.clock, sample.encoding, sample.past, *own)
         line = self._lines.get(name)
         if line is None:
             line = Line(
                 topic=f"{self._bus.robot}/{sample.key}", form=form.encoding, key=sample.key, sender=sample.source,
                 life=sample.life, clock=sample.clock, encoding=sample.encoding, is_past=sample.past,
+                is_typed=form.is_typed,
             )  # fmt: skip
             if not self._file.writer.knows(line):
                 self._own(MORE, msgspec.msgpack.encode(sample), MSGPACK)

@@ -49,7 +49,8 @@ SCHEMA = 1
 class Line(Struct, frozen=True):
     """Messages that share a channel: of one key, sender, life, clock, encoding, and either past or not.
 
-    sender: participant. is_past: from before the recording. form: encoding of its messages in the file.
+    sender: participant. is_past: from before the recording. form: encoding of its messages in the file. is_typed: as
+    of `Form`.
     """
 
     topic: str
@@ -60,11 +61,13 @@ class Line(Struct, frozen=True):
     clock: str = ""
     encoding: str = ""
     is_past: bool = False
+    is_typed: bool = False
 
     def metadata(self) -> dict[str, str]:
         named = {
             "key": self.key, "sender": self.sender, "life": self.life, "clock": self.clock,
             "encoding": self.encoding, "past": "true" if self.is_past else "",
+            "typed": "true" if self.is_typed else "",
         }  # fmt: skip
         return {name: value for name, value in named.items() if value}
 

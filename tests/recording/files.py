@@ -6,7 +6,7 @@ from pathlib import Path
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode, encoding_of, published
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording.form import kept
+from engage_hri.services.recording.form import Form, kept
 from engage_hri.services.recording.reading import BILLION, Recording
 from engage_hri.services.recording.writing import Line, Writer
 
@@ -21,10 +21,10 @@ def sample(
     return Sample(key, payload, encoding, source, at, life=life, number=number, clock="loop", sent=at)
 
 
-def line(one: Sample, form: str) -> Line:
+def line(one: Sample, form: Form) -> Line:
     return Line(
-        topic=f"robot/{one.key}", form=form, key=one.key, sender=one.source, life=one.life, clock=one.clock,
-        encoding=one.encoding, is_past=one.past,
+        topic=f"robot/{one.key}", form=form.encoding, is_typed=form.is_typed, key=one.key, sender=one.source,
+        life=one.life, clock=one.clock, encoding=one.encoding, is_past=one.past,
     )  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True
     data = writer.begin(FACTS)
     for number, one in enumerate(samples, 1):
         form = kept(one)
-        writer.add(line(one, form.encoding), form.data, nanoseconds(one.at), nanoseconds(one.sent), one.number)
+        writer.add(line(one, form), form.data, nanoseconds(one.at), nanoseconds(one.sent), one.number)
         if number % chunk == 0 or number == len(samples):
             sealed = writer.seal()
             assert sealed is not None

@@ -8,6 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from engage_hri.schemas.messages import encode, encoding_of
+from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.recording.form import BYTES, JSON, MSGPACK, XML, Form, kept, payload
 
@@ -31,6 +34,18 @@ def test_every_message_pack_comes_back_to_the_byte(value: object) -> None:
     data = msgspec.msgpack.encode(value)
 
     assert there_and_back(data, PACKED)[1] == data
+
+
+def test_a_message_with_many_fields_comes_back_through_its_type() -> None:
+    at = Stamp("loop", 1.5)
+    event = ConnectionEvent(
+        id="a-dg-1", kind="directed_gaze", initiator="robot", responder="ann", state="started", at=at, started=at
+    )  # fmt: skip
+    data = encode(event)
+    form = kept(Sample("key", data, encoding_of(event), "there", 0.0))
+
+    assert (form.encoding, form.is_typed) == (JSON, True)
+    assert payload(form, encoding_of(event)) == data
 
 
 @given(st.binary(), st.sampled_from([PACKED, "application/json", "application/xml", "", "image/png"]))

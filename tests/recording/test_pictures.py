@@ -7,23 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from engage_hri.services.commandline.config import Config
-from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.drawing import pictures, sheet, times_of_film, write_film
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.scenes import scenes, spread
-from engage_hri.services.simulation.config import SimulationConfig
-from tests.recording.runs import tangram
 
 
-async def task(path: Path) -> Recording:
-    await tangram(path / "a.mcap", Config(simulation=SimulationConfig(human="scripted")))
-    return read(path / "a.mcap")
-
-
-async def test_scenes_show_who_looks_where_and_what_is_said(tmp_path: Path) -> None:
-    recording = await task(tmp_path)
-    found = list(scenes(recording, [0.0, 3.0, 8.0]))
+def test_scenes_show_who_looks_where_and_what_is_said(task: Recording) -> None:
+    found = list(scenes(task, [0.0, 3.0, 8.0]))
 
     assert found[0].at == 0.0
     assert ("human", "look") in found[1].doing
@@ -32,9 +22,8 @@ async def test_scenes_show_who_looks_where_and_what_is_said(tmp_path: Path) -> N
     assert [scene.at for scene in found] == [0.0, 3.0, 8.0]
 
 
-async def test_a_sheet_and_films_are_pictures_that_change(tmp_path: Path) -> None:
-    recording = await task(tmp_path)
-    chosen = list(scenes(recording, spread(recording.duration, 6)))
+def test_a_sheet_and_films_are_pictures_that_change(task: Recording, tmp_path: Path) -> None:
+    chosen = list(scenes(task, spread(task.duration, 6)))
 
     with Image.open(io.BytesIO(sheet(chosen))) as image:
         assert image.format == "PNG"
@@ -49,10 +38,9 @@ async def test_a_sheet_and_films_are_pictures_that_change(tmp_path: Path) -> Non
         assert film.n_frames == 6  # type: ignore[attr-defined]
 
 
-async def test_a_film_is_mp4_where_there_is_ffmpeg(tmp_path: Path) -> None:
+def test_a_film_is_mp4_where_there_is_ffmpeg(task: Recording, tmp_path: Path) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    recording = await task(tmp_path)
-    write_film(tmp_path / "a.mp4", list(scenes(recording, [1.0, 2.0, 3.0, 4.0, 5.0])), 5.0)
+    write_film(tmp_path / "a.mp4", list(scenes(task, [1.0, 2.0, 3.0, 4.0, 5.0])), 5.0)
 
     frames = ffmpeg.read_frames(str(tmp_path / "a.mp4"))
     facts = next(frames)

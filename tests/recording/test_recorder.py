@@ -14,14 +14,13 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.status import Status
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config
 from engage_hri.services.recording import disk
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.service import FLUSH
-from engage_hri.services.simulation.config import SimulationConfig
+from tests.recording.conftest import Anchor
 from tests.recording.files import all_of
-from tests.recording.runs import recording_to, tangram
+from tests.recording.runs import recording_to
 
 
 def faults_in(recording: Recording) -> list[str]:
@@ -30,10 +29,9 @@ def faults_in(recording: Recording) -> list[str]:
     return [one.message.reason for one in found if isinstance(one.message, Fault)]
 
 
-async def test_a_whole_task_is_in_the_file_message_for_message(tmp_path: Path) -> None:
-    live = await tangram(tmp_path / "task.mcap", Config(simulation=SimulationConfig(human="scripted")))
+def test_a_whole_task_is_in_the_file_message_for_message(anchor: Anchor) -> None:
+    live, recording = anchor.live, anchor.recording
 
-    recording = read(tmp_path / "task.mcap")
     kept = [received for number in range(len(recording)) if (received := recording.received(number)) is not None]
     heard = [one for one in kept if keys.key_class(one.key) != "rpc" and one.source not in ("viewer", "recorder")]
     numbers = {(one.life, one.number) for one in heard if one.number}
@@ -46,10 +44,9 @@ async def test_a_whole_task_is_in_the_file_message_for_message(tmp_path: Path) -
     assert recording.losses.total == 0
 
 
-async def test_status_and_capabilities_of_those_who_come_are_asked_for(tmp_path: Path) -> None:
-    await tangram(tmp_path / "task.mcap", Config(simulation=SimulationConfig(human="scripted")))
+def test_status_and_capabilities_of_those_who_come_are_asked_for(task: Recording) -> None:
+    recording = task
 
-    recording = read(tmp_path / "task.mcap")
     told = [recording.received(number) for number in range(len(recording))]
     answers = [one for one in told if one is not None and keys.key_class(one.key) == "rpc"]
     assert {one.source for one in answers if isinstance(one.message, Status)} >= set(keys.SERVICES)

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from pathlib import Path
 
 import pytest
 
@@ -14,17 +13,14 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.replay import control_of
 from engage_hri.services.console.follow import following
-from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.player import Player
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.replay import Control, Stage, replay
 from engage_hri.services.recording.times import moved
-from engage_hri.services.simulation.config import SimulationConfig
+from tests.recording.conftest import Anchor
 from tests.recording.files import recording, sample
-from tests.recording.runs import tangram
 
 
 @asynccontextmanager
@@ -59,13 +55,9 @@ def faults(number: int, key: str = "there") -> list[Sample]:
     return [alive, *sorted([*said, *states], key=lambda one: one.at)]
 
 
-async def test_a_whole_task_comes_again_message_for_message(tmp_path: Path) -> None:
-    config = Config(simulation=SimulationConfig(human="scripted"))
-    told: list[tuple[str, float]] = []
-    await tangram(
-        tmp_path / "a.mcap", config, lambda m, at: told.append((repr(type(m)), at)) if _is_event(m) else None
-    )
-    original = read(tmp_path / "a.mcap")
+async def test_a_whole_task_comes_again_message_for_message(anchor: Anchor) -> None:
+    told = [(repr(type(message)), at) for message, at in anchor.told if _is_event(message)]
+    original = anchor.recording
     again: list[tuple[str, float]] = []
 
     async with MemoryHub() as hub:

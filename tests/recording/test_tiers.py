@@ -7,7 +7,6 @@ from pathlib import Path
 import praatio.textgrid
 import pympi
 import pytest
-import pytest_asyncio
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,23 +15,12 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.commandline.config import Config
 from engage_hri.services.recording.annotations import eaf, table, textgrid
-from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.tiers import Annotation, Tier, _apart, tiers
-from engage_hri.services.simulation.config import SimulationConfig
 from tests.recording.files import recording, sample
-from tests.recording.runs import tangram
 
 DATE = "2026-11-24T17:00:00+00:00"
-
-
-@pytest_asyncio.fixture
-async def task(tmp_path: Path) -> Recording:
-    """The anchor scenario."""
-    await tangram(tmp_path / "a.mcap", Config(simulation=SimulationConfig(human="scripted")))
-    return read(tmp_path / "a.mcap")
 
 
 def events(task: Recording) -> dict[str, list[ConnectionEvent]]:
@@ -44,7 +32,7 @@ def events(task: Recording) -> dict[str, list[ConnectionEvent]]:
     return found
 
 
-async def test_every_connection_event_is_an_annotation_with_its_times(task: Recording) -> None:
+def test_every_connection_event_is_an_annotation_with_its_times(task: Recording) -> None:
     found = [one for tier in tiers(task) if tier.actor == "connection events" for one in tier.annotations]
 
     lives = list(events(task).values())
@@ -58,7 +46,7 @@ async def test_every_connection_event_is_an_annotation_with_its_times(task: Reco
     assert len(succeeded) == len([life for life in lives if any(event.state == "succeeded" for event in life)])
 
 
-async def test_looks_of_both_sides_are_those_that_were_told(task: Recording) -> None:
+def test_looks_of_both_sides_are_those_that_were_told(task: Recording) -> None:
     by_name = {tier.name: tier for tier in tiers(task)}
     looks = by_name["human gaze"].annotations
 
@@ -70,7 +58,7 @@ async def test_looks_of_both_sides_are_those_that_were_told(task: Recording) -> 
     assert " ".join(one.value for one in by_name["robot words"].annotations) == speech
 
 
-async def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
+def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
     made = tiers(task)
     (tmp_path / "a.eaf").write_bytes(eaf(made, date=DATE, media="a.mp4"))
 
@@ -85,7 +73,7 @@ async def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording
     assert document.get_linked_files()[0]["MEDIA_URL"] == "a.mp4"
 
 
-async def test_a_textgrid_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
+def test_a_textgrid_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
     made = tiers(task)
     (tmp_path / "a.TextGrid").write_text(textgrid(made, task.duration), encoding="utf-8")
 
@@ -99,7 +87,7 @@ async def test_a_textgrid_is_read_by_another_library_as_it_was_meant(task: Recor
         assert [one.end for one in found] == pytest.approx([one.end for one in tier.annotations], abs=2e-6)
 
 
-async def test_a_table_has_a_row_for_each_annotation(task: Recording) -> None:
+def test_a_table_has_a_row_for_each_annotation(task: Recording) -> None:
     made = tiers(task)
 
     header, *found = csv.reader(io.StringIO(table(made)))

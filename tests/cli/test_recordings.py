@@ -1,0 +1,161 @@
+"""`engage record`, `replay`, `export` and `analyse` as people type them; two of them as processes."""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault
+from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.recording.disk import read
+from tests.bus.places import PATIENCE, free_endpoint
+from tests.cli.command import Engage, engage, start
+from tests.cli.test_processes import line
+from tests.recording.files import bytes_of, saved
+from tests.recording.test_reading import told
+
+
+@pytest.fixture(name="run")
+def _run(capsys: pytest.CaptureFixture[str]) -> Engage:
+    return engage(capsys)
+
+
+@pytest.mark.real_time
+async def test_what_is_recorded_comes_again_on_another_bus(tmp_path: Path) -> None:
+    path, endpoint = tmp_path / "a.mcap", free_endpoint()
+    async with await open_hub("told", listen=[endpoint]) as hub:
+        there = hub.join("there")
+        there.declare_alive()
+        there.publish(keys.HEAD_OWNER, Fault(reason="state"))
+        recorder = await start("record", path, "--robot", "told", "--connect", endpoint, "--participant", "p1")
+        await line(recorder, "recording told into")
+        with there.subscribe(keys.ANY_ALIVE) as presence:
+            async for received in presence:
+                if received.source.startswith("record-"):
+                    break
+        for number in range(50):
+            there.publish(keys.fault("there"), Fault(reason=str(number)))
+        while not _recorded(path, 50):
+            await _soon()
+        recorder.terminate()
+        assert await asyncio.wait_for(recorder.wait(), PATIENCE) == 0
+
+    recording = read(path)
+    assert recording.is_whole
+    assert (recording.robot, recording.facts["participant"]) == ("told", "p1")
+
+    elsewhere = free_endpoint()
+    async with await open_hub("told", listen=[elsewhere]) as hub:
+        bus = hub.join("listener")
+        with bus.subscribe(keys.ANY_FAULT, keys.HEAD_OWNER, keys.ANY_ALIVE) as inbox:
+            replay = await start("replay", path, "--connect", elsewhere, "--speed", "10")
+            found = []
+            while len(found) < 51:
+                received = await inbox.next(bus.now() + PATIENCE)
+                assert received is not None, f"only {len(found)} have come"
+                if isinstance(received.message, Fault):
+                    found.append((received.source, received.message.reason))
+            assert found == [("there", "state"), *(("there", str(number)) for number in range(50))]
+            assert await asyncio.wait_for(replay.wait(), PATIENCE) == 0
+
+        control = hub.join("control")
+        control.declare_alive()
+        refused = await start("replay", path, "--connect", elsewhere)
+        _, said = await asyncio.wait_for(refused.communicate(), PATIENCE)
+        assert refused.returncode == 2
+        assert b"has this on the bus already" in said
+
+
+def _recorded(path: Path, count: int) -> bool:
+    recording = read(path)
+    return sum(recording.key(number) == keys.fault("there") for number in range(len(recording))) >= count
+
+
+async def _soon() -> None:
+    done = asyncio.get_running_loop().create_future()
+    asyncio.get_running_loop().call_later(0.05, done.set_result, None)
+    await done
+
+
+def test_a_folder_that_is_read_only_and_a_file_that_is_there_are_refused(run: Engage, tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_text("mine")
+
+    taken = run("record", tmp_path / "a.mcap", "--robot", "nobody", "--seconds", 0)
+    nowhere = run("record", tmp_path / "none" / "a.mcap", "--robot", "nobody", "--seconds", 0)
+
+    assert (taken.code, nowhere.code) == (2, 2)
+    assert "there is such a file" in taken.err
+    assert "cannot write: No such file or directory" in nowhere.err
+    assert (tmp_path / "a.mcap").read_text() == "mine"
+
+
+def test_without_the_library_its_extra_is_named(run: Engage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mcap.records", None)
+
+    result = run("export", saved(tmp_path / "a.mcap", told()), "--csv")
+
+    assert result.code == 2
+    assert "pip install 'engage-hri[record]'" in result.err
+
+
+def test_a_cut_file_is_read_and_repaired_and_that_is_said(run: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(bytes_of(told(), is_whole=False)[:-40])
+
+    shown = run("export", path, "--csv")
+    repaired = run("record", path, "--repair")
+    again = run("record", path, "--repair")
+
+    assert shown.code == 0
+    assert "its recorder did not end in order; 49 messages until 7.00 s are whole" in shown.err
+    assert (repaired.code, again.code) == (0, 0)
+    assert "49 messages" in repaired.out
+    assert "nothing to repair" in again.out
+    assert read(path).is_whole
+
+
+def test_exports_lie_beside_the_recording_and_are_not_overwritten(run: Engage, tmp_path: Path) -> None:
+    path = saved(tmp_path / "a.mcap", told())
+
+    made = run("export", path, "--elan", "--textgrid", "--csv", "--lines", "--sheet")
+    twice = run("export", path, "--elan")
+    named = run("export", path, "--elan", "--csv", "--out", tmp_path / "x.eaf")
+    nothing = run("export", path)
+
+    names = ["a.eaf", "a.TextGrid", "a.csv", "a.jsonl", "a.png"]
+    assert sorted(made.out.split()) == sorted(str(tmp_path / name) for name in names)
+    assert all((tmp_path / name).stat().st_size for name in names)
+    assert [json.loads(one)["type"] for one in (tmp_path / "a.jsonl").read_text().splitlines()] == ["fault"] * 47
+    assert (twice.code, named.code, nothing.code) == (2, 2, 2)
+    assert "there is such a file" in twice.err
+    assert "nothing is to be made" in nothing.err
+
+
+def test_tables_of_a_folder_are_printed_and_written(run: Engage, tmp_path: Path) -> None:
+    saved(tmp_path / "a.mcap", told())
+    saved(tmp_path / "b.mcap", told())
+
+    result = run("analyse", tmp_path, "--out", tmp_path / "out")
+
+    assert result.code == 0
+    assert "finished" in result.out
+    assert "there is no connection event in it" in " ".join(result.out.split())
+    written = (tmp_path / "out" / "recordings.csv").read_text().splitlines()
+    assert written[1:] == [
+        f"{number},recorded,{name}.mcap,,there is no connection event in it" for number, name in enumerate("ab")
+    ]
+    assert (tmp_path / "out" / "summary.md").read_text().startswith("## Sessions")
+
+
+def test_again_without_a_ledger_is_refused_and_settings_are_for_it_alone(run: Engage, tmp_path: Path) -> None:
+    path = saved(tmp_path / "a.mcap", told())
+
+    again = run("analyse", path, "--again")
+    settings = run("analyse", path, "--set", "recognition.window=1")
+
+    assert (again.code, settings.code) == (2, 2)
+    assert "recognition told nothing of what it took" in again.err
+    assert "is for --again" in settings.err
