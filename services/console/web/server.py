@@ -106,8 +106,9 @@ async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
 
     Raises OSError if the port is taken.
     """
+    # With a configuration of its own for the log, it would close the handlers of ours.
     config = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws="websockets-sansio", ws_per_message_deflate=False,
+        app, log_config=None, log_level="warning", access_log=False, ws="websockets-sansio", ws_per_message_deflate=False,
         timeout_graceful_shutdown=1, lifespan="on",
     )  # fmt: skip
     listening = _bound(host, port)
