@@ -36,11 +36,11 @@ URL = rb"(http://[^\s]+)"
 
 
 class Place(NamedTuple):
-    """Addresses of a robot's bus and its window, and the port of a browser; 0: there is none."""
+    """Address of a window, the port of a browser (0: there is none), and the log of the window."""
 
-    endpoint: str
     url: str
     port: int
+    log: Path
 
 
 @contextmanager
@@ -73,10 +73,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
         waited(robot, folder / "up", b"(all services are up)")
         url = waited(window, folder / "console", URL)
         if browser.CHROMIUM is None:
-            yield Place(endpoint, url, 0)
+            yield Place(url, 0, folder / "log")
         else:
             with browser.running(folder / "browser") as port:
-                yield Place(endpoint, url, port)
+                yield Place(url, port, folder / "log")
 
 
 @asynccontextmanager
@@ -148,6 +148,7 @@ async def test_a_fault_is_switched_on_and_off_and_everybody_sees_it(place: Place
 
         await press(page, "slow", ".faults")
         await page.until("document.querySelector('.switched').hidden")
+        assert "wizard: somebody: faults: slow" in place.log.read_text()
         assert "faults: slow" in await page.value("document.querySelector('.notes').textContent")
 
 
@@ -282,12 +283,18 @@ async def test_a_window_whose_robot_has_gone_says_so_and_then_that_it_is_gone_it
 
 
 @needs_browser
-async def test_the_demo_shows_itself_and_takes_its_window_with_it(tmp_path: Path, place: Place) -> None:
-    with engage(tmp_path / "demo", "demo", "--window", BROWSER="true %s") as demo:
+@pytest.mark.parametrize("you", [(), ("--you",)])
+async def test_the_demo_shows_itself_and_takes_its_window_with_it(
+    tmp_path: Path, place: Place, you: tuple[str, ...]
+) -> None:
+    """With a simulated person, and with the visitor in its place."""
+    with engage(tmp_path / "demo", "demo", "--window", *you, BROWSER="true %s") as demo:
         url = waited(demo, tmp_path / "demo", rb"the window: (http://[^\s]+)")
         async with opened(place, url) as page:
             gaze = "JSON.stringify(window.engage.state.scene.body.gaze)"
             first = await page.value(gaze)
+            if you:
+                await sit(page, "zoe")
             await page.until(f"{gaze} !== '{first}'", 40)
             await page.until("document.querySelector('.words').textContent.includes('tangram')", 40)
             await page.until("document.querySelectorAll('.net .fired').length", 40)

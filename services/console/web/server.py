@@ -20,6 +20,9 @@ from engage_hri.services.console.web.visitor import Visitor
 
 TICK: Seconds = 1 / 15
 """Least time between two frames of a browser."""
+LARGEST_ORDER = 2**16
+"""Bytes of one order of a page."""
+MOST_VIEWERS = 100
 FRAMES = "/frames"
 """Path of the WebSocket."""
 
@@ -37,6 +40,9 @@ def application(window: Window, hosts: Sequence[str], token: str) -> FastAPI:
     async def frames(browser: WebSocket) -> None:
         if urlsplit(browser.headers.get("origin", "")).netloc != browser.headers.get("host"):
             await browser.close(4403, "the page is from elsewhere")
+            return
+        if window.viewers >= MOST_VIEWERS:
+            await browser.close(4429, f"{MOST_VIEWERS} browsers look on already")
             return
         await browser.accept()
         with contextlib.suppress(WebSocketDisconnect):
@@ -106,9 +112,10 @@ async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
 
     Raises OSError if the port is taken.
     """
+    # With a configuration of its own for the log, it would close the handlers of ours.
     config = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws="websockets-sansio", ws_per_message_deflate=False,
-        timeout_graceful_shutdown=1, lifespan="on",
+        app, log_config=None, log_level="warning", access_log=False, lifespan="on", timeout_graceful_shutdown=1,
+        ws="websockets-sansio", ws_per_message_deflate=False, ws_max_size=LARGEST_ORDER,
     )  # fmt: skip
     listening = _bound(host, port)
     server = _Quiet(config)

@@ -1,0 +1,67 @@
+"""`engage console` and the window of `engage demo`, as far as no browser is needed: what is refused, and why."""
+
+import importlib.util
+import socket
+import sys
+
+import pytest
+
+from engage_hri.services.commandline import windowed
+from tests.bus.places import free_endpoint
+from tests.cli.command import Engage
+
+needs_console = pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="needs the extra `console`")
+
+
+def test_without_the_extra_the_window_names_it(engage: Engage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "engage_hri.services.console.web.server", raising=False)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+
+    told = engage("console", "--port", "0")
+
+    assert told.code == 2
+    assert "uvicorn is not installed" in told.err
+    assert "engage-hri[console]" in told.err
+
+
+@needs_console
+def test_a_port_that_is_taken_is_told_with_what_to_do(engage: Engage) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        told = engage("console", "--connect", free_endpoint(), "--port", port)
+
+    assert told.code == 3
+    assert f"127.0.0.1:{port}" in told.err
+    assert "--port 0" in told.err
+
+
+def test_a_script_that_is_no_file_is_refused_before_anything_is_opened(engage: Engage) -> None:
+    told = engage("console", "--script", "nowhere.json")
+
+    assert (told.code, "nowhere.json" in told.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    "given", [("--window", "--virtual-time"), ("--you", "--virtual-time"), ("--you", "--no-window")]
+)
+def test_a_window_that_cannot_be_is_refused(engage: Engage, given: tuple[str, ...]) -> None:
+    told = engage("demo", *given)
+
+    assert told.code == 2
+    assert "leave out" in told.err
+
+
+@pytest.mark.parametrize(
+    ("terminal", "display", "opens"), [(True, ":0", True), (True, "", False), (False, ":0", False)]
+)
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a display")
+@needs_console
+def test_the_demo_opens_a_window_only_where_somebody_sees_it(
+    monkeypatch: pytest.MonkeyPatch, terminal: bool, display: str, opens: bool
+) -> None:
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+
+    assert windowed.can_open(terminal) is opens
+    monkeypatch.setattr(windowed, "NEEDED", "no_such_package")
+    assert windowed.can_open(terminal) is False
