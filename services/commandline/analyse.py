@@ -213,6 +213,8 @@ def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
     if life.is_same:
         return [f"{head}: again the same, to the last bit", *lines]
     different = life.differences()
+    if not different and lack.before:
+        return [f"{head}: again the same, but for the numbers of the events", *lines]
     why = "with other settings" if has_other_settings else "again"
     lines.append(f"  live:  {_counts(life.live)}")
     lines.append(f"  again: {_counts(life.again)}")

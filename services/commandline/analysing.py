@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.ledger import Taken
@@ -124,11 +124,30 @@ class Compared(Struct, frozen=True, kw_only=True):
         return self.live == self.again[: len(self.live)] and len(self.live) >= self.sure
 
     def differences(self) -> list[tuple[ConnectionEvent | None, ConnectionEvent | None]]:
-        """Changes that only one side has, or that differ: of one event and state together."""
-        live = {(one.id, one.state): one for one in self.live}
-        again = {(one.id, one.state): one for one in self.again}
+        """Changes that only one side has, or that differ: of one event and state together.
+
+        If the first steps are missing, events are numbered otherwise again, and are known by what they are.
+        """
+        live, again = self._named(self.live), self._named(self.again)
         names = [*live, *(name for name in again if name not in live)]
-        return [(live.get(name), again.get(name)) for name in names if live.get(name) != again.get(name)]
+        pairs = ((live.get(name), again.get(name)) for name in names)
+        return [(one, other) for one, other in pairs if not self._is_one(one, other)]
+
+    def _named(self, changes: Iterable[ConnectionEvent]) -> dict[tuple[object, ...], ConnectionEvent]:
+        """Changes by their event, their state, and how often that was told before."""
+        told = Counter[tuple[object, ...]]()
+        named = dict[tuple[object, ...], ConnectionEvent]()
+        for one in changes:
+            event = (one.kind, one.initiator, one.responder, one.started) if self.lack.before else (one.id,)
+            name = (*event, one.state)
+            named[*name, told[name]] = one
+            told[name] += 1
+        return named
+
+    def _is_one(self, one: ConnectionEvent | None, other: ConnectionEvent | None) -> bool:
+        if self.lack.before and one is not None and other is not None:
+            return structs.replace(one, id="") == structs.replace(other, id="")
+        return one == other
 
 
 Choose = Callable[[RecognitionConfig], RecognitionConfig]

@@ -156,6 +156,11 @@ async def test_a_recording_that_begins_in_the_middle_says_that_it_lacks_what_was
     assert life.lack.before > 10
     assert (life.lack.gaps, life.lack.messages) == (0, 0)
     assert len(life.again) > 10
+    first = min(one.at.seconds for one in life.live)
+    changes = {one for pair in life.differences() for one in pair if one is not None}
+    later = [one for one in life.live if one.started.seconds > first + 10.0]
+    assert len(later) > 10
+    assert not changes & set(later)
 
 
 async def test_a_message_that_is_missing_is_counted(tmp_path: Path) -> None:
