@@ -19,6 +19,7 @@ from engage_hri.schemas import (
     feedback,
     fragments,
     holds,
+    ledger,
     nets,
     perception,
     presence,
@@ -30,8 +31,8 @@ from engage_hri.schemas import (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, holds, nets, recognition, attention, actions, perception, world, body,
-    body_faults, requests, faults, presence, status, units,
+    fragments, blocks, behaviors, feedback, holds, nets, recognition, ledger, attention, actions, perception, world,
+    body, body_faults, requests, faults, presence, status, units,
 )  # fmt: skip
 
 HEAD = """\
