@@ -31,14 +31,18 @@ async def windowed(robot: str, tell: Callable[[str], None]) -> AsyncIterator[Hub
     from engage_hri.services.bus.zenoh.hub import open_hub
 
     endpoint = f"tcp/127.0.0.1:{_free_port()}"
-    async with await open_hub(robot, listen=(endpoint,), mode="peer") as hub:
-        with without_threads():
-            async with spawned(_end, *_command(robot, endpoint)) as process:
-                telling = asyncio.create_task(_pass_on(process, tell), name="window")
-                try:
-                    yield hub
-                finally:
-                    telling.cancel()
+    # The child first: until it has loaded the web stack, the hub is there.
+    with without_threads():
+        async with (
+            spawned(_end, *_command(robot, endpoint)) as process,
+            await open_hub(robot, listen=(endpoint,), mode="peer") as hub,
+        ):
+            telling = asyncio.create_task(_pass_on(process, tell), name="window")
+            try:
+                yield hub
+            finally:
+                telling.cancel()
+                await asyncio.wait([telling])
 
 
 def _command(robot: str, endpoint: str) -> list[str]:
