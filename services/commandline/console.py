@@ -34,6 +34,10 @@ class Options(Connected):
         Path | None,
         typer.Option(metavar="FILE", help="Prepared fragments and blocks, for buttons and the keys 1 to 9."),
     ] = None
+    pages: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Pages of your own, served at /pages/: they may listen at /messages."),
+    ] = None
     host: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Where to listen; others than this machine see it all.")
     ] = "127.0.0.1"
@@ -47,6 +51,10 @@ class Options(Connected):
 def main(options: Options) -> int:
     """Show the window until a signal."""
     config = options.load()
+    if options.pages is not None and not options.pages.is_dir():
+        raise InputRefused(
+            Fault(reason="is no folder", where=str(options.pages), advice="give the folder of index.html")
+        )
     things = read_source(options.script).things if options.script else ()
     run_until_signal(_show(options, config, things))
     return DONE
@@ -69,7 +77,9 @@ async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> 
         async with window(hub, bus, Script(things)) as shown:
             bus.declare_alive()
             try:
-                async with serving(application(shown, hosts, token), options.host, options.port) as port:
+                async with serving(
+                    application(shown, hosts, token, options.pages), options.host, options.port
+                ) as port:
                     url = _address(options, port, token)
                     print(url, flush=True)
                     if hosts == ("*",):

@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import aiohttp
+import msgspec
 import pytest
 
+from engage_hri.schemas.body import RobotState
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
@@ -32,6 +34,7 @@ NAMELESS = """
   .map((each) => each.outerHTML.slice(0, 90))
 """
 """What a screen reader could not name."""
+EXAMPLE = Path(__file__).parents[2] / "examples" / "browser"
 URL = rb"(http://[^\s]+)"
 
 
@@ -67,7 +70,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     up = ("up", "--in-one", "--listen", endpoint, "--set", "simulation.human=none")
     shown = (
         "console", "--connect", endpoint, "--port", "0", "--role", "wizard", "--script", str(folder / "script.json"),
-        "--log", str(folder / "log"),
+        "--log", str(folder / "log"), "--pages", str(EXAMPLE),
     )  # fmt: skip
     with engage(folder / "up", *up) as robot, engage(folder / "console", *shown) as window:
         waited(robot, folder / "up", b"(all services are up)")
@@ -174,6 +177,31 @@ async def test_two_visitors_in_two_windows_are_two_people(place: Place) -> None:
 
         await press(other, "Leave", "#part")
         await one.until(f"!{both}.includes('eve')")
+
+
+@needs_browser
+async def test_a_page_of_ones_own_tells_connection_events(place: Place) -> None:
+    home = place.url.partition("?")[0]
+    async with opened(place) as window, browser.at_port(place.port) as running, running.page() as page:
+        await page.go(f"{home}pages/")
+        await page.until("document.querySelector('#state').textContent === 'listening'")
+        await sit(window, "joe")
+        await window.value("window.engage.send({ do: 'look', target: 'robot' })")
+        told = "document.querySelector('#events').textContent"
+        await page.until(f"{told}.includes('joe → robot') && {told}.includes('mutual facial gaze')")
+
+
+async def test_a_program_gets_the_messages_of_the_types_that_it_asks_for_as_json(place: Place) -> None:
+    home = place.url.partition("?")[0]
+    async with aiohttp.ClientSession() as session:
+        async with session.ws_connect(f"{home}messages?only=robot_state") as socket:
+            message = msgspec.json.decode(await socket.receive_str(timeout=60), type=RobotState)
+            assert message.at.clock
+        async with session.ws_connect(f"{home}messages?only=no_such") as socket:
+            await socket.receive(timeout=60)
+            assert socket.close_code == 4400
+        with pytest.raises(aiohttp.WSServerHandshakeError):
+            await session.ws_connect(f"{home}messages", headers={"Origin": "http://elsewhere.example"})
 
 
 @needs_browser

@@ -5,15 +5,19 @@ import contextlib
 import secrets
 import socket
 from collections.abc import AsyncIterator, Iterator, Sequence
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import uvicorn
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from nicegui import ui
 from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.staticfiles import StaticFiles
 
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.frames import Viewer
+from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.page import build
 from engage_hri.services.console.web.service import Window
 from engage_hri.services.console.web.visitor import Visitor
@@ -24,11 +28,18 @@ LARGEST_ORDER = 2**16
 """Bytes of one order of a page."""
 MOST_VIEWERS = 100
 FRAMES = "/frames"
-"""Path of the WebSocket."""
+"""Path of the WebSocket of our own page."""
+MESSAGES = "/messages"
+"""Path of the WebSocket for programs of others."""
+PAGES = "/pages"
+"""Path of pages of others."""
+MOST_PROGRAMS = 100
 
 
-def application(window: Window, hosts: Sequence[str], token: str) -> FastAPI:
+def application(window: Window, hosts: Sequence[str], token: str, pages: Path | None = None) -> FastAPI:
     """The page and its frames, for requests that name one of these hosts; `*` stands for all.
+
+    pages: a folder of pages of somebody else, which may listen to the messages.
 
     A page of somebody else's in the same browser may call 127.0.0.1, too: the name that it calls, and the page that a
     WebSocket is from, have to be ours. token: who takes part has it in the address of the page.
@@ -48,6 +59,25 @@ def application(window: Window, hosts: Sequence[str], token: str) -> FastAPI:
         with contextlib.suppress(WebSocketDisconnect):
             given = browser.query_params.get("token", "")
             await _show(window, browser, Visitor(window, secrets.compare_digest(given.encode(), token.encode())))
+
+    @app.websocket(MESSAGES)
+    async def messages(program: WebSocket) -> None:
+        origin = program.headers.get("origin")  # a program that is no browser has none
+        only = frozenset(filter(None, program.query_params.get("only", "").split(",")))
+        if origin is not None and urlsplit(origin).netloc != program.headers.get("host"):
+            await program.close(4403, "the page is from elsewhere: --pages serves yours from here")
+            return
+        await program.accept()  # who is refused before learns no reason
+        if unknown := sorted(only - types()):
+            await program.close(4400, f"there is no message of type {unknown[0]!r}"[:120])
+        elif len(window.listeners) >= MOST_PROGRAMS:
+            await program.close(4429, f"{MOST_PROGRAMS} programs listen already")
+        else:
+            with contextlib.suppress(WebSocketDisconnect):
+                await _tell(window, program, Outbox(only))
+
+    if pages is not None:
+        app.mount(PAGES, StaticFiles(directory=pages, html=True))
 
     @ui.page("/", title=f"Engage: {window.bus.robot}")
     def page() -> None:
@@ -88,6 +118,34 @@ async def _show(window: Window, browser: WebSocket, visitor: Visitor) -> None:
         window.viewers -= 1
         listening.cancel()
         await visitor.leave()
+
+
+async def _tell(window: Window, program: WebSocket, outbox: Outbox) -> None:
+    """Send messages until the program has gone. Raises WebSocketDisconnect then."""
+    news = asyncio.Event()
+
+    def take(message: Message) -> None:
+        if outbox.put(message):
+            news.set()
+
+    async def listen() -> None:
+        while True:  # what it says means nothing
+            await program.receive_text()
+
+    window.listeners.add(take)
+    listening = asyncio.create_task(listen(), name="program")
+    try:
+        while not listening.done():
+            waiting = asyncio.ensure_future(news.wait())
+            await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
+            waiting.cancel()
+            news.clear()
+            for text in outbox.take():
+                await program.send_text(text)
+        listening.result()
+    finally:
+        window.listeners.discard(take)
+        listening.cancel()
 
 
 class _Quiet(uvicorn.Server):

@@ -4,7 +4,7 @@ Each browser gets a frame, draws it, says so, and gets the next one: a slow one 
 """
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from itertools import count
 
@@ -36,7 +36,8 @@ PATIENCE: Seconds = 1.0
 class Window:
     """The picture of a robot's bus, kept up to date, and what people need who take part.
 
-    viewers: number of browsers; while there is none, services are not asked how they are.
+    viewers: number of browsers; while there is none, services are not asked how they are. listeners: what gets each
+    message.
     """
 
     def __init__(self, hub: Hub, bus: Bus, robot: Robot, script: Script) -> None:
@@ -46,6 +47,7 @@ class Window:
         self.script = script
         self.picture = Picture(bus.robot, bus.now())
         self.viewers = 0
+        self.listeners: set[Callable[[Message], None]] = set()
         self._here: set[str] = set()
         self._numbers = count(1)
 
@@ -57,6 +59,8 @@ class Window:
             case PeerGone(participant=name):
                 self._here.discard(name)
         self.picture.feed(message, at, self.bus.now())
+        for listener in self.listeners:
+            listener(message)
 
     def new_id(self) -> str:
         """Make an id for a fragment that somebody makes at the page."""
