@@ -1,6 +1,6 @@
 /* Print the connection events of a robot, a line of JSON each: zenoh-pico and nothing else (docs/other-languages.md).
 
-       cc connection_events.c $(pkg-config --cflags --libs zenohpico) -DZENOH_LINUX -o events
+       cc examples/connection_events.c -DZENOH_LINUX -lzenohpico -o events
        ./events tcp/127.0.0.1:7447       # where a router or `engage up` listens
 */
 #include <stdio.h>
