@@ -214,7 +214,7 @@ class Physics:
     def _heat(self, loads: Array, seconds: Seconds) -> None:
         """Warm the motors by the squares of the shares of their torques, and let a hot one give less."""
         self.temperatures = warmed(self.temperatures, self._heating, loads, seconds)
-        is_hot = self.temperatures.max() > WARM
+        is_hot = bool((self.temperatures > WARM).any())
         limit = self._whole * derating(self.temperatures) if is_hot else self._whole
         if limit is not self._limit and (np.abs(limit - self._limit) > 1e-9).any():
             self._limit = limit
