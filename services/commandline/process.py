@@ -66,6 +66,7 @@ async def _interruptible(main: Coroutine[Any, Any, T]) -> T:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, _leave)
+        last_resort.end_at_the_second(signal.SIGINT)  # what blocks from now on ends at the one after the next
         cancel(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)

@@ -135,7 +135,8 @@ async def test_a_fault_of_the_body_and_its_end_are_once_in_the_terminal_of_up(tm
     (tmp_path / "losing.py").write_text(LOSING)
     (tmp_path / "nod.xml").write_text('<bml id="b"><head id="n" lexeme="NOD"/></bml>')
     where = free_endpoint()
-    up = await start("up", "--robot", "losing", "--listen", where, "--body", tmp_path / "losing.py")
+    alone = ("--set", "simulation.human=none")  # so that the robot does nothing but the block
+    up = await start("up", "--robot", "losing", "--listen", where, "--body", tmp_path / "losing.py", *alone)
     assert up.stdout is not None
     try:
         async with asyncio.timeout(60):
