@@ -98,7 +98,9 @@ class Head(SimulatedBody):
         super().__init__()
         joints = tuple(each for each in self.capabilities.joints if each.part == "head")
         types = ("gaze", "gazeShift", "head")
-        self.capabilities = replace(self.capabilities, body="head", types=types, parts=("head",), joints=joints)
+        self.capabilities = replace(
+            self.capabilities, body="head", types=types, parts=("head",), joints=joints, reach=0.0
+        )
 
     def state(self):
         return replace(super().state(), left_arm=None, right_arm=None)

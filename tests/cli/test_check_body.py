@@ -105,7 +105,7 @@ class Leaving(SimulatedBody):
 class Silent(SimulatedBody):
     def __init__(self):
         super().__init__()
-        self.capabilities = replace(self.capabilities, types=("gaze", "locomotion"))
+        self.capabilities = replace(self.capabilities, types=("gaze", "locomotion"), reach=0.0)
 '''
 
 
