@@ -2,18 +2,24 @@
 
 import secrets
 import webbrowser
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name, until_closed
 from engage_hri.services.commandline.sources import Thing, read_source
+
+if TYPE_CHECKING:
+    from engage_hri.services.recording.reading import Recording
 
 PORT = 8137
 LOCAL = ("127.0.0.1", "::1", "localhost")
@@ -34,6 +40,10 @@ class Options(Connected):
         Path | None,
         typer.Option(metavar="FILE", help="Prepared fragments and blocks, for buttons and the keys 1 to 9."),
     ] = None
+    recording: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Play a recording of `engage record` in place of a running robot."),
+    ] = None
     pages: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Pages of your own, served at /pages/: they may listen at /messages."),
@@ -53,45 +63,72 @@ def main(options: Options) -> int:
     config = options.load()
     if options.pages is not None and not options.pages.is_dir():
         raise InputRefused(
-            Fault(reason="is no folder", where=str(options.pages), advice="give the folder of index.html")
+            Fault(reason="this is no folder", where=str(options.pages), advice="give the one that index.html is in")
         )
+    if options.recording is not None:
+        run_until_signal(_play(options, opened(options.recording)))
+        return DONE
     things = read_source(options.script).things if options.script else ()
     run_until_signal(_show(options, config, things))
     return DONE
 
 
+async def _play(options: Options, recording: "Recording") -> None:
+    """Show a recording: without a bus, and for whoever looks."""
+    server = _web()
+    await _serve(options, server.recorded(recording, _hosts(options)), "", forever)
+
+
 async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> None:
-    try:
-        from engage_hri.services.console.web.server import application, serving
-    except ModuleNotFoundError as error:
-        advice = "python -m pip install 'engage-hri[console]', in the environment of `engage`"
-        raise InputRefused(Fault(reason=f"{error.name} is not installed", where="console", advice=advice)) from error
+    server = _web()
     from engage_hri.services.bus.zenoh.neighbors import hinting
     from engage_hri.services.console.web.script import Script
     from engage_hri.services.console.web.service import window
 
     token = secrets.token_urlsafe(12)
-    hosts = ("127.0.0.1", "localhost", "[::1]") if options.host in LOCAL else ("*",)
     async with await options.open(config.bus, HOLDERS[options.role]) as hub:
         bus = hub.join(unique_name("console"), options.role)
         async with window(hub, bus, Script(things)) as shown:
             bus.declare_alive()
-            try:
-                async with serving(
-                    application(shown, hosts, token, options.pages), options.host, options.port
-                ) as port:
-                    url = _address(options, port, token)
-                    print(url, flush=True)
-                    if hosts == ("*",):
-                        complain(_open_to_all(options))
-                    if options.browser:
-                        webbrowser.open(url)
-                    async with hinting(bus, config.bus.connect):
-                        await (until_closed() if options.attended else forever())
-            except OSError as error:
-                advice = "is another `engage console` there? --port 0 takes any that is free"
-                where = f"{options.host}:{options.port}"
-                raise RunFailed(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
+
+            async def stay() -> None:
+                async with hinting(bus, config.bus.connect):
+                    await (until_closed() if options.attended else forever())
+
+            app = server.application(shown, _hosts(options), token, options.pages)
+            await _serve(options, app, token, stay)
+
+
+def _web() -> ModuleType:
+    """Load the web server. Raises InputRefused if it is not installed."""
+    try:
+        from engage_hri.services.console.web import server
+    except ModuleNotFoundError as error:
+        advice = "python -m pip install 'engage-hri[console]', in the environment of `engage`"
+        raise InputRefused(Fault(reason=f"{error.name} is not installed", where="console", advice=advice)) from error
+    return server
+
+
+def _hosts(options: Options) -> tuple[str, ...]:
+    """Names by which the page may be called."""
+    return ("127.0.0.1", "localhost", "[::1]") if options.host in LOCAL else ("*",)
+
+
+async def _serve(options: Options, app: Any, token: str, stay: Callable[[], Awaitable[None]]) -> None:
+    """Serve a page while `stay` lasts. Raises RunFailed if the port is taken."""
+    try:
+        async with _web().serving(app, options.host, options.port) as port:
+            url = _address(options, port, token)
+            print(url, flush=True)
+            if _hosts(options) == ("*",):
+                complain(_open_to_all(options))
+            if options.browser:
+                webbrowser.open(url)
+            await stay()
+    except OSError as error:
+        advice = "is another `engage console` there? --port 0 takes any that is free"
+        where = f"{options.host}:{options.port}"
+        raise RunFailed(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
 
 
 HOLDERS = {"observer": "viewer", "operator": "operator", "wizard": "wizard"}
@@ -101,7 +138,7 @@ HOLDERS = {"observer": "viewer", "operator": "operator", "wizard": "wizard"}
 def _address(options: Options, port: int, token: str) -> str:
     host = "127.0.0.1" if options.host in ("0.0.0.0", "::") else options.host
     host = f"[{host}]" if ":" in host else host
-    return f"http://{host}:{port}/" + ("" if options.role == "observer" else f"?token={token}")
+    return f"http://{host}:{port}/" + ("" if options.role == "observer" or not token else f"?token={token}")
 
 
 def _open_to_all(options: Options) -> str:

@@ -15,7 +15,7 @@ HEARTBEAT: Seconds = 1.0
 class Frame(Struct, frozen=True, omit_defaults=True):
     """Message to the browser. now: seconds of the picture. sections: by name. gone: names of those that are over.
 
-    you: who looks at this page. told: what became of its orders.
+    you: who looks at this page. told: what became of its orders. place: of a recording, where the page is in it.
     """
 
     now: Seconds
@@ -23,6 +23,21 @@ class Frame(Struct, frozen=True, omit_defaults=True):
     gone: tuple[str, ...] = ()
     you: "You | None" = None
     told: tuple[str, ...] = ()
+    place: "Place | None" = None
+
+
+class Place(Struct, frozen=True):
+    """Place of a page in a recording.
+
+    at, end: seconds from its beginning. speed: times as fast as it was. visit: counts how often the page has jumped;
+    what it knew before a jump is void.
+    """
+
+    at: Seconds
+    end: Seconds
+    paused: bool
+    speed: float
+    visit: int
 
 
 class You(Struct, frozen=True):
@@ -47,17 +62,35 @@ class Viewer:
         self._known: dict[str, int] = {}
         self._you: You | None = None
         self._told: Seconds | None = None
+        self._place: Place | None = None
         self._encoder = Encoder()
 
-    def frame(self, picture: Picture, now: Seconds, you: You | None = None, told: Iterable[str] = ()) -> bytes | None:
-        """The next frame as JSON; None: there is nothing new, and the browser has heard of the window lately."""
+    def frame(
+        self,
+        picture: Picture,
+        now: Seconds,
+        you: You | None = None,
+        told: Iterable[str] = (),
+        place: Place | None = None,
+        clock: Seconds | None = None,
+    ) -> bytes | None:
+        """The next frame as JSON; None: there is nothing new, and the browser has heard of the window lately.
+
+        place: with a recording; at another visit the picture is another one, and is told whole. clock: what runs on
+        while the time of the picture stands still; None: that never does.
+        """
         told = tuple(told)
+        if place is not None and (self._place is None or place.visit != self._place.visit):
+            self._known = {}
+        is_moved, self._place = place != self._place, place
         new = {name: version for name, version in picture.versions.items() if self._known.get(name) != version}
         gone = tuple(self._known.keys() - picture.versions.keys())
-        if not (new or gone or told or you != self._you) and self._told is not None and now - self._told < HEARTBEAT:
+        beat = now if clock is None else clock
+        is_new = new or gone or told or is_moved or you != self._you
+        if not is_new and self._told is not None and beat - self._told < HEARTBEAT:
             return None
-        self._told = now
+        self._told = beat
         self._known = dict(picture.versions)
         sections = {name: Raw(picture.section(name)) for name in new}
         news, self._you = (you if you != self._you else None), you
-        return self._encoder.encode(Frame(picture.zero(now), sections, gone, news, told))
+        return self._encoder.encode(Frame(picture.zero(now), sections, gone, news, told, place))

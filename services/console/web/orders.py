@@ -15,9 +15,10 @@ from engage_hri.schemas.perception import LONGEST_TEXT
 from engage_hri.schemas.units import Coordinate
 
 Right = Literal["seat", "speak", "steer", "faults"]
+ALL_RIGHTS: tuple[Right, ...] = ("seat", "speak", "steer", "faults")
 RIGHTS: dict[str, tuple[Right, ...]] = {
     "operator": ("steer", "faults"),
-    "wizard": ("seat", "speak", "steer", "faults"),
+    "wizard": ALL_RIGHTS,
 }
 """Rights by role; no other role has any."""
 Name = Annotated[str, Meta(max_length=80)]
@@ -150,6 +151,17 @@ class SwitchOrder(Order, frozen=True, kw_only=True, tag="faults"):
     by: Name = ""
 
 
+class Play(Order, frozen=True, kw_only=True, tag="play"):
+    """Play a recording, or stand still in it.
+
+    at: where to go first, in seconds; None: nowhere. speed: times as fast as it was; None: as before.
+    """
+
+    on: bool = True
+    at: Annotated[float, Meta(ge=0)] | None = None
+    speed: Annotated[float, Meta(ge=0.1, le=20)] | None = None
+
+
 AnyOrder = (
     Drawn | Sit | Leave | LookAt | PointAt | MoveHead | Move | Speak | Type
     | Tell | Prepared | Backchannel | InhibitGaze | Condition | SteerOrder | SwitchOrder
@@ -165,6 +177,17 @@ def decoded(text: str | bytes) -> AnyOrder:
         raise InputRefused(Fault(reason=str(error), where="order", advice="reload the page")) from error
 
 
+_played_decoder: "msgspec.json.Decoder[Drawn | Play]" = msgspec.json.Decoder(Drawn | Play)
+
+
+def decoded_in_recording(text: str | bytes) -> Drawn | Play:
+    """Read an order of a page that shows a recording. Raises InputRefused for what is none."""
+    try:
+        return _played_decoder.decode(text)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputRefused(Fault(reason="it can only be played", where="this is a recording")) from error
+
+
 def missing(order: Order, role: str, trusted: bool) -> str:
     """Say why this order is not carried out; empty: it may be. trusted: the page was called with the token."""
     return denied(role, trusted).get(order.needs, "") if order.needs else ""
@@ -172,12 +195,11 @@ def missing(order: Order, role: str, trusted: bool) -> str:
 
 def denied(role: str, trusted: bool) -> dict[str, str]:
     """The rights that a page does not have, each with the reason."""
-    rights: tuple[Right, ...] = ("seat", "speak", "steer", "faults")
     if role in RIGHTS and not trusted:
         reason = "this address lacks the token: open the one that `engage console` has printed"
-        return dict[str, str].fromkeys(rights, reason)
+        return dict[str, str].fromkeys(ALL_RIGHTS, reason)
     found: dict[str, str] = {}
-    for right in rights:
+    for right in ALL_RIGHTS:
         if right not in RIGHTS.get(role, ()):
             able = " or ".join(name for name, has in RIGHTS.items() if right in has)
             found[right] = f"the window has the role {role}; start it with `--role` {able}"

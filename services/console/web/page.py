@@ -4,8 +4,6 @@ from pathlib import Path
 
 from nicegui import ui
 
-from engage_hri.services.console.web.service import Window
-
 MODULES = Path(__file__).parent / "page"
 
 
@@ -13,10 +11,10 @@ class Stage(ui.element, component=MODULES / "stage.js", esm={"engage-window": st
     """All that is drawn from the frames."""
 
 
-def build(window: Window) -> None:
+def build(robot: str) -> None:
     """Lay out the page for one browser."""
     import nicegui.elements.scene  # noqa: F401  # its three.js is served from here
 
     ui.add_css(MODULES / "window.css")
     ui.query(".nicegui-content").classes(remove="nicegui-content")
-    Stage().props(f'robot="{window.bus.robot}"')
+    Stage().props(f'robot="{robot}"')

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import secrets
 import socket
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -14,13 +14,17 @@ from nicegui import ui
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.staticfiles import StaticFiles
 
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.web.frames import Viewer
+from engage_hri.services.console.web import orders
+from engage_hri.services.console.web.frames import Viewer, You
 from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.page import build
+from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import Window
 from engage_hri.services.console.web.visitor import Visitor
+from engage_hri.services.recording.reading import Recording
 
 TICK: Seconds = 1 / 15
 """Least time between two frames of a browser."""
@@ -44,12 +48,11 @@ def application(window: Window, hosts: Sequence[str], token: str, pages: Path | 
     A page of somebody else's in the same browser may call 127.0.0.1, too: the name that it calls, and the page that a
     WebSocket is from, have to be ours. token: who takes part has it in the address of the page.
     """
-    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts])
+    app = _guarded(hosts)
 
     @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
-        if urlsplit(browser.headers.get("origin", "")).netloc != browser.headers.get("host"):
+        if not _is_ours(browser):
             await browser.close(4403, "the page is from elsewhere")
             return
         if window.viewers >= MOST_VIEWERS:
@@ -58,7 +61,8 @@ def application(window: Window, hosts: Sequence[str], token: str, pages: Path | 
         await browser.accept()
         with contextlib.suppress(WebSocketDisconnect):
             given = browser.query_params.get("token", "")
-            await _show(window, browser, Visitor(window, secrets.compare_digest(given.encode(), token.encode())))
+            visitor = Visitor(window, secrets.compare_digest(given.encode(), token.encode()))
+            await _show_robot(window, browser, visitor)
 
     @app.websocket(MESSAGES)
     async def messages(program: WebSocket) -> None:
@@ -79,45 +83,127 @@ def application(window: Window, hosts: Sequence[str], token: str, pages: Path | 
     if pages is not None:
         app.mount(PAGES, StaticFiles(directory=pages, html=True))
 
-    @ui.page("/", title=f"Engage: {window.bus.robot}")
+    _with_page(app, window.bus.robot)
+    return app
+
+
+def recorded(recording: Recording, hosts: Sequence[str]) -> FastAPI:
+    """The page, playing a recording."""
+    app, viewers = _guarded(hosts), set[WebSocket]()
+
+    @app.websocket(FRAMES)
+    async def frames(browser: WebSocket) -> None:
+        if not _is_ours(browser):
+            await browser.close(4403, "the page is from elsewhere")
+            return
+        if len(viewers) >= MOST_VIEWERS:
+            await browser.close(4429, f"{MOST_VIEWERS} browsers look on already")
+            return
+        viewers.add(browser)
+        try:
+            await browser.accept()
+            await _show_recording(recording, browser)
+        except WebSocketDisconnect:
+            pass
+        finally:
+            viewers.discard(browser)
+
+    _with_page(app, recording.robot)
+    return app
+
+
+def _guarded(hosts: Sequence[str]) -> FastAPI:
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts])
+    return app
+
+
+def _is_ours(browser: WebSocket) -> bool:
+    """True if the page that calls is one that this server has sent."""
+    return bool(urlsplit(browser.headers.get("origin", "")).netloc == browser.headers.get("host"))
+
+
+def _with_page(app: FastAPI, robot: str) -> None:
+    @ui.page("/", title=f"Engage: {robot}")
     def page() -> None:
-        build(window)
+        build(robot)
 
     ui.run_with(
         app, dark=None, language="en-US", tailwind=False, show_welcome_message=False, storage_secret=None,
         reconnect_timeout=10.0, binding_refresh_interval=None, gzip_middleware_factory=None,
     )  # fmt: skip
-    return app
 
 
-async def _show(window: Window, browser: WebSocket, visitor: Visitor) -> None:
-    """Send frames until the browser has gone. Raises WebSocketDisconnect then."""
-    viewer, drawn = Viewer(), asyncio.Event()
+async def _show(browser: WebSocket, take: Callable[[str], bool], frame: Callable[[], bytes | None]) -> None:
+    """Send frames until the browser has gone. Raises WebSocketDisconnect then.
+
+    take: takes an order; True: it says that the last frame is drawn. frame: makes the next one; None: there is none.
+    """
+    drawn = asyncio.Event()
     drawn.set()
 
     async def listen() -> None:
         while True:
-            if visitor.take(await browser.receive_text()):
+            if take(await browser.receive_text()):
                 drawn.set()
 
-    window.viewers += 1
     listening = asyncio.create_task(listen(), name="browser")
     try:
         while not listening.done():
-            window.picture.advance(window.bus.now())
-            frame = viewer.frame(window.picture, window.bus.now(), visitor.you, visitor.told())
-            if frame is not None:
+            if (made := frame()) is not None:
                 drawn.clear()
-                await browser.send_text(frame.decode())
+                await browser.send_text(made.decode())
                 waiting = asyncio.ensure_future(drawn.wait())
                 await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
                 waiting.cancel()
             await asyncio.sleep(TICK)
         listening.result()
     finally:
-        window.viewers -= 1
         listening.cancel()
+
+
+async def _show_robot(window: Window, browser: WebSocket, visitor: Visitor) -> None:
+    viewer = Viewer()
+
+    def frame() -> bytes | None:
+        window.picture.advance(window.bus.now())
+        return viewer.frame(window.picture, window.bus.now(), visitor.you, visitor.told())
+
+    window.viewers += 1
+    try:
+        await _show(browser, visitor.take, frame)
+    finally:
+        window.viewers -= 1
         await visitor.leave()
+
+
+async def _show_recording(recording: Recording, browser: WebSocket) -> None:
+    """Each browser has a place of its own in the recording."""
+    now = asyncio.get_running_loop().time
+    viewer, told, played = Viewer(), list[str](), PlayedPicture(recording, now())
+    reason = "this is a recording"
+    you = You(denied=dict.fromkeys(orders.ALL_RIGHTS, reason))
+
+    def take(text: str) -> bool:
+        try:
+            order = orders.decoded_in_recording(text)
+        except InputRefused as error:
+            told.append(str(error))
+            return False
+        if isinstance(order, orders.Play):
+            at = now()
+            if order.at is not None:
+                played.seek(order.at, at)
+            played.play(at, order.speed) if order.on else played.pause(at)
+        return isinstance(order, orders.Drawn)
+
+    def frame() -> bytes | None:
+        played.advance(now())
+        place, news = played.place(now()), tuple(told)
+        told.clear()
+        return viewer.frame(played.picture, place.at, you, news, place, now())
+
+    await _show(browser, take, frame)
 
 
 async def _tell(window: Window, program: WebSocket, outbox: Outbox) -> None:

@@ -7,6 +7,7 @@ import { net } from "./net.js";
 import { measures } from "./measures.js";
 import { part } from "./part.js";
 import { wizard } from "./wizard.js";
+import { player } from "./player.js";
 import { away, head, health, notes, references, switched, words } from "./lists.js";
 
 const EACH = ["block/", "net/"]; // sections that there are several of
@@ -20,14 +21,24 @@ export function begin(root, robot) {
     space(at("scene"), order), map(at("above"), order), part(at("part"), order), wizard(at("wizard"), order), words(at("said")), head(at("head")), eventLanes(at("events")),
     behaviorLanes(at("behaviors")), net(at("net")), measures(at("measures")), references(at("references")),
     health(at("health")), notes(at("notes")), switched(root.querySelector(".switched")),
+    player(root.querySelector(".player"), order),
   ];
   const warning = away(root.querySelector(".away"));
   const clock = runningClock();
   state.now = clock.now;
 
   function take(frame) {
-    clock.hear(frame.now);
+    clock.hear(frame.now, Boolean(frame.place));
     const changed = new Set();
+    if (frame.place) {
+      if (frame.place.visit !== state.place?.visit) {
+        state.blocks.clear();
+        state.layouts.clear();
+        changed.add("blocks").add("layouts");
+      }
+      state.place = frame.place;
+      changed.add("place");
+    }
     for (const [name, value] of Object.entries(frame.sections ?? {})) {
       if (name.startsWith(EACH[0])) {
         state.blocks.set(name.slice(EACH[0].length), value);
@@ -76,12 +87,14 @@ export function begin(root, robot) {
 // Seconds of the picture, between frames by the browser's own clock. Frames come late, never early.
 function runningClock() {
   let behind = null;
+  let still = null; // the last frame's time, where time is that of a recording, which goes as somebody wants
   const own = () => performance.now() / 1000;
   return {
-    hear(now) {
+    hear(now, isPlayed) {
+      still = isPlayed ? now : null;
       const measured = own() - now;
       behind = behind === null || measured < behind || measured > behind + 1 ? measured : behind + (measured - behind) * 0.01;
     },
-    now: () => (behind === null ? 0 : own() - behind),
+    now: () => still ?? (behind === null ? 0 : own() - behind),
   };
 }

@@ -28,6 +28,7 @@ export default {
   template: `<div class="window">
     <p class="away" role="alert" hidden></p>
     <p class="switched" role="status" hidden></p>
+    <div class="player row" role="group" aria-label="The recording" hidden></div>
     <div class="column main">${panels(MAIN)}</div>
     <div class="column side">${panels(SIDE)}</div>
   </div>`,

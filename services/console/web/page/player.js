@@ -1,0 +1,41 @@
+// The bar of a recording: play and pause, a place to go to, and how fast.
+import { clock, element } from "./look.js";
+
+const SPEEDS = [0.25, 0.5, 1, 2, 4, 10];
+const EACH = 250; // ms between two places while the slider is dragged
+
+export function player(bar, order) {
+  let place = null;
+  let asked = 0;
+  const go = (more) => order({ do: "play", on: !place.paused, ...more });
+  const button = element("button", { type: "button", class: "main" }, "Pause");
+  button.addEventListener("click", () => order({ do: "play", on: place.paused }));
+  const slider = element("input", { type: "range", min: "0", step: "0.1", "aria-label": "Place in the recording" });
+  const dragged = (isLast) => {
+    if (!isLast && performance.now() - asked < EACH) return;
+    asked = performance.now();
+    go({ at: Number(slider.value) });
+  };
+  slider.addEventListener("input", () => dragged(false));
+  slider.addEventListener("change", () => dragged(true));
+  const speed = element("select", { "aria-label": "Speed" },
+    ...SPEEDS.map((each) => element("option", { value: String(each) }, `${each} x`)));
+  speed.value = "1";
+  speed.addEventListener("change", () => go({ speed: Number(speed.value) }));
+  const told = element("span", {});
+  bar.replaceChildren(button, slider, told, speed);
+
+  return {
+    take(state, changed) {
+      if (!changed.has("place")) return;
+      place = state.place;
+      bar.hidden = false;
+      for (const id of ["part", "wizard"]) document.querySelector(`#${id}`).hidden = true; // nobody takes part
+      button.textContent = place.paused || place.at >= place.end ? "Play" : "Pause";
+      slider.max = String(place.end);
+      if (performance.now() - asked > 2 * EACH) slider.value = String(place.at);
+      slider.setAttribute("aria-valuetext", clock(place.at));
+      told.textContent = `${clock(place.at)} of ${clock(place.end)}`;
+    },
+  };
+}

@@ -1,0 +1,68 @@
+"""A recording as the picture of the page, to and fro at any speed. Pure: time is an argument."""
+
+from math import floor
+
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.samples import Sample
+from engage_hri.services.console.web.frames import Place
+from engage_hri.services.console.web.picture import Picture
+from engage_hri.services.recording.player import Player, Timeline
+from engage_hri.services.recording.reading import Recording, received
+from engage_hri.services.recording.times import Times
+
+BEFORE: Seconds = 30.0
+"""Time before a place that is played at once when somebody goes there: what the lanes and the words still show."""
+
+
+class PlayedPicture:
+    """The picture at a place in a recording that moves. visit: counts the jumps; each begins a new picture."""
+
+    def __init__(self, recording: Recording, now: Seconds) -> None:
+        self._recording = recording
+        self._times = Times(recording)
+        self._player = Player(recording, now)
+        self.visit = 0
+        self.picture = Picture(recording.robot, 0.0)
+
+    def place(self, now: Seconds) -> Place:
+        """Where it is."""
+        at, player = self._player.at(now), self._player
+        return Place(floor(at * 1000) / 1000, player.end, player.is_paused, player.speed, self.visit)
+
+    def advance(self, now: Seconds) -> None:
+        """Take what is due."""
+        at = self._player.at(now)
+        self._feed(self._player.advance(now))
+        self.picture.advance(at)
+
+    def seek(self, at: Seconds, now: Seconds) -> None:
+        """Go to a time: as if one had looked on for a while before it."""
+        self.visit += 1
+        self.picture = Picture(self._recording.robot, 0.0)
+        self._player.seek(at, now)
+        timeline: Timeline = self._player.timeline
+        there = self._player.at(now)
+        first, last = timeline.before(there - BEFORE), timeline.before(there)
+        self._feed(timeline.standing(first))
+        self._feed([self._recording.sample(number) for number in range(first, last) if self._recording.key(number)])
+        self.picture.advance(there)
+
+    def pause(self, now: Seconds) -> None:
+        """Stand still."""
+        self._player.pause(now)
+
+    def play(self, now: Seconds, speed: float | None = None) -> None:
+        """Go on; from the end, from the beginning. speed: times as fast as it was; None: as before."""
+        if self._player.at(now) >= self._player.end:
+            self.seek(0.0, now)
+        self._player.play(now, speed)
+
+    def _feed(self, samples: list[Sample]) -> None:
+        for sample in samples:
+            if (one := received(sample)) is None:
+                continue
+            came = max(0.0, one.at - self._recording.began)
+            stamp = getattr(one.message, "since" if isinstance(one.message, HeadOwner) else "at", None)
+            told = self._times.at(stamp, came) if isinstance(stamp, Stamp) else None
+            self.picture.feed(one.message, came if told is None else told, came)
