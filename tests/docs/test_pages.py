@@ -66,8 +66,9 @@ ELSEWHERE = {
 IN_LESS_TIME = {
     "--sessions 200 ": "--sessions 1 ",
     "--embedded": "--embedded --virtual-time",
+    "engage console": "engage console --port 0",
 }
-"""What is left out of a command, so that nobody waits for it here."""
+"""What is put in place of parts of a command, so that nobody waits for it here, or for a port that another has."""
 ENDLESS = {"up": 0, "run": 0, "watch": 0, "console": 0, "demo": 130}
 """Commands that go on until Ctrl-C (docs/commands.md), and their exit code then. Of a demo whose output no page shows
 the beginning is enough."""
