@@ -26,7 +26,7 @@ class PlayedPicture:
         self.picture = Picture(recording.robot, 0.0)
 
     def place(self, now: Seconds) -> Place:
-        """Where it is."""
+        """Place where it is now."""
         at, player = self._player.at(now), self._player
         return Place(floor(at * 1000) / 1000, player.end, player.is_paused, player.speed, self.visit)
 
