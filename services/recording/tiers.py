@@ -15,7 +15,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
-from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.times import Times
@@ -52,10 +52,7 @@ def messages(recording: Recording) -> Iterator[tuple[Received, Seconds]]:
     for number in range(len(recording)):
         if not recording.key(number) or (received := recording.received(number)) is None:
             continue
-        came = recording.time(number)
-        stamp = getattr(received.message, "since" if isinstance(received.message, HeadOwner) else "at", None)
-        at = times.at(stamp, came) if isinstance(stamp, Stamp) else None
-        yield received, came if at is None else at
+        yield received, times.told(received.message, recording.time(number))
 
 
 def tiers(recording: Recording) -> list[Tier]:

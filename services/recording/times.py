@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recording.losses import CLOCK
 from engage_hri.services.recording.reading import Recording
@@ -35,6 +36,12 @@ class Times:
         since, offsets = self._offsets[stamp.clock]
         # What was told before the clock was measured is taken by its first measurement.
         return stamp.seconds + offsets[max(0, bisect_right(since, told_at) - 1)] - self._began
+
+    def told(self, message: object, came: Seconds) -> Seconds:
+        """Time that a message tells of; that at which it came, if it has none, or of a clock that was not known."""
+        stamp = getattr(message, "since" if isinstance(message, HeadOwner) else "at", None)
+        at = self.at(stamp, came) if isinstance(stamp, Stamp) else None
+        return came if at is None else at
 
 
 def moved(value: Any, instant: Callable[[Stamp], Stamp]) -> Any:

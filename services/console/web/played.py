@@ -2,8 +2,7 @@
 
 from math import floor
 
-from engage_hri.schemas.attention import HeadOwner
-from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Sample
 from engage_hri.services.console.web.frames import Place
 from engage_hri.services.console.web.picture import Picture
@@ -63,6 +62,4 @@ class PlayedPicture:
             if (one := received(sample)) is None:
                 continue
             came = max(0.0, one.at - self._recording.began)
-            stamp = getattr(one.message, "since" if isinstance(one.message, HeadOwner) else "at", None)
-            told = self._times.at(stamp, came) if isinstance(stamp, Stamp) else None
-            self.picture.feed(one.message, came if told is None else told, came)
+            self.picture.feed(one.message, self._times.told(one.message, came), came)
