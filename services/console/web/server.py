@@ -66,9 +66,8 @@ def application(window: Window, hosts: Sequence[str], token: str, pages: Path | 
 
     @app.websocket(MESSAGES)
     async def messages(program: WebSocket) -> None:
-        origin = program.headers.get("origin")  # a program that is no browser has none
         only = frozenset(filter(None, program.query_params.get("only", "").split(",")))
-        if origin is not None and urlsplit(origin).netloc != program.headers.get("host"):
+        if "origin" in program.headers and not _is_ours(program):  # a program that is no browser has none
             await program.close(4403, "the page is from elsewhere: --pages serves yours from here")
             return
         await program.accept()  # who is refused before learns no reason
