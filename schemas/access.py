@@ -53,13 +53,13 @@ class Row(NamedTuple):
 
 SERVED = {
     "fragment": keys.FRAGMENT, "inhibit": keys.INHIBIT, "block": keys.BLOCK, "event": keys.EVENT, "turn": keys.TURN,
-    "behavior": keys.BEHAVIOR, "robot": keys.ROBOT, "faults": keys.FAULTS,
+    "behavior": keys.BEHAVIOR, "robot": keys.ROBOT, "faults": keys.FAULTS, "condition": keys.CONDITION,
 }  # fmt: skip
 """Commands by their subject."""
 WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.UTTERANCE,
     keys.ANY_CONNECTION_EVENT, keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS,
-    keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
+    keys.STUDY_CONDITION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
@@ -115,7 +115,7 @@ _NO_PROGRAM = "of no program of ours: for those of others"
 
 TABLE: tuple[Row, ...] = (
     *_service(
-        "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER,
+        "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER, keys.STUDY_CONDITION,
         heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.ANY_ACTION,
                keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS),
     ),
@@ -156,9 +156,9 @@ TABLE: tuple[Row, ...] = (
     *(Row("observer", "subscribes", key, "recorded by `engage record`") for key in (keys.TAKEN, keys.ROBOT_SEEN)),
     *_watches("operator", "what an operator sees"),
     *_looks("operator", keys.WORLD),
-    *_commands("operator", "robot", "faults"),
+    *_commands("operator", "robot", "faults", "condition"),
     Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
-    *_manages("wizard", "robot", "faults", why="drives the robot by hand, in `engage console`"),
+    *_manages("wizard", "robot", "faults", "condition", why="drives the robot by hand, in `engage console`"),
     *_looks("wizard"),
     *(
         Row("wizard", "publishes", key, "says what perception does not see; visitors of `engage console` are people")

@@ -26,6 +26,8 @@ HISTORY_MAX_AGE = 2.0
 # The expression for the commands of all requesters. `command` makes the key of one requester.
 FRAGMENT = f"{PREFIX}/cmd/generation/*/*/fragment"
 INHIBIT = f"{PREFIX}/cmd/generation/*/*/inhibit"
+CONDITION = f"{PREFIX}/cmd/generation/*/*/condition"
+"""For the condition of a study: a key of its own, so that rules can keep it to a few."""
 BLOCK = f"{PREFIX}/cmd/realizer/*/*/block"
 EVENT = f"{PREFIX}/cmd/recognition/*/*/event"
 TURN = f"{PREFIX}/cmd/recognition/*/*/turn"
@@ -51,6 +53,7 @@ ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"
 HEAD_OWNER = f"{PREFIX}/state/generation/head_owner"
+STUDY_CONDITION = f"{PREFIX}/state/generation/condition"
 HELD = f"{PREFIX}/state/realizer/held"
 BODY_HELD = f"{PREFIX}/state/control/held"
 BODY_FAULTS = f"{PREFIX}/state/control/faults"

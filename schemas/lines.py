@@ -12,6 +12,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.body_faults import BodyFaults
+from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import Feedback
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -30,6 +31,7 @@ LineMessage = (
     | Held
     | BodyHeld
     | BodyFaults
+    | StudyCondition
     | Fault
     | NetPlanned
     | NetMarked

@@ -36,6 +36,7 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched, SwitchFaults
+from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
@@ -63,6 +64,7 @@ MAJOR = 1
 Message = (
     Heard | Accepted | Outdated | Refused | Cancel | KeepAlive | Unreadable | Fault
     | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
+    | SetCondition | ConditionSet | StudyCondition
     | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted | SteerPerformance | SteerRobot
     | PerformanceSteered | Held | BodyHeld | NetPlanned | NetMarked | NetWaiting
     | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
@@ -79,6 +81,7 @@ Message = (
 COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
     keys.FRAGMENT: (PerformFragment,),
     keys.INHIBIT: (Inhibit,),
+    keys.CONDITION: (SetCondition,),
     keys.BLOCK: (PerformBlock, InterruptBehavior, SteerPerformance),
     keys.ROBOT: (SteerRobot,),
     keys.EVENT: (RequestEvent,),

@@ -15,6 +15,7 @@ from engage_hri.schemas import (
     blocks,
     body,
     body_faults,
+    conditions,
     faults,
     feedback,
     fragments,
@@ -31,8 +32,8 @@ from engage_hri.schemas import (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, holds, nets, recognition, ledger, attention, actions, perception, world,
-    body, body_faults, requests, faults, presence, status, units,
+    fragments, blocks, behaviors, feedback, holds, nets, recognition, ledger, attention, conditions, actions,
+    perception, world, body, body_faults, requests, faults, presence, status, units,
 )  # fmt: skip
 
 HEAD = """\

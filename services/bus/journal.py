@@ -13,6 +13,8 @@ from typing import Any
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.body_faults import BodyFaults, words
+from engage_hri.schemas.conditions import StudyCondition
+from engage_hri.schemas.conditions import words as condition_words
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
@@ -115,6 +117,12 @@ def _body_faults(message: BodyFaults) -> Entry:
     )
 
 
+def _condition(message: StudyCondition) -> Entry:
+    by = f", set by {message.by}" if message.by else ""
+    told = condition_words(message.name, message.speech_only)
+    return INFO if message.by else DEBUG, f"condition of the study: {told}{by}"
+
+
 def _names(holds: Iterable[Hold]) -> str:
     names = [": ".join(filter(None, (each.block, each.behavior))) or "everything" for each in holds]
     return ", ".join(names) or "nothing"
@@ -145,6 +153,7 @@ _TOLD: dict[type, Callable[[Any], Entry]] = {
     Held: _held,
     BodyHeld: _body_held,
     BodyFaults: _body_faults,
+    StudyCondition: _condition,
     Refused: _refused,
     Fault: _fault,
     ActorFound: _actor,

@@ -9,8 +9,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.perception import Utterance
-from engage_hri.services.client.faulting import Faulting
 from engage_hri.services.client.feeds import Feed
+from engage_hri.services.client.studied import Studied
 
 MOST = 256
 """Number of utterances that are remembered."""
@@ -35,7 +35,7 @@ class NewWords:
         return new
 
 
-class Hearing(Faulting):
+class Hearing(Studied):
     """The part of `Robot` that tells what people say."""
 
     _words: NewWords

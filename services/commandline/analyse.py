@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.analysing import Compared, Session, again, session, with_settings
+from engage_hri.services.commandline.analysing import Compared, Session, again, sessions, with_settings
 from engage_hri.services.commandline.folder import Folder
 from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.options import Quiet
@@ -20,13 +20,12 @@ from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.simulate import PLOTS, plotting, rendered
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recording.conditions import UNNAMED
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import BASELINE
 from engage_hri.services.study.hypotheses import Finding, findings
 from engage_hri.services.study.summary import BETWEEN, WITHIN, Table
 
-UNNAMED = "recorded"
-"""Condition of recordings that name none."""
 FILES = ("recordings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
 DIFFERENT = 1
 """Exit code if recognition again gives other events with the same settings, and nothing is missing."""
@@ -68,14 +67,14 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="is for --again: all else is as it was recorded", where="--set"))
     draw = plotting() if options.out is not None else None
     folder = Folder(options.out, FILES, overwrite=options.overwrite) if options.out is not None else None
-    sessions, is_within = numbered([_session(path) for path in paths])
-    compared, tables = compare(sessions, options.baseline, is_within=is_within)
+    played, is_within = numbered([one for path in paths for one in sessions(opened(path))])
+    compared, tables = compare(played, options.baseline, is_within=is_within)
     for table in tables:
         console.print("", rendered(table), sep="\n")
     if folder is not None and draw is not None:
-        records, events = [one.record for one in sessions], [event for one in sessions for event in one.events]
+        records, events = [one.record for one in played], [event for one in played for event in one.events]
         texts = {
-            "recordings.csv": listed(sessions), "events.csv": files.events(events),
+            "recordings.csv": listed(played), "events.csv": files.events(events),
             "sessions.csv": files.sessions(records), "summary.md": "\n".join(table.markdown() for table in tables),
         }  # fmt: skip
         if compared:
@@ -91,11 +90,6 @@ def found(given: Sequence[Path]) -> list[Path]:
     if not paths:
         raise InputRefused(Fault(reason="no recordings (*.mcap) in it", where=", ".join(map(str, given))))
     return list(dict.fromkeys(paths))
-
-
-def _session(path: Path) -> Session:
-    recording = opened(path)
-    return session(recording, 0, recording.facts.get("condition", "") or UNNAMED)
 
 
 def numbered(sessions: Sequence[Session]) -> tuple[list[Session], bool]:
@@ -148,7 +142,7 @@ def compare(
 
 
 def overview(sessions: Sequence[Session], baseline: str) -> Table:
-    """Table with a row for each recording, and what to doubt."""
+    """Table with a row for each session, and what to doubt."""
     rows = tuple(
         (
             one.path.name, one.condition, one.participant or summary.MISSING, f"{one.record.duration:.0f}",
@@ -157,11 +151,11 @@ def overview(sessions: Sequence[Session], baseline: str) -> Table:
         for one in sessions
     )  # fmt: skip
     conditions = {one.condition for one in sessions}
-    notes = [f"{one.path.name}: {doubt}." for one in sessions for doubt in one.doubts]
+    notes = list(dict.fromkeys(f"{one.path.name}: {doubt}." for one in sessions for doubt in one.doubts))
     if len(conditions) > 1 and baseline not in conditions:
         notes.append(f"No recording has the condition {baseline!r}, so nothing is compared: name one by --baseline.")
     if UNNAMED in conditions:
-        notes.append("Some name no condition (`engage record --condition`): they count together.")
+        notes.append("Some name no condition (by `engage record --condition` or the window): they count together.")
     columns = ("", "condition", "participant", "seconds", "events", "MTBCE (s)")
     return Table(title="Recordings", columns=columns, rows=rows, notes=tuple(notes))
 

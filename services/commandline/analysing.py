@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import msgspec
 from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
@@ -18,9 +20,9 @@ from engage_hri.services.console.follow import FOLLOWED
 from engage_hri.services.recognition.again import Again, Lack, events_in, settings_of
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.tiers import messages
-from engage_hri.services.recording.times import Times, moved
+from engage_hri.services.recording.times import Times, messages, moved
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.records import Recording as Record
 
@@ -28,9 +30,14 @@ WINDOW: Seconds = 30.0
 """Window of a tally whose recent numbers nobody reads."""
 
 
-class Session(Struct, frozen=True, kw_only=True):
-    """A recording in numbers. participant: empty: not told. published: what recognition said itself in the end.
+Told = tuple[Received, Seconds]
+"""A message, and the time in the recording that it tells of."""
 
+
+class Session(Struct, frozen=True, kw_only=True):
+    """A recording in numbers, or the part of it under one condition. participant: empty: not told.
+
+    published: what recognition said itself in the end; None: it said nothing, or of more than this part.
     doubts: what may be wrong with these numbers, in words.
     """
 
@@ -43,52 +50,97 @@ class Session(Struct, frozen=True, kw_only=True):
     doubts: tuple[str, ...]
 
 
-def session(recording: Recording, number: int, condition: str) -> Session:
-    """Take a recording's numbers: of all connection events that began in it, as recognition decided them.
+def sessions(recording: Recording) -> list[Session]:
+    """Take a recording's numbers: a session for each condition that was set in it, or one of all of it.
 
-    number: of the session, as in the tables. condition: under which it counts.
+    Of several, those under no condition, and those with nobody there, are left out; a doubt says so.
     """
-    times, tally, record = Times(recording), Tally(WINDOW), Record(recording.robot)
+    times, told = Times(recording), [one for one in messages(recording) if _counts_for(one[0])]
+    doubts = tuple(_doubts(recording, told, times))
+    parts = stretches(told, recording.facts.get("condition", ""), recording.duration)
+    made = [_session(recording, told, times, part, doubts) for part in parts if part.name]
+    if len(parts) == 1:
+        return made
+    kept = [one for one in made if one.events or one.record.eye_contact is not None] or made
+    lost = [f"{part.seconds:.0f} s under no condition" for part in parts if not part.name]
+    lost += [f"{one.record.duration:.0f} s of {one.condition} with nobody there" for one in made if one not in kept]
+    if lost:
+        kept[0] = structs.replace(kept[0], doubts=(*kept[0].doubts, f"left out: {', '.join(lost)}"))
+    return kept
+
+
+def _counts_for(received: Received) -> bool:
+    return keys.first(FOLLOWED, received.key) is not None
+
+
+def _session(
+    recording: Recording,
+    told: Sequence[Told],
+    times: Times,
+    part: Stretch,
+    doubts: tuple[str, ...],
+) -> Session:
+    """Take the numbers of a part: of all connection events that began in it, as recognition decided them."""
+    tally, record = Tally(WINDOW), Record(recording.robot)
     published: WindowStatistics | None = None
-    lives, before = Counter[str](), 0
-    known: dict[str, bool] = {}
-    for received, at in messages(recording):
+    until = part.end if part.end < recording.duration else inf
+    within: dict[str, bool] = {}
+    for received, at in told:
         message = received.message
-        if keys.first(FOLLOWED, received.key) is None:
-            continue
-        if isinstance(message, ConnectionEvent):
-            if received.past and message.id not in known:
-                known[message.id] = False
-            began = times.at(message.started, recording.duration)
-            if not known.setdefault(message.id, began is not None and began >= 0):
-                before += message.state == "started" or not lives[message.session]
-                continue
-            lives[message.session] += 1
-            tally.feed(message)
         if isinstance(message, Statistics):
             published = message.session if message.actor == "" else published
             continue
-        record(_in_time(message, times, at), max(0.0, at))
-    end = Stamp("recording", recording.duration)
-    record(Statistics(actor="", at=end, session=tally.session(), recent=WindowStatistics()), recording.duration)
-    doubts = tuple(_doubts(recording, lives, sum(not counts for counts in known.values())))
+        if isinstance(message, ConnectionEvent):
+            if not within.setdefault(message.id, _began(received, message, times, recording, part.begin, until)):
+                continue
+            tally.feed(message)
+        elif at >= until or (at < part.begin and not _lasts(message)):
+            continue
+        record(_in_time(message, times, at, part.begin), min(max(0.0, at - part.begin), part.seconds))
+    end = Stamp("recording", part.seconds)
+    record(Statistics(actor="", at=end, session=tally.session(), recent=WindowStatistics()), part.seconds)
+    is_all = part.begin == 0.0 and until == inf
     return Session(
-        path=Path(recording.name), condition=condition, participant=recording.facts.get("participant", ""),
-        record=record.session(session=number, condition=condition, seed=0),
-        events=record.events(session=number, condition=condition), published=published, doubts=doubts,
+        path=Path(recording.name), condition=part.name, participant=recording.facts.get("participant", ""),
+        record=record.session(session=0, condition=part.name, seed=0),
+        events=record.events(session=0, condition=part.name), published=published if is_all else None, doubts=doubts,
     )  # fmt: skip
 
 
-def _in_time(message: Message, times: Times, at: Seconds) -> Message:
+def _began(
+    received: Received, event: ConnectionEvent, times: Times, recording: Recording, begin: Seconds, until: Seconds
+) -> bool:
+    """Tell whether an event began between these times. One that is known only from before the recording did not."""
+    began = times.at(event.started, recording.duration)
+    return not received.past and began is not None and begin <= began < until
+
+
+def _lasts(message: Message) -> bool:
+    """True if a message tells what may still be so when a later part begins: who is there, and looks where."""
+    is_look = isinstance(message, ActionBegan | ActionEnded) and message.action == "look"
+    return is_look or isinstance(message, ActorFound | ActorLost)
+
+
+def _in_time(message: Message, times: Times, at: Seconds, begin: Seconds) -> Message:
+    """The message with its instants in seconds since `begin`. at: when it came, in the recording."""
+
     def instant(stamp: Stamp) -> Stamp:
         found = times.at(stamp, at)
-        return Stamp("recording", at if found is None else found)
+        return Stamp("recording", (at if found is None else found) - begin)
 
     told: Message = moved(message, instant)
     return told
 
 
-def _doubts(recording: Recording, lives: Counter[str], before: int) -> Iterable[str]:
+def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterable[str]:
+    """List what is doubtful in all numbers of a recording."""
+    lives, known = set[str](), dict[str, bool]()
+    for received, _ in told:
+        if not isinstance(event := received.message, ConnectionEvent):
+            continue
+        if known.setdefault(event.id, _began(received, event, times, recording, 0.0, inf)):
+            lives.add(event.session)
+    before = sum(not counts for counts in known.values())
     if not recording.is_whole:
         yield f"the recorder did not end in order: the numbers are of the first {recording.duration:.0f} s"
     if recording.losses.total:

@@ -107,7 +107,7 @@ def _make(name: str, path: Path, recording: "Recording", options: Options) -> Pa
 def lines_of(recording: "Recording") -> str:
     """The messages that have a line, as `engage watch --json` would have printed them."""
     from engage_hri.schemas import lines
-    from engage_hri.services.recording.tiers import messages
+    from engage_hri.services.recording.times import messages
 
     told = (lines.line(received.message) for received, _ in messages(recording) if not received.past)
     return "".join(f"{line}\n" for line in told if line is not None)

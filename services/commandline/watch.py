@@ -11,6 +11,7 @@ from engage_hri.schemas import keys, lines
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.body_faults import BodyFaults
+from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -34,6 +35,7 @@ OTHERS = (
     keys.HELD,
     keys.BODY_HELD,
     keys.BODY_FAULTS,
+    keys.STUDY_CONDITION,
     keys.ANY_FAULT,
 )
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {
@@ -44,6 +46,7 @@ SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "head": (HeadOwner,),
     "holds": (Held, BodyHeld),
     "faults": (Fault, BodyFaults),
+    "condition": (StudyCondition,),
 }
 
 
@@ -53,7 +56,8 @@ class Options(Connected):
     only: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="WHAT", help="events, statistics, words, feedback, head, holds or faults; may be repeated."
+            metavar="WHAT",
+            help="events, statistics, words, feedback, head, holds, faults or condition; may be repeated.",
         ),
     ] = None
     net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False

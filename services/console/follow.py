@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from engage_hri.schemas import keys
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.body_faults import BodyFaults
+from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetWaiting
@@ -28,6 +29,7 @@ FOLLOWED = (
     keys.HELD,
     keys.BODY_HELD,
     keys.BODY_FAULTS,
+    keys.STUDY_CONDITION,
     keys.ANY_REQUEST_STATE,
     keys.ANY_FAULT,
     keys.ANY_ALIVE,
@@ -47,8 +49,8 @@ async def following(
     """Feed the sinks, in order, while the body of `async with` runs; messages that have arrived by its end are still
     fed.
 
-    past: feed also earlier messages that the bus still has; of connection events those that are open. What is held
-    now is fed in any case.
+    past: feed also earlier messages that the bus still has; of connection events those that are open. What is held,
+    switched on or set now is fed in any case.
     kinds: of connection events; empty: all.
     """
     sinks = tuple(sinks)
@@ -62,7 +64,7 @@ async def following(
         message, at = received.message, instant(bus, received.message, received.at)
         for event in events.feed(message, at, bus.now(), past=received.past):
             tell(event, instant(bus, event, at))
-        is_now = past or not received.past or isinstance(message, Held | BodyHeld | BodyFaults)
+        is_now = past or not received.past or isinstance(message, Held | BodyHeld | BodyFaults | StudyCondition)
         if is_now and not isinstance(message, ConnectionEvent | OpenEvents):
             tell(message, at)
 

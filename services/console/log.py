@@ -7,6 +7,7 @@ from msgspec import Struct
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.body_faults import BodyFaults, words
+from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -73,6 +74,8 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return f"! faults of the body that are switched on: {', '.join(map(words, faults))}"
         case BodyFaults() if before.faults:
             return "no fault of the body is switched on any more"
+        case StudyCondition(by=by) if by or message.speech_only or before.condition:
+            return wording.condition(message)
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:

@@ -11,6 +11,7 @@ from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
+from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.holds import Held, Hold
@@ -117,6 +118,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     held: tuple[HoldInView, ...] = ()
     faults: tuple[BodyFault, ...] = ()
+    condition: StudyCondition | None = None
+    """Condition of the study; None: generation has not told of one."""
 
     def actor(self, id: str) -> Actor:
         return self.actors.get(id) or Actor(id=id)
@@ -163,6 +166,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return replace(scene, held=tuple(HoldInView(hold, began, began + last) for hold, began, last in held))
         case BodyFaults(faults=faults):
             return replace(scene, faults=faults)
+        case StudyCondition():
+            return replace(scene, condition=message)
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
         case WarningFeedback(kind=kind, message=text):

@@ -7,6 +7,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
 from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
@@ -46,6 +47,7 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(generation.perform(), name="fragments")
                 tasks.create_task(generation.keep_deadlines(), name="deadlines")
+                generation.tell_condition()
                 ready()
                 async for received in inbox:
                     with bus.containing(received):
@@ -132,6 +134,8 @@ class _Generation:
                 self._admit(request, now, now + self._config.world_patience)
             case Inhibit():
                 self._grant(request, now)
+            case SetCondition():
+                self._set_condition(request)
             case Cancel():
                 self._cancel(request)
 
@@ -173,6 +177,17 @@ class _Generation:
             self._refuse(request.id, error.fault)
         else:
             self._desk.accept(request.id)
+
+    def _set_condition(self, request: SetCondition) -> None:
+        self._leases.speech_only = request.speech_only
+        self._desk.accept(request.id)
+        self.tell_condition(request.name, request.by or request.requester)
+        self._desk.end(ConditionSet(id=request.id, name=request.name, speech_only=request.speech_only))
+
+    def tell_condition(self, name: str = "", by: str = "") -> None:
+        """Publish the condition that begins now."""
+        told = StudyCondition(at=self._bus.stamp(), name=name, speech_only=self._leases.speech_only, by=by)
+        self._bus.publish(keys.STUDY_CONDITION, told)
 
     def _refuse(self, id: str, fault: Fault) -> None:
         self._desk.refuse(id, fault)

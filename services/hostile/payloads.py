@@ -11,6 +11,7 @@ from engage_hri.schemas.attention import HeadOwner, InhibitionEnded
 from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, PerformanceSteered
 from engage_hri.schemas.body import RobotSeen, RobotState, SyncPointArrived, SyncPointReached, WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched
+from engage_hri.schemas.conditions import ConditionSet, StudyCondition
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.holds import BodyHeld, Held
@@ -34,6 +35,7 @@ SERVER: Mapping[type, str] = {
     FragmentOutcome: "generation", InhibitionEnded: "generation", BlockOutcome: "realizer",
     BehaviorInterrupted: "realizer", PerformanceSteered: "realizer",
     EventOutcome: "recognition", TurnOutcome: "recognition", FaultsSwitched: "control",
+    ConditionSet: "generation",
 }  # fmt: skip
 FIXED_KEYS: Mapping[type, str] = {
     **dict.fromkeys((BlockProgress, SyncPointProgress, PredictionFeedback, WarningFeedback), keys.FEEDBACK),
@@ -42,6 +44,7 @@ FIXED_KEYS: Mapping[type, str] = {
     TurnClosed: keys.TURN_CLOSED, World: keys.WORLD, HeadOwner: keys.HEAD_OWNER, RobotState: keys.ROBOT_STATE,
     NetPlanned: keys.NET, NetMarked: keys.NET, NetWaiting: keys.NET, Held: keys.HELD,
     BodyHeld: keys.BODY_HELD, BodyFaults: keys.BODY_FAULTS, RobotSeen: keys.ROBOT_SEEN, Utterance: keys.UTTERANCE,
+    StudyCondition: keys.STUDY_CONDITION,
 }  # fmt: skip
 """Key of each type of message that always has the same."""
 

@@ -10,7 +10,7 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.tiers import messages
+from engage_hri.services.recording.times import messages
 
 
 class Scene(Struct, frozen=True, kw_only=True):

@@ -12,13 +12,13 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.conditions import StudyCondition, words
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.samples import Received
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.times import Times
+from engage_hri.services.recording.times import Times, messages
 
 SHORTEST: Seconds = 0.001
 """Shortest annotation: annotation tools count milliseconds."""
@@ -26,6 +26,8 @@ NAMES = {
     "speak": "speech", "look": "gaze", "point": "points", "nod": "nods", "shake": "shakes", "act": "manipulations",
 }  # fmt: skip
 """Tiers of the actions."""
+STUDY = "study"
+"""Actor of the tier that tells which condition of a study was in force."""
 DO_NOT_END_EACH_OTHER = ("point", "act")
 """Actions of which an actor may do several at once."""
 
@@ -44,15 +46,6 @@ class Tier(Struct, frozen=True):
     name: str
     actor: str
     annotations: tuple[Annotation, ...]
-
-
-def messages(recording: Recording) -> Iterator[tuple[Received, Seconds]]:
-    """All messages that can be read, with the times that they tell of, or else at which they came."""
-    times = Times(recording)
-    for number in range(len(recording)):
-        if not recording.key(number) or (received := recording.received(number)) is None:
-            continue
-        yield received, times.told(received.message, recording.time(number))
 
 
 def tiers(recording: Recording) -> list[Tier]:
@@ -116,6 +109,10 @@ class _Collected:
                 self._end((self._robot, "behaviors", f"{block}:{behavior}"), at)
             case ConnectionEvent():
                 self._event(message, at)
+            case StudyCondition(name=name, speech_only=speech_only, by=by):
+                self._end((STUDY, "condition"), at)
+                if by or speech_only:
+                    self._open[STUDY, "condition"] = (at, words(name, speech_only))
             case HeadOwner(owner=owner):
                 self._owner("" if owner.kind == "none" else f"{owner.kind} {owner.target}".strip(), at)
 

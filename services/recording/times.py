@@ -1,7 +1,7 @@
 """Instants of messages as times in a recording, through the clocks that its recorder knew. Pure."""
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgspec
@@ -9,6 +9,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.samples import Received
 from engage_hri.services.recording.losses import CLOCK
 from engage_hri.services.recording.reading import Recording
 
@@ -42,6 +43,15 @@ class Times:
         stamp = getattr(message, "since" if isinstance(message, HeadOwner) else "at", None)
         at = self.at(stamp, came) if isinstance(stamp, Stamp) else None
         return came if at is None else at
+
+
+def messages(recording: Recording) -> Iterator[tuple[Received, Seconds]]:
+    """All messages that can be read, with the times that they tell of, or else at which they came."""
+    times = Times(recording)
+    for number in range(len(recording)):
+        if not recording.key(number) or (received := recording.received(number)) is None:
+            continue
+        yield received, times.told(received.message, recording.time(number))
 
 
 def moved(value: Any, instant: Callable[[Stamp], Stamp]) -> Any:

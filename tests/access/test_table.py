@@ -64,7 +64,7 @@ async def visit(flows: set[Flow]) -> None:
         async with nets, log, Robot.on(hub.join("alice")) as alice, Robot.on(hub.join("guard")) as guard:
             feeds = [alice.connection_events(open=True), alice.turns(), alice.feedback(), alice.actions()]
             feeds += [alice.faults(), alice.worlds(), alice.head_owners(), alice.statistics_updates()]
-            feeds.append(alice.utterances())
+            feeds += [alice.utterances(), alice.conditions()]
             await alice.statistics()
             async with perceive("carl", hub=hub, name="camera") as carl:
                 await carl.say("hello")
@@ -74,6 +74,7 @@ async def visit(flows: set[Flow]) -> None:
                 await guard.hold()
                 await guard.resume()
                 await guard.switch_faults([BodyFault(kind="miscalibrated", part="right_arm")])
+                await guard.set_condition("operational")
                 await alice.interrupt("b", "s")
                 await speaking
             await alice.perform(TurnFragment(id="whole", behaviors=(SPEECH,)))

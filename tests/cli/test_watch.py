@@ -193,7 +193,7 @@ async def _again(tell: Callable[[], None]) -> None:
         ),
         (
             ("--only", "all"),
-            "--only: unknown 'all' (known: events, statistics, words, feedback, head, holds, faults)",
+            "--only: unknown 'all' (known: events, statistics, words, feedback, head, holds, faults, condition)",
         ),
         (("--net", "--only", "events"), "--net: shows nets and nothing else (leave out --only, --actor and --kind)"),
         (("--actor", "a/b"), "--actor: 'a/b' can't be in a key: "),

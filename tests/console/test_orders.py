@@ -19,6 +19,7 @@ from engage_hri.services.console.web.laying import NEAR, laid
 from engage_hri.services.console.web.orders import (
     RIGHTS,
     AnyOrder,
+    Condition,
     LookAt,
     SteerOrder,
     SwitchOrder,
@@ -39,6 +40,7 @@ from engage_hri.services.tangram.table import edges, overlap, tangram_table, tou
         ('{"do": "look", "target": "cup"}', LookAt(target="cup")),
         ('{"do": "steer", "to": "stop", "by": "ann"}', SteerOrder(to="stop", by="ann")),
         ('{"do": "faults", "faults": [{"kind": "slow"}]}', SwitchOrder(faults=(BodyFault(kind="slow"),))),
+        ('{"do": "condition", "name": "b", "speech_only": true}', Condition(name="b", speech_only=True)),
     ],
 )
 def test_an_order_is_read(text: str, order: AnyOrder) -> None:
@@ -69,14 +71,14 @@ def test_no_bytes_break_the_reading(text: bytes) -> None:
 def test_what_a_role_may_not_is_denied_with_the_roles_that_may(role: str) -> None:
     reasons = denied(role, trusted=True)
 
-    assert {"seat", "speak", "steer", "faults"} - reasons.keys() == set(RIGHTS.get(role, ()))
+    assert {"seat", "speak", "steer", "faults", "condition"} - reasons.keys() == set(RIGHTS.get(role, ()))
     for right, reason in reasons.items():
         assert role in reason
         assert all(name in reason for name, rights in RIGHTS.items() if right in rights)
 
 
 def test_an_address_without_the_token_lets_nobody_take_part() -> None:
-    assert set(denied("wizard", trusted=False)) == {"seat", "speak", "steer", "faults"}
+    assert set(denied("wizard", trusted=False)) == {"seat", "speak", "steer", "faults", "condition"}
     assert "token" in missing(Tell(text="x"), "wizard", trusted=False)
     assert missing(Tell(text="x"), "wizard", trusted=True) == ""
     assert "operator or wizard" in missing(SteerOrder(to="stop"), "observer", trusted=True)
@@ -86,6 +88,8 @@ def test_the_log_has_what_was_ordered_but_not_the_words() -> None:
     assert written(Tell(text="a secret", target="cup", asks=True)) == "asks 8 letters about cup"
     assert written(SwitchOrder(faults=(BodyFault(kind="slow"),))) == "faults: slow"
     assert written(SteerOrder(to="hold")) == "hold"
+    assert written(Condition(name="b", speech_only=True)) == "condition: b, speech only"
+    assert written(Condition()) == "condition: none"
 
 
 def test_words_and_a_reference_are_a_turn_that_engage_can_read() -> None:

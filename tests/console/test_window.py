@@ -156,6 +156,26 @@ async def test_a_fault_is_switched_on_and_off_and_everybody_sees_it(place: Place
 
 
 @needs_browser
+async def test_a_condition_of_a_study_is_begun_and_everybody_sees_it(place: Place) -> None:
+    told = "document.querySelector('.switched').textContent"
+    async with opened(place) as page, opened(place) as other:
+        await page.until("document.querySelector('#wizard-condition').checkVisibility()")
+        await page.value("document.querySelector('#wizard-by').value = 'Anna'")
+        await page.value("document.querySelector('#wizard-condition').value = 'words alone'")
+        await page.value("document.querySelector('#wizard-alone').click()")
+        await press(page, "Begin it", ".study")
+        for each in (page, other):
+            await each.until(f"{told} === 'Condition of the study: words alone, speech only, set by Anna.'")
+        await page.until("document.querySelector('.head .owner').textContent.includes('speech only')")
+
+        await page.value("document.querySelector('#wizard-condition').value = ''")
+        await page.value("document.querySelector('#wizard-alone').click()")
+        await press(page, "Begin it", ".study")
+        await other.until(f"{told} === 'Condition of the study: none, set by Anna.'")
+        assert "wizard: Anna: condition: words alone, speech only" in place.log.read_text()
+
+
+@needs_browser
 async def test_two_visitors_in_two_windows_are_two_people(place: Place) -> None:
     async with opened(place) as one, opened(place) as other:
         await sit(one, "bob")

@@ -1,9 +1,10 @@
 """Whole runs in memory and virtual time, with a recorder on the bus."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 from engage_hri.schemas import keys
 from engage_hri.services.bus.interface import Received
@@ -13,7 +14,7 @@ from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.tangram import ending
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.recording.service import Recorder, opened, record
-from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.service import Service, running
 from tests.recording.files import WALL
 
 
@@ -33,13 +34,16 @@ async def recording_to(path: Path, hub: MemoryHub, **facts: str) -> AsyncIterato
         await bus.leave()
 
 
-async def tangram(path: Path, config: Config, *sinks: Sink) -> list[Received]:
-    """The whole task, recorded. Returns what a subscription got of it."""
+async def tangram(
+    path: Path, config: Config, *sinks: Sink, more: Mapping[str, Service] = MappingProxyType({})
+) -> list[Received]:
+    """The whole task, recorded. more: further participants. Returns what a subscription got of it."""
     finished = asyncio.Event()
     live: list[Received] = []
     async with MemoryHub(config.robot) as hub:
         services = {name: roster.service(name, config) for name in roster.NAMES}
         services["collaboration"] = ending(services["collaboration"], finished)
+        services |= more
         inbox = hub.join("viewer").subscribe(keys.EVERYTHING, capacity=10**6)
         async with recording_to(path, hub), following(hub.join("console"), sinks), running(hub, services):
             await finished.wait()

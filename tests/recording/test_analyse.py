@@ -11,7 +11,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.analyse import compare, found, numbered
-from engage_hri.services.commandline.analysing import Session, session
+from engage_hri.services.commandline.analysing import Session, sessions
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.recording.disk import read
 from engage_hri.services.simulation.config import SimulationConfig
@@ -32,13 +32,13 @@ async def test_the_numbers_of_a_recording_are_those_of_the_live_run(tmp_path: Pa
 
     await tangram(tmp_path / "a.mcap", config, live, watch)
 
-    again = session(read(tmp_path / "a.mcap"), 0, "operational")
+    (again,) = sessions(read(tmp_path / "a.mcap"))
 
-    expected = live.session(session=0, condition="operational", seed=0)
+    expected = live.session(session=0, condition="recorded", seed=0)
     assert again.record.statistics == last[-1].session == expected.statistics
     assert again.published == last[-1].session
     assert again.record.statistics.events > 50
-    assert again.events == live.events(session=0, condition="operational")
+    assert again.events == live.events(session=0, condition="recorded")
     assert again.record.completion_time == pytest.approx(expected.completion_time, abs=1e-6)
     assert again.record.adjacency_pairs_every == pytest.approx(expected.adjacency_pairs_every, abs=1e-6)
     assert again.record.eye_contact is not None

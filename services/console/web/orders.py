@@ -1,7 +1,7 @@
 """Orders: what a page sends when somebody takes part, and which right each needs. Pure.
 
 `seat`: to be a person. `speak`: to drive the robot by hand. `steer`: to hold and stop it. `faults`: to switch faults
-of a simulated body.
+of a simulated body. `condition`: to set the condition of a study.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -10,14 +10,15 @@ import msgspec
 from msgspec import Meta, Struct
 
 from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.conditions import words
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.perception import LONGEST_TEXT
 from engage_hri.schemas.units import Coordinate
 
-Right = Literal["seat", "speak", "steer", "faults"]
-ALL_RIGHTS: tuple[Right, ...] = ("seat", "speak", "steer", "faults")
+Right = Literal["seat", "speak", "steer", "faults", "condition"]
+ALL_RIGHTS: tuple[Right, ...] = ("seat", "speak", "steer", "faults", "condition")
 RIGHTS: dict[str, tuple[Right, ...]] = {
-    "operator": ("steer", "faults"),
+    "operator": ("steer", "faults", "condition"),
     "wizard": ALL_RIGHTS,
 }
 """Rights by role; no other role has any."""
@@ -130,9 +131,11 @@ class InhibitGaze(WizardOrder, frozen=True, kw_only=True, tag="inhibit"):
 
 
 class Condition(WizardOrder, frozen=True, kw_only=True, tag="condition"):
-    """Note which condition of a study begins, in the log of this window."""
+    """Begin a condition of a study. speech_only: the robot says the task's words and does nothing else."""
 
-    name: Name
+    needs: ClassVar[Right] = "condition"
+    name: Name = ""
+    speech_only: bool = False
 
 
 class SteerOrder(Order, frozen=True, kw_only=True, tag="steer"):
@@ -218,8 +221,8 @@ def written(order: Order) -> str:
             return f"backchannel: {how}"
         case InhibitGaze(on=on, mode=mode, target=target):
             return f"inhibits the gaze: {mode} {target}".rstrip() if on else "lets the gaze go"
-        case Condition(name=name):
-            return f"condition: {name}"
+        case Condition(name=name, speech_only=speech_only):
+            return f"condition: {words(name, speech_only)}"
         case SteerOrder(to=to):
             return to
         case SwitchOrder(faults=faults):

@@ -15,6 +15,7 @@ from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.body import Capabilities, RobotState, WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults, words
+from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome
@@ -129,7 +130,7 @@ class Picture:
             case PeerAlive() | PeerGone() | Status():
                 self._health.feed(message)
                 self._changed("health")
-            case Held() | BodyFaults():
+            case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
         self._note(message, at)
 
@@ -273,7 +274,12 @@ class Picture:
     def _switched(self) -> Switched:
         held = tuple(wording.held(each.hold) for each in self._scene.held)
         kinds = dict.fromkeys(each.kind for each in self._scene.faults)
-        return Switched(held, tuple(map(words, self._scene.faults)), tuple(kinds))
+        told = self._scene.condition
+        is_set = told is not None and (told.by or told.speech_only)
+        return Switched(
+            held, tuple(map(words, self._scene.faults)), tuple(kinds),
+            condition=wording.condition(told) if told is not None and is_set else "",
+        )  # fmt: skip
 
     def _changed(self, *names: str) -> None:
         for name in names:

@@ -255,8 +255,9 @@ class Note(Struct, frozen=True):
 
 
 class Switched(Struct, frozen=True):
-    """Holds, and faults of the body that are on, in words. kinds: of these faults."""
+    """Holds, faults of the body that are on, and the condition of a study, in words. kinds: of these faults."""
 
     held: tuple[str, ...]
     faults: tuple[str, ...]
     kinds: tuple[str, ...]
+    condition: str = ""

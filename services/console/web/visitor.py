@@ -173,6 +173,9 @@ class Visitor:
                 self._begin(_done(robot.stop(timeout=PATIENCE)))
             case orders.SwitchOrder(faults=faults):
                 self._begin(_done(robot.switch_faults(faults, timeout=PATIENCE)))
+            case orders.Condition(name=name, speech_only=speech_only, by=who):
+                named = name.strip()
+                self._begin(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))
 
     async def _perform(self, thing: Any) -> None:
         if isinstance(thing, Block):

@@ -34,7 +34,8 @@ class Leases:
     """The leases in force, newest last."""
 
     def __init__(self, config: GenerationConfig) -> None:
-        self._config = config
+        self.speech_only = config.speech_only
+        """True if the study's condition leaves the robot words alone, and its head to the upper right."""
         self._leases: dict[str, Inhibit] = {}
 
     def take(self, request: Inhibit) -> None:
@@ -53,7 +54,7 @@ class Leases:
     @property
     def inhibition(self) -> Inhibition | None:
         """The inhibition by the newest lease on gaze; None: there is none. The study's condition goes before."""
-        if self._config.speech_only:
+        if self.speech_only:
             return SPEECH_ONLY
         for request in reversed(self._leases.values()):
             if request.part == "gaze":
@@ -73,5 +74,5 @@ class Leases:
         return Permits(
             gaze="gaze" not in inhibited,
             hands=tuple(hand for hand in HANDS if hand not in {_HAND_OF.get(part) for part in inhibited}),
-            speech_only=self._config.speech_only,
+            speech_only=self.speech_only,
         )

@@ -141,8 +141,9 @@ export function switched(place) {
   return {
     take(state, changed) {
       if (!changed.has("switched")) return;
-      const { held, faults } = state.switched;
+      const { held, faults, condition } = state.switched;
       const told = [
+        condition ? `${condition[0].toUpperCase()}${condition.slice(1)}.` : "",
         held.length ? `Held: ${held.join(", ")}.` : "",
         faults.length ? `Faults of the body that are on: ${faults.join(", ")}.` : "",
       ].filter(Boolean).join(" ");

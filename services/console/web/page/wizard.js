@@ -39,14 +39,17 @@ export function wizard(panel, order) {
   const script = element("ol", { class: "script" });
   const faults = element("div", { class: "row faults", role: "group", "aria-label": "Faults of the body" });
   const condition = input("condition", "Condition of a study", { maxlength: "40" });
-  const note = element("form", { class: "row" }, ...condition.parts, element("button", { type: "submit" }, "Note it"));
-  note.addEventListener("submit", (event) => {
+  const alone = element("input", { type: "checkbox", id: "wizard-alone" });
+  const study = element("form", { class: "row study" }, ...condition.parts, alone,
+    element("label", { for: alone.id }, "speech only"), element("button", { type: "submit" }, "Begin it"));
+  study.addEventListener("submit", (event) => {
     event.preventDefault();
-    if (condition.field.value.trim()) send({ do: "condition", name: condition.field.value.trim() });
+    send({ do: "condition", name: condition.field.value.trim(), speech_only: alone.checked });
   });
-  const speaks = element("div", {}, element("div", { class: "row" }, ...by.parts), form, signs, script, note);
+  const named = element("div", { class: "row" }, ...by.parts);
+  const speaks = element("div", {}, form, signs, script);
   const refused = element("p", { class: "why" });
-  place.replaceChildren(refused, speaks, steer, faults);
+  place.replaceChildren(refused, named, speaks, steer, study, faults);
   document.addEventListener("keydown", (event) => {
     const busy = event.target.closest?.("input, select, textarea, button, [tabindex]") || event.ctrlKey || event.metaKey || event.altKey;
     const number = Number(event.key) - 1;
@@ -61,6 +64,8 @@ export function wizard(panel, order) {
         refused.textContent = denied.steer ? `Only watched here: ${denied.steer}.` : "";
         speaks.hidden = Boolean(denied.speak);
         steer.hidden = Boolean(denied.steer);
+        study.hidden = Boolean(denied.condition);
+        named.hidden = speaks.hidden && steer.hidden && study.hidden;
         faults.hidden = Boolean(denied.faults) || !kinds.length;
         inhibit.setAttribute("aria-pressed", String(Boolean(inhibits)));
         inhibit.textContent = inhibits ? "Let go" : "Keep";

@@ -1,0 +1,53 @@
+"""Conditions of a study, set while the robot runs: one person may meet several. Thesis, chapter 5."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Stamp
+
+LONGEST_NAME = 80
+"""Characters of a condition's name, and of the name of who set it."""
+Named = Annotated[str, Meta(max_length=LONGEST_NAME)]
+
+
+class SetCondition(Request, frozen=True, kw_only=True, tag="set_condition", omit_defaults=True):
+    """cmd: operator or wizard -> generation: this condition begins now. Ends in `ConditionSet`.
+
+    name: any name, by which `engage analyse` tells the conditions apart; empty: what comes belongs to none.
+    speech_only: the robot says the words of the task and does nothing else, its head to the upper right, as in the
+        condition `degraded-generation`. What is under way of looks and points is broken off, as by an inhibition.
+    by: who sets it, for the record; empty: the requester.
+    """
+
+    name: Named = ""
+    speech_only: bool = False
+    by: Named = ""
+
+
+class ConditionSet(Outcome, frozen=True, kw_only=True, tag="condition_set", omit_defaults=True):
+    """evt: terminal state of `SetCondition`: this is in force."""
+
+    name: str = ""
+    speech_only: bool = False
+
+
+class StudyCondition(Struct, frozen=True, kw_only=True, tag="study_condition", omit_defaults=True):
+    """state: generation. The condition in force.
+
+    Published at the start, with what the configuration says of `speech_only`, and whenever one is set; a late
+    subscriber gets the last one.
+
+    at: when it began. name: empty: none has been set. by: who set it; empty: the configuration.
+    """
+
+    at: Stamp
+    name: str = ""
+    speech_only: bool = False
+    by: str = ""
+
+
+def words(name: str, speech_only: bool) -> str:
+    """A condition in words, for people."""
+    return f"{name or 'none'}{', speech only' if speech_only else ''}"
