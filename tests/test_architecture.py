@@ -33,6 +33,8 @@ PURE_MACHINERY = {
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
     "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
+    "services/runtime/action_reports.py", "services/runtime/reporters.py", "services/runtime/reports.py",
+    "services/runtime/world_report.py",
     "services/client/chunking.py",
     "services/client/event_stream.py", "services/client/person_actions.py", "services/client/shared_world.py",
     "services/client/utterances.py",

@@ -1,4 +1,7 @@
-"""Listening to a running system: each message is passed on with the local instant that it tells of."""
+"""Listening to a running system: each message is passed on with the local instant that it tells of.
+
+Actions are passed on as all their reporters together tell them (`heard.py`).
+"""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Collection, Iterable
@@ -15,6 +18,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.event_stream import EventStream
+from engage_hri.services.console.heard import Heard
 
 Sink = Callable[[Message, Seconds], None]
 FOLLOWED = (
@@ -60,23 +64,36 @@ async def following(
         for sink in sinks:
             sink(message, at)
 
+    heard = Heard(
+        bus.robot, bus.clock, lambda stamp, came: bus.local(stamp), lambda message, came: instant(bus, message, came)
+    )
+
     def take(received: Received) -> None:
         message, at = received.message, instant(bus, received.message, received.at)
         for event in events.feed(message, at, bus.now(), past=received.past):
             tell(event, instant(bus, event, at))
         is_now = past or not received.past or isinstance(message, Held | BodyHeld | BodyFaults | StudyCondition)
-        if is_now and not isinstance(message, ConnectionEvent | OpenEvents):
-            tell(message, at)
+        for each, when in heard.take(received, bus.now()):
+            if is_now and not isinstance(each, ConnectionEvent | OpenEvents):
+                tell(each, when)
+
+    def advance() -> None:
+        for event in events.expire(bus.now()):
+            tell(event, bus.now())
+        for each, when in heard.advance(bus.now()):
+            tell(each, when)
+
+    def deadline() -> Seconds | None:
+        return min((due for due in (events.deadline, heard.deadline) if due is not None), default=None)
 
     with bus.subscribe(*patterns) as inbox:
 
         async def listen() -> None:
             while not inbox.is_over:
-                if (received := await inbox.next(events.deadline)) is not None:
+                if (received := await inbox.next(deadline())) is not None:
                     take(received)
                 else:
-                    for event in events.expire(bus.now()):
-                        tell(event, bus.now())
+                    advance()
 
         # A group, so that a failing sink ends the body, which might wait for ever.
         async with asyncio.TaskGroup() as group:

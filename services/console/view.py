@@ -26,6 +26,8 @@ UTTERANCES_KEPT = 40
 EVENTS_KEPT = 100
 NOTES_KEPT = 3
 ENDED_BLOCKS_KEPT = 2
+LOST_KEPT = 3
+"""Number of people that are shown as gone: those who left last."""
 SAME_SPEECH: Seconds = 1.0
 """Greatest distance of the beginnings of a speech and of its words."""
 OWN_BLOCKS = ("maintenance-", "response-")
@@ -192,11 +194,18 @@ def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLo
         case ActorFound():
             actor = Actor(id=actor.id)
         case ActorLost():
-            actor = Actor(id=actor.id, present=False)
+            return replace(scene, actors=_without(scene.actors, actor.id))
     scene = replace(scene, actors=scene.actors.put(actor.id, actor))
     if isinstance(message, ActionBegan | ActionEnded) and message.action == "speak":
         return _voice(scene, message, at)
     return scene
+
+
+def _without(actors: Shelf[str, Actor], lost: str) -> Shelf[str, Actor]:
+    """The actors with this one gone, at the end, and without those that have been gone for longest."""
+    gone = [actor for actor in actors if not actor.present and actor.id != lost][1 - LOST_KEPT :]
+    here = [actor for actor in actors if actor.present and actor.id != lost]
+    return Shelf((each.id, each) for each in (*here, *gone, Actor(id=lost, present=False)))
 
 
 def _voice(scene: Scene, message: ActionBegan | ActionEnded, at: Seconds) -> Scene:

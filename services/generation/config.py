@@ -7,6 +7,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.ranges import inner_shares, not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Radians, Seconds
+from engage_hri.services.runtime.action_reports import REPORT_GRACE
 
 Channel = Literal["sum", "independent"]
 Profile = Literal["check-back", "figure-3.3"]
@@ -116,6 +117,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Seconds that a hand is still before the head leaves it. Ours."""
     face_lost: Seconds = 2.0
     """Seconds after which a lost face is no longer tracked; the head holds its direction. Ours."""
+    report_grace: Seconds = REPORT_GRACE
+    """Seconds for which what a participant said of people holds after it has gone from the bus, as in recognition."""
     retry: Seconds = 1.0
     """Pause before a gaze shift that failed is tried again. Ours."""
 
@@ -165,5 +168,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
-    "mtbce_events", "body_patience", "words_between", "words_patience",
+    "mtbce_events", "body_patience", "words_between", "words_patience", "report_grace",
 )  # fmt: skip

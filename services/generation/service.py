@@ -1,6 +1,7 @@
 """The generation service: takes fragments and what is perceived; sends blocks, outcomes and the owner of the head."""
 
 import asyncio
+from collections.abc import Iterable
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -16,7 +17,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
 from engage_hri.schemas.requests import Cancel, Request, Unreadable
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.generation.config import GenerationConfig
@@ -26,13 +27,16 @@ from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.requests.serving import GONE, LAPSED
+from engage_hri.services.runtime.action_reports import ActionReports
 from engage_hri.services.runtime.publisher import Publisher
+from engage_hri.services.runtime.reports import GoesOn, Told
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.world_report import WorldReport
 
 NAME = "generation"
 PATTERNS = (
     *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD,
-    keys.ANY_ACTION, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
+    keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
 )  # fmt: skip
 
 
@@ -70,7 +74,9 @@ class _Generation:
             bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after
         )
         self._objects = objects
+        self._reports = ActionReports(bus.robot, config.report_grace, bus.clock, self._instant)
         self._perception = Publisher()
+        self._seen = WorldReport(config.report_grace)
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that wait for a report of the world, or for a person, and until when; by request id."""
         self._changed = asyncio.Event()
@@ -89,6 +95,10 @@ class _Generation:
         message = received.message
         if self._perception.feed(message):
             self._admit_early(now)
+        key, source, life = received.key, received.source, received.life
+        self._observe(self._reports.take(message, key, source, life, now, past=received.past))
+        if (seen := self._seen.take(message, source, life, now)) is not None and seen is not message:
+            self._arbiter.feed((self._objects.at(now) if seen.entities else None) or seen, now)
         if (request := self._desk.take(received)) is not None:
             with self._desk.serving(request):
                 self._serve(request, now)
@@ -106,11 +116,7 @@ class _Generation:
             case Utterance():
                 if message.actor != self._bus.robot:
                     self._runner.feed(message, now)
-            case ActionBegan() | ActionEnded():
-                self._runner.feed(message, now)
-                if message.actor != self._bus.robot:
-                    self._arbiter.feed(message, now)
-            case RobotState() | Statistics() | ActorFound() | ActorLost():
+            case RobotState() | Statistics():
                 self._arbiter.feed(message, now)
             case SyncPointProgress():
                 self._runner.feed(message, now)
@@ -127,6 +133,23 @@ class _Generation:
             case PeerAlive(participant="recognition", run=run):
                 self._runner.recognition_there(session_of(run))
         self._after(now)
+
+    def _observe(self, told: Iterable[Told]) -> None:
+        """Take what somebody does, or did while nobody told of it."""
+        now = self._bus.now()
+        for observation, _, _ in told:
+            match observation:
+                case ActionBegan() | ActionEnded():
+                    self._runner.feed(observation, now)
+                    if observation.actor != self._bus.robot:
+                        self._arbiter.feed(observation, now)
+                case ActorFound() | ActorLost():
+                    self._arbiter.feed(observation, now)
+                case GoesOn(began=began) if began.actor != self._bus.robot:
+                    self._arbiter.feed(began, now)  # its beginning is no news: it answers nothing
+
+    def _instant(self, stamp: Stamp) -> Seconds:
+        return min(self._bus.local(stamp), self._bus.now())
 
     def _serve(self, request: Request, now: Seconds) -> None:
         match request:
@@ -227,12 +250,15 @@ class _Generation:
                     self._after(self._bus.now())
 
     def _deadline(self) -> Seconds | None:
-        due = [self._runner.deadline, self._arbiter.deadline]
+        due = [self._runner.deadline, self._arbiter.deadline, self._reports.deadline, self._seen.deadline]
         due += [until for _, until in self._early.values()]
         return min((each for each in due if each is not None), default=None)
 
     def _after(self, now: Seconds) -> None:
         """Settle what has become due by now; called after every message and at every deadline."""
+        self._observe(self._reports.advance(now))
+        if (seen := self._seen.advance(now)) is not None:
+            self._arbiter.feed(seen, now)
         for id, (request, until) in list(self._early.items()):
             if now >= until:
                 del self._early[id]

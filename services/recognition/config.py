@@ -7,6 +7,7 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.ranges import not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
+from engage_hri.services.runtime.action_reports import REPORT_GRACE
 
 GazeResolution = Literal["object", "table"]
 
@@ -96,7 +97,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Settings for raw perception."""
     lost_face_grace: Seconds = 0.5
     """Time for which a face may be lost before the person has gone."""
-    report_grace: Seconds = 4.0
+    report_grace: Seconds = REPORT_GRACE
     """Time for which what a participant said of people, or of the robot, holds after it has gone from the bus: a
     link that was cut looks like a death. After that it has ended when the participant went. As long as a requester
     waits for its server."""

@@ -15,32 +15,28 @@ from typing import Protocol, TypeGuard
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.ledger import TAKEN, Content
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
-from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.machine import Forgotten, Mishap
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
-from engage_hri.services.recognition.events.scene import GoesOn, Worded
+from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
-from engage_hri.services.recognition.perceive.reporters import OLDEST, Reporters
-from engage_hri.services.recognition.perceive.reports import Told
 from engage_hri.services.recognition.perceive.words import HeardWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent
+from engage_hri.services.runtime.action_reports import ActionReports, Read
+from engage_hri.services.runtime.reporters import OLDEST
+from engage_hri.services.runtime.reports import GoesOn, Told
 
-STRANGERS_KEPT = 256
-"""Number of programs of others whose name as a reporter is remembered."""
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
 
@@ -114,9 +110,7 @@ class Intake:
         self._clock = clock
         self._now: Seconds = -inf
         self._bad_ids: set[str] = set()
-        self._reporters = Reporters(robot, config.report_grace, clock.name, self._instant)
-        self._strangers: Latest[str, str] = Latest(STRANGERS_KEPT)
-        """Names of reporters whose messages name no participant, by their life."""
+        self._reports = ActionReports(robot, config.report_grace, clock.name, self._instant)
         self._clock_errors = ClockErrors(robot)
         self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
         self._open_events = OpenEventTracker(robot, session)
@@ -125,7 +119,7 @@ class Intake:
 
     @property
     def deadline(self) -> Seconds | None:
-        times = (self._recognizer.deadline, self._statistics.deadline, self._reporters.deadline)
+        times = (self._recognizer.deadline, self._statistics.deadline, self._reports.deadline)
         return min((at for at in times if at is not None), default=None)
 
     def begin(self, now: Seconds) -> list[Output]:
@@ -135,7 +129,7 @@ class Intake:
     def advance(self, now: Seconds) -> list[Output]:
         """Take all steps that are due by now."""
         self._now = now
-        self._tell(self._reporters.advance(now))
+        self._tell(self._reports.advance(now))
         self._note(self._recognizer.advance(now))
         return self._take()
 
@@ -146,15 +140,10 @@ class Intake:
         if isinstance(message, Cancel):
             self._feed(message, now)
         elif self._is_credible(input):
-            self._tell(self._reporters.advance(now))
-            if isinstance(message, OngoingActions | ActionEvent):
-                name, life = self._reporter(input)
-                self._tell(self._reporters.hear(message, name, life, now, past=input.past))
-            elif isinstance(message, PeerAlive | PeerGone):
-                self._tell(self._reporters.feed(message, now))
-            elif isinstance(message, Utterance):
+            self._tell(self._reports.take(message, input.key, input.source, input.life, now, past=input.past))
+            if isinstance(message, Utterance):
                 self._hear(message)
-            else:
+            elif not isinstance(message, Read):
                 self._feed(message, self._when(message, input.at))
         return self._take()
 
@@ -172,18 +161,6 @@ class Intake:
         )  # fmt: skip
         self._feed(words, at)
 
-    def _reporter(self, input: Input) -> tuple[str, str]:
-        """Name and life of who tells of actions. The robot's are told by its body, whoever speaks for it."""
-        is_perceived = input.key == keys.PERCEIVED_ACTION
-        name = input.source if is_perceived else keys.reporter_of(input.key) or "control"
-        if input.source:
-            return name, input.life if name == input.source else ""
-        if is_perceived:
-            return self._strangers.get(input.life, ""), ""
-        if input.life and name != "control":
-            self._strangers[input.life] = name
-        return name, ""
-
     def _tell(self, told: Iterable[Told]) -> None:
         """Feed what reporters say, or what follows from it."""
         for observation, at, is_sure in told:
@@ -198,31 +175,17 @@ class Intake:
     def _is_credible(self, input: Input) -> bool:
         """True if the message came from its proper sender: the robot's body for the robot, perception for people."""
         match input.message:
-            case ActionBegan(actor=actor) | ActionEnded(actor=actor):
-                by_robot = actor == self._robot
-                return self._has_valid_id(actor) and by_robot == (input.key == keys.ROBOT_ACTION)
-            case ActorFound(actor=actor) | ActorLost(actor=actor) | Utterance(actor=actor):
+            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() as event:
+                return self._has_valid_id(event.actor)
+            case Utterance(actor=actor):
                 return self._has_valid_id(actor) and actor != self._robot
             case HeadPose(actor=actor):
                 return actor != self._robot and input.key == keys.head_pose(actor)
             case VoiceActivity(actor=actor):
                 return actor != self._robot and input.key == keys.voice_activity(actor)
-            case OngoingActions(actor=actor):
-                return all(action.actor == actor for action in input.message.actions) and self._may_tell(input)
             case World(people=people):
                 return all(self._has_valid_id(person.id) for person in people)
         return True
-
-    def _may_tell(self, input: Input) -> bool:
-        """True if a state of ongoing actions is not too long, and on the key of its actor and its reporter."""
-        assert isinstance(input.message, OngoingActions)
-        if len(input.message.actions) > MOST:
-            return False
-        actor, reporter = input.message.actor, keys.reporter_of(input.key)
-        if not reporter:
-            return actor == self._robot
-        is_own = input.source in ("", reporter)
-        return is_own and actor != self._robot and input.key == keys.perceived_ongoing(reporter, actor)
 
     def _has_valid_id(self, actor: str) -> bool:
         """True if the id can be in a key; without that there are no events. A bad id is reported once."""
@@ -280,7 +243,7 @@ class Intake:
                     out.append(Answer(self._clock_errors.marked_as(result, changes)))
                 case Forgotten(actor=actor):
                     changes.append(result)
-                    self._reporters.forget(actor)
+                    self._reports.forget(actor)
                 case Mishap(actor=actor, error=error):
                     out.append(Mistake(error, f"what {actor or 'somebody'} does", request))
         events = [change for change in changes if isinstance(change, ConnectionEvent)]

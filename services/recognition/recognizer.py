@@ -19,10 +19,11 @@ from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import InterruptedLooks, Symbolic
 from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mishap
-from engage_hri.services.recognition.events.scene import Covered, GoesOn
+from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
 from engage_hri.services.recognition.perceive.words import HeardWords, Words
+from engage_hri.services.runtime.reports import GoesOn
 
 Perceived = Observation | HeadPose | VoiceActivity | RobotState | HeardWords
 Result = Effect | Symbolic

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActorFound, OngoingActions
+from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.body import BodyPose, Capabilities, JointAngle, Ray, RobotState
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
@@ -20,6 +20,7 @@ from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.schemas.status import BusHealth, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.console import view
 from engage_hri.services.console.web.lanes import KEPT
 from engage_hri.services.console.web.picture import BLOCK, NET, Picture
 from tests.console.scenes import SCENE, Timed, at, event
@@ -103,24 +104,22 @@ def test_the_body_is_drawn_from_its_rays_and_its_own_cone() -> None:
     assert (shown["looks_at"], shown["points"], shown["joints"]) == ("blue", ["blue"], {"jaw": 0.5})
 
 
-def test_who_is_there_already_is_known_to_a_window_that_comes_late() -> None:
-    look = ActionBegan(actor="ann", action="look", targets=("robot",), at=at(3.0))
-    late = OngoingActions(actor="ann", at=at(3.0), actions=(look,), seen=True)
-    away = ActionBegan(actor="ann", action="look", at=at(11.0))
+def test_who_left_is_not_shown_any_more_unless_the_world_still_has_them() -> None:
+    visits = [
+        (kind(actor=f"visitor-{number}", at=at(number)), float(number))
+        for number in range(50)
+        for kind in (ActorFound, ActorLost)
+    ]
+    ann = Entity(id="visitor-49", kind="person", position=(1.3, 0.0, 1.2))
+    made = picture(*visits)
 
-    made = picture((late, 3.0))
-    assert section(made, "scene")["people"][0]["looks"] == ["robot"]
+    assert section(made, "scene")["people"] == []
+    assert len(made._scene.actors) == view.LOST_KEPT
 
-    made.feed(away, 11.0, 11.0)
-    made.feed(late, 3.0, 12.0)  # what the state says of an actor that events tell of is older than they are
-    assert section(made, "scene")["people"][0]["looks"] == []
+    made.feed(World(entities=(ann,)), 50.0, 50.0)
+    assert [(each["id"], each["present"]) for each in section(made, "scene")["people"]] == [("visitor-49", False)]
 
-
-def test_who_left_is_told_as_gone() -> None:
-    made = picture((OngoingActions(actor="ann", at=at(3.0), seen=False), 3.0))
-    assert section(made, "scene")["people"][0]["present"] is False
-
-    made.feed(ActorFound(actor="ann", at=at(4.0)), 4.0, 4.0)
+    made.feed(ActorFound(actor="visitor-49", at=at(51.0)), 51.0, 51.0)
     assert section(made, "scene")["people"][0]["present"] is True
 
 

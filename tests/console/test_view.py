@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.holds import Held, Hold
@@ -299,11 +299,11 @@ def test_a_sync_point_costs_the_view_no_look_at_all_other_points_of_its_block() 
     assert work(1000) == work(10)
 
 
-def test_an_action_costs_the_view_no_look_at_all_who_were_ever_here() -> None:
+def test_an_action_costs_the_view_no_look_at_all_who_are_here() -> None:
     def work(people: int) -> int:
         scene = view.empty("robot", 0.0)
         for number in range(people):
-            scene = view.feed(scene, ActorLost(actor=f"p{number}", at=at(0.0)), 0.0)
+            scene = view.feed(scene, ActorFound(actor=f"p{number}", at=at(0.0)), 0.0)
         count, scene = instructions(view.feed, scene, ActionBegan(actor="p7", action="nod", at=at(1.0)))
         assert [doing.action for doing in scene.actor("p7").doing] == ["nod"]
         assert len(scene.actors) == people

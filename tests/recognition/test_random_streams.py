@@ -15,9 +15,9 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcom
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import DECISIONS
-from engage_hri.services.recognition.events.scene import GoesOn
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.statistics.tally import KINDS
+from engage_hri.services.runtime.reports import GoesOn
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 
 Stream = list[tuple[float, Observation]]

@@ -11,7 +11,6 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.body import Capabilities, RobotState, WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults, words
@@ -28,7 +27,7 @@ from engage_hri.schemas.status import Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.console import nets, view, wording
-from engage_hri.services.console.web import net_layout, people, scene
+from engage_hri.services.console.web import net_layout, scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
 from engage_hri.services.console.web.measures import Measures
@@ -136,10 +135,7 @@ class Picture:
 
     def _see(self, message: Message, at: Seconds) -> None:
         before = self._scene
-        if isinstance(message, OngoingActions):
-            self._scene = people.caught_up(before, message, at)
-        else:
-            self._scene = view.feed(before, message, at)
+        self._scene = view.feed(before, message, at)
         if isinstance(message, WordSpoken) or self._scene.said != before.said:
             self._changed("words")
         if self._scene.actors != before.actors:

@@ -2,8 +2,11 @@
 
 from math import floor
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Sample
+from engage_hri.services.console.heard import Heard
 from engage_hri.services.console.web.frames import Place
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.recording.player import Player, Timeline
@@ -22,7 +25,12 @@ class PlayedPicture:
         self._times = Times(recording)
         self._player = Player(recording, now)
         self.visit = 0
-        self.picture = Picture(recording.robot, 0.0)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin a new picture, of which nothing is known yet."""
+        self.picture = Picture(self._recording.robot, 0.0)
+        self._heard = Heard(self._recording.robot, self._recording.clock, self._times.at, self._times.told)
 
     def place(self, now: Seconds) -> Place:
         """Place where it is now."""
@@ -33,19 +41,19 @@ class PlayedPicture:
         """Take what is due."""
         at = self._player.at(now)
         self._feed(self._player.advance(now))
-        self.picture.advance(at)
+        self._let_pass(at)
 
     def seek(self, at: Seconds, now: Seconds) -> None:
         """Go to a time: as if one had looked on for a while before it."""
         self.visit += 1
-        self.picture = Picture(self._recording.robot, 0.0)
+        self._begin()
         self._player.seek(at, now)
         timeline: Timeline = self._player.timeline
         there = self._player.at(now)
         first, last = timeline.before(there - BEFORE), timeline.before(there)
         self._feed(timeline.standing(first))
         self._feed([self._recording.sample(number) for number in range(first, last) if self._recording.key(number)])
-        self.picture.advance(there)
+        self._let_pass(there)
 
     def pause(self, now: Seconds) -> None:
         """Stand still."""
@@ -62,4 +70,10 @@ class PlayedPicture:
             if (one := received(sample)) is None:
                 continue
             came = max(0.0, one.at - self._recording.began)
-            self.picture.feed(one.message, self._times.told(one.message, came), came)
+            for message, at in self._heard.take(replace(one, at=came), came):
+                self.picture.feed(message, at, came)
+
+    def _let_pass(self, at: Seconds) -> None:
+        for message, when in self._heard.advance(at):
+            self.picture.feed(message, when, at)
+        self.picture.advance(at)

@@ -16,7 +16,7 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
     """Everything that is seen in space. world, state, body: None: nothing was told of it yet."""
     entities = world.entities if world is not None else ()
     people = {entity.id: entity.position for entity in entities if entity.kind == "person"}
-    actors = [actor.id for actor in scene.actors if actor.id != scene.robot]
+    actors = [actor.id for actor in scene.actors if actor.id != scene.robot and actor.present]
     return SceneSection(
         robot=scene.robot,
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,

@@ -49,12 +49,20 @@ class HandWatch:
             case ActorLost(actor=actor):
                 for act in [act for act in self._acts if act[0] == actor]:
                     self._rest(act, now)
+                self._lose(actor, now)
 
     def _rest(self, act: tuple[str, tuple[str, ...]], now: Seconds) -> None:
         """End a manipulation: its hand counts as still from now, unless it goes on moving."""
         id = self._acts.pop(act, None)
         if id is not None and (hand := self._hands[id]).moving_since is None:
             hand.still_since = now
+
+    def _lose(self, owner: str, now: Seconds) -> None:
+        """Let the hands of somebody who is lost be still: of hands that nobody sees, no world says that they stop."""
+        for id, hand in self._hands.items():
+            place = self._places.get(id)
+            if place is not None and place.owner == owner and hand.moving_since is not None:
+                hand.moving_since, hand.still_since = None, now
 
     def _see(self, world: World, now: Seconds) -> None:
         fast = {

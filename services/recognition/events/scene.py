@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -28,16 +27,6 @@ class Covered(Struct, frozen=True):
     """Observation of all pieces under hands, from raw perception alone."""
 
     by: frozenset[Covering]
-
-
-class GoesOn(Struct, frozen=True):
-    """Observation: an action goes on that began long ago, or before its actor was found. Its beginning is no news.
-
-    since: local time at which it began.
-    """
-
-    began: ActionBegan
-    since: Seconds
 
 
 class Worded(Struct, frozen=True, kw_only=True):

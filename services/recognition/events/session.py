@@ -27,7 +27,8 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Person
-from engage_hri.services.recognition.events.scene import Covered, GoesOn, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
+from engage_hri.services.runtime.reports import GoesOn
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel

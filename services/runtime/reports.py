@@ -3,18 +3,28 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+from msgspec import Struct
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.recognition.events.interrupted_looks import Symbolic
-from engage_hri.services.recognition.events.scene import GoesOn
 from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent, Ongoing, which
 
 
-class Told(NamedTuple):
-    """An observation for the recognizer, and its local time. is_sure: False: that time is the latest possible."""
+class GoesOn(Struct, frozen=True):
+    """Observation: an action goes on that began long ago, or before its actor was found. Its beginning is no news.
 
-    observation: Symbolic | GoesOn
+    since: local time at which it began.
+    """
+
+    began: ActionBegan
+    since: Seconds
+
+
+class Told(NamedTuple):
+    """An observation, and its local time. is_sure: False: that time is the latest possible."""
+
+    observation: ActionEvent | GoesOn
     at: Seconds
     is_sure: bool = True
 

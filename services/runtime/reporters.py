@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.recognition.perceive.reports import Report, Told
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
+from engage_hri.services.runtime.reports import Report, Told
 
 OLDEST: Seconds = 60.0
 """Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
@@ -22,6 +22,8 @@ CATCH_UP: Seconds = 0.5
 """Time from the return of a reporter until what it said before goes on: what it has said meanwhile comes first."""
 LATER: Seconds = 1e-6
 """Distance of what is told late, and so cannot have its own time any more."""
+SILENCED_KEPT = 64
+"""Number of reporters that are remembered after all that they said has ended: each may come back as the same life."""
 FORMER = 8
 """Number of lives of a reporter that are remembered, as what they said may come late."""
 
@@ -110,7 +112,14 @@ class Reporters:
             due = self._due(one)
             if due is not None and due <= now:
                 told += self._step(one, "grace_over" if one.standing == "away" else "caught_up", now)
+        if told:
+            self._forget_silenced()
         return told
+
+    def _forget_silenced(self) -> None:
+        silenced = [name for name, one in self._reporters.items() if one.standing == "silenced"]
+        for name in sorted(silenced, key=lambda name: self._reporters[name].since)[:-SILENCED_KEPT]:
+            del self._reporters[name]
 
     # -- presence -----------------------------------------------------------------------------------------------
 
