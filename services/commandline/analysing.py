@@ -9,16 +9,18 @@ import msgspec
 from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics, session_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.console.follow import FOLLOWED
-from engage_hri.services.recognition.again import Again, Lack, events_in, settings_of
+from engage_hri.services.recognition.again import Again, Lack, events_in
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import Tally
 from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.settings import Life, settings_of
 from engage_hri.services.recording.tiers import messages
 from engage_hri.services.recording.times import Times, moved
 from engage_hri.services.study.records import EventRecord, SessionRecord
@@ -31,7 +33,7 @@ WINDOW: Seconds = 30.0
 class Session(Struct, frozen=True, kw_only=True):
     """A recording in numbers. participant: empty: not told. published: what recognition said itself in the end.
 
-    doubts: what may be wrong with these numbers, in words.
+    doubts: what may be wrong with these numbers, in words. settings: those under which its services ran.
     """
 
     path: Path
@@ -41,6 +43,7 @@ class Session(Struct, frozen=True, kw_only=True):
     events: tuple[EventRecord, ...]
     published: WindowStatistics | None
     doubts: tuple[str, ...]
+    settings: tuple[Life, ...] = ()
 
 
 def session(recording: Recording, number: int, condition: str) -> Session:
@@ -76,6 +79,7 @@ def session(recording: Recording, number: int, condition: str) -> Session:
         path=Path(recording.name), condition=condition, participant=recording.facts.get("participant", ""),
         record=record.session(session=number, condition=condition, seed=0),
         events=record.events(session=number, condition=condition), published=published, doubts=doubts,
+        settings=tuple(settings_of(recording)),
     )  # fmt: skip
 
 
@@ -159,7 +163,7 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
     found: dict[str, tuple[Again, list[ConnectionEvent]]] = {}
     live: dict[str, list[ConnectionEvent]] = {}
     sure: dict[str, int] = {}
-    numbers = _numbers(recording)
+    numbers, configs = _numbers(recording), configurations(recording)
 
     def find(life: str, number: int) -> Received | None:
         place = numbers.get((life, number & 0xFFFFFFFF))
@@ -174,8 +178,11 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
             live.setdefault(message.session, []).append(message)
         elif isinstance(message, Taken):
             if message.session not in found:
-                config = choose(settings_of(message) or RecognitionConfig())
-                found[message.session] = (Again(recording.robot, message.session, message.at.clock, config), [])
+                known = configs.get(message.session)
+                config = choose(known or RecognitionConfig())
+                lack = Lack(settings=known is None)
+                life = Again(recording.robot, message.session, message.at.clock, config, lack)
+                found[message.session] = (life, [])
             life, events = found[message.session]
             sure[message.session] = len(events)
             events += events_in(life.take(message, find))
@@ -183,6 +190,22 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
         Compared(session=name, live=tuple(live.get(name, ())), again=tuple(events), lack=life.lack, sure=sure[name])
         for name, (life, events) in found.items()
     ]
+
+
+def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
+    """Configuration of each life of recognition, by the session of its events. Raises InputRefused."""
+    found = {}
+    for life in settings_of(recording):
+        if life.told.participant != "recognition":
+            continue
+        try:
+            config = msgspec.convert(life.told.settings.get("recognition"), RecognitionConfig)
+        except msgspec.ValidationError as error:
+            reason = f"recognition of Engage {life.told.version} had settings that this one does not know: {error}"
+            fault = Fault(reason=reason, where=recording.name, advice=f"use Engage {life.told.version}")
+            raise InputRefused(fault) from error
+        found[session_of(life.told.run)] = config
+    return found
 
 
 def _numbers(recording: Recording) -> dict[tuple[str, int], int]:

@@ -27,6 +27,7 @@ from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.requests.serving import GONE, LAPSED
 from engage_hri.services.runtime.publisher import Publisher
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 
 NAME = "generation"
 PATTERNS = (
@@ -46,6 +47,7 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(generation.perform(), name="fragments")
                 tasks.create_task(generation.keep_deadlines(), name="deadlines")
+                tell_settings(bus, "generation", config, covered_for=covered_for)
                 ready()
                 async for received in inbox:
                     with bus.containing(received):
