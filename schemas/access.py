@@ -64,6 +64,7 @@ WATCHED = (
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
 _OWN_FAULT = keys.fault(OWN)
+_OWN_SETTINGS = keys.settings(OWN)
 _OWN_ONGOING = keys.perceived_ongoing(OWN, "*")
 _RARELY = "sent when something goes wrong"
 _WITHDRAWN = "sent when a request is withdrawn"
@@ -84,6 +85,7 @@ def _service(name: str, *published: str, heard: tuple[str, ...], served: tuple[s
     """Rows of one of the robot's services, without the commands that it sends itself."""
     yield Row(name, "publishes", keys.request_state(name))
     yield Row(name, "publishes", _OWN_FAULT, _RARELY)
+    yield Row(name, "publishes", _OWN_SETTINGS)
     yield from (Row(name, "publishes", each) for each in published)
     yield from (Row(name, "subscribes", each) for each in (keys.commands(name), keys.ANY_ALIVE, *heard))
     yield from (Row(name, "serves", each) for each in (keys.status(OWN), *served))
@@ -142,6 +144,7 @@ TABLE: tuple[Row, ...] = (
         for key in (keys.WORLD, keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, *_RAW)
     ),
     Row("perception", "publishes", _OWN_FAULT, _RARELY),
+    Row("perception", "publishes", _OWN_SETTINGS),
     *(
         Row("perception", "subscribes", key)
         for key in (keys.ANY_ALIVE, keys.WORLD, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION,
@@ -150,10 +153,14 @@ TABLE: tuple[Row, ...] = (
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
     *_manages("manager"),
+    Row("manager", "publishes", _OWN_SETTINGS),
     *_watches("observer"),
     *_looks("observer", keys.WORLD),
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
-    *(Row("observer", "subscribes", key, "recorded by `engage record`") for key in (keys.TAKEN, keys.ROBOT_SEEN)),
+    *(
+        Row("observer", "subscribes", key, "recorded by `engage record`")
+        for key in (keys.TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS)
+    ),
     *_watches("operator", "what an operator sees"),
     *_looks("operator", keys.WORLD),
     *_commands("operator", "robot", "faults", "condition"),

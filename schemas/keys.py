@@ -78,6 +78,7 @@ ANY_ACTION = f"{PREFIX}/evt/*/action"
 ANY_PERCEIVED_ONGOING = f"{PREFIX}/state/perception/ongoing_actions/*/*"
 ANY_OPEN_EVENTS = f"{PREFIX}/state/recognition/open_events/*"
 ANY_STATISTICS = f"{PREFIX}/state/recognition/statistics/*"
+ANY_SETTINGS = f"{PREFIX}/state/*/settings"
 ANY_ALIVE = f"{PREFIX}/alive/*"
 EVERYTHING = f"{PREFIX}/**"
 
@@ -154,6 +155,11 @@ def request_state(server: str) -> str:
 
 def fault(service: str) -> str:
     return f"{PREFIX}/evt/{service}/fault"
+
+
+def settings(participant: str) -> str:
+    """Key of the settings under which a service runs."""
+    return f"{PREFIX}/state/{participant}/settings"
 
 
 def status(participant: str) -> str:

@@ -62,12 +62,10 @@ class Taken(Struct, frozen=True, kw_only=True, tag="taken", omit_defaults=True):
     """evt: recognition -> recorders: steps, in order; only while somebody listens. They come before what they led to.
 
     session: the life of recognition, as in the ids of its events. first: number of the first step in that life, from
-    1; steps before were not told. settings: the configuration of recognition, as JSON; with the first that are told
-    when somebody listens anew.
+    1; steps before were not told. Its configuration is in its `ServiceSettings`.
     """
 
     session: str
     at: Stamp
     first: Annotated[int, Meta(ge=1)]
     steps: tuple[Step, ...]
-    settings: str = ""

@@ -56,6 +56,7 @@ from engage_hri.schemas.recognition import (
     TurnOutcome,
 )
 from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Outdated, Refused, Request, Unreadable
+from engage_hri.schemas.settings import ServiceSettings
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.world import World
 
@@ -74,7 +75,7 @@ Message = (
     | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | Utterance
     | World | HeadPose | VoiceActivity
     | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics | Taken
-    | AskStatus | Status | PeerAlive | PeerGone
+    | AskStatus | Status | ServiceSettings | PeerAlive | PeerGone
 )  # fmt: skip
 """Union of all messages. The field `type` of the encoded form says which one it is."""
 

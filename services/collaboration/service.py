@@ -19,6 +19,7 @@ from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.collaboration.pieces_in_view import PiecesInView
 from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.tangram.table import tangram_table
 
 
@@ -30,6 +31,7 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
         engine = _Engine(robot, bus, PiecesInView(config.steady))
         with robot.worlds() as worlds:
             watching = tasks.create_task(engine.watch(worlds), name="watch the table")
+            tell_settings(bus, "collaboration", config)
             ready()
             await _follow(plan, engine)
             watching.cancel()

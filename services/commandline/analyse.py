@@ -3,7 +3,7 @@
 import csv
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +13,7 @@ from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.analysing import Compared, Session, again, sessions, with_settings
+from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.folder import Folder
 from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.options import Quiet
@@ -21,12 +22,14 @@ from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.simulate import PLOTS, plotting, rendered
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.conditions import UNNAMED
+from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
+from engage_hri.services.runtime.settings import shown
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import BASELINE
 from engage_hri.services.study.hypotheses import Finding, findings
 from engage_hri.services.study.summary import BETWEEN, WITHIN, Table
 
-FILES = ("recordings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
+FILES = ("recordings.csv", "settings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
 DIFFERENT = 1
 """Exit code if recognition again gives other events with the same settings, and nothing is missing."""
 SHOWN = 10
@@ -69,12 +72,14 @@ def main(options: Options) -> int:
     folder = Folder(options.out, FILES, overwrite=options.overwrite) if options.out is not None else None
     played, is_within = numbered([one for path in paths for one in sessions(opened(path))])
     compared, tables = compare(played, options.baseline, is_within=is_within)
+    tables.append(configured(played))
     for table in tables:
         console.print("", rendered(table), sep="\n")
     if folder is not None and draw is not None:
         records, events = [one.record for one in played], [event for one in played for event in one.events]
         texts = {
-            "recordings.csv": listed(played), "events.csv": files.events(events),
+            "recordings.csv": listed(played), "settings.csv": settings(played),
+            "events.csv": files.events(events),
             "sessions.csv": files.sessions(records), "summary.md": "\n".join(table.markdown() for table in tables),
         }  # fmt: skip
         if compared:
@@ -160,6 +165,37 @@ def overview(sessions: Sequence[Session], baseline: str) -> Table:
     return Table(title="Recordings", columns=columns, rows=rows, notes=tuple(notes))
 
 
+def configured(sessions: Sequence[Session]) -> Table:
+    """Table with the settings of the services that are not as by default, and those of later lives that changed."""
+    by_default = dict(flat(shown(Config())))
+    found: list[tuple[str, ...]] = []
+    notes = []
+    for one in {one.path: one for one in sessions}.values():
+        before: dict[str, Mapping[str, str]] = {}
+        for life in one.settings:
+            told = life.told
+            others = before.get(told.participant, by_default)
+            since = "" if life.number == 1 else f"life {life.number}, from {life.since:.1f} s"
+            found += [(one.path.name, told.participant, since, line) for line in changed(life, others)]
+            before[told.participant] = life.values
+        if not one.settings:
+            notes.append(f"{one.path.name}: it has no settings of its services.")
+    notes.append("All others are as by default in this Engage; `engage export --settings` has them all.")
+    return Table(
+        title="Settings", columns=("", "service", "life", "setting"), rows=tuple(found), notes=tuple(notes)
+    )  # fmt: skip
+
+
+def settings(sessions: Sequence[Session]) -> str:
+    """CSV of all settings of all services of all recordings."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("session", "condition", *COLUMNS))
+    for one in sessions:
+        writer.writerows((one.record.session, one.condition, *row) for row in rows(one.settings))
+    return text.getvalue()
+
+
 def listed(sessions: Sequence[Session]) -> str:
     """CSV of the recordings: what `session` in the other files stands for."""
     text = io.StringIO()
@@ -200,6 +236,8 @@ def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
     head = f"{name}, life {life.session}: {ids} events, {len(life.live)} changes"
     lines = []
     lack = life.lack
+    if lack.settings:
+        lines.append("  the settings that recognition had are not in the recording: again it has those by default")
     if lack.before:
         lines.append(f"  {lack.before} steps are from before the recording: what had begun by then is not known")
     if lack.gaps or lack.messages:

@@ -11,17 +11,19 @@ from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics, session_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.console.follow import FOLLOWED
-from engage_hri.services.recognition.again import Again, Lack, events_in, settings_of
+from engage_hri.services.recognition.again import Again, Lack, events_in
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import Tally
 from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.settings import Life, settings_of
 from engage_hri.services.recording.times import Times, messages, moved
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.records import Recording as Record
@@ -38,7 +40,7 @@ class Session(Struct, frozen=True, kw_only=True):
     """A recording in numbers, or the part of it under one condition. participant: empty: not told.
 
     published: what recognition said itself in the end; None: it said nothing, or of more than this part.
-    doubts: what may be wrong with these numbers, in words.
+    doubts: what may be wrong with these numbers, in words. settings: those under which its services ran.
     """
 
     path: Path
@@ -48,6 +50,7 @@ class Session(Struct, frozen=True, kw_only=True):
     events: tuple[EventRecord, ...]
     published: WindowStatistics | None
     doubts: tuple[str, ...]
+    settings: tuple[Life, ...] = ()
 
 
 def sessions(recording: Recording) -> list[Session]:
@@ -104,6 +107,7 @@ def _session(
         path=Path(recording.name), condition=part.name, participant=recording.facts.get("participant", ""),
         record=record.session(session=0, condition=part.name, seed=0),
         events=record.events(session=0, condition=part.name), published=published if is_all else None, doubts=doubts,
+        settings=tuple(settings_of(recording)),
     )  # fmt: skip
 
 
@@ -211,7 +215,7 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
     found: dict[str, tuple[Again, list[ConnectionEvent]]] = {}
     live: dict[str, list[ConnectionEvent]] = {}
     sure: dict[str, int] = {}
-    numbers = _numbers(recording)
+    numbers, configs = _numbers(recording), configurations(recording)
 
     def find(life: str, number: int) -> Received | None:
         place = numbers.get((life, number & 0xFFFFFFFF))
@@ -226,8 +230,11 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
             live.setdefault(message.session, []).append(message)
         elif isinstance(message, Taken):
             if message.session not in found:
-                config = choose(settings_of(message) or RecognitionConfig())
-                found[message.session] = (Again(recording.robot, message.session, message.at.clock, config), [])
+                known = configs.get(message.session)
+                config = choose(known or RecognitionConfig())
+                lack = Lack(settings=known is None)
+                life = Again(recording.robot, message.session, message.at.clock, config, lack)
+                found[message.session] = (life, [])
             life, events = found[message.session]
             sure[message.session] = len(events)
             events += events_in(life.take(message, find))
@@ -235,6 +242,22 @@ def again(recording: Recording, choose: Choose = lambda config: config) -> list[
         Compared(session=name, live=tuple(live.get(name, ())), again=tuple(events), lack=life.lack, sure=sure[name])
         for name, (life, events) in found.items()
     ]
+
+
+def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
+    """Configuration of each life of recognition, by the session of its events. Raises InputRefused."""
+    found = {}
+    for life in settings_of(recording):
+        if life.told.participant != "recognition":
+            continue
+        try:
+            config = msgspec.convert(life.told.settings.get("recognition"), RecognitionConfig)
+        except msgspec.ValidationError as error:
+            reason = f"recognition of Engage {life.told.version} had settings that this one does not know: {error}"
+            fault = Fault(reason=reason, where=recording.name, advice=f"use Engage {life.told.version}")
+            raise InputRefused(fault) from error
+        found[session_of(life.told.run)] = config
+    return found
 
 
 def _numbers(recording: Recording) -> dict[tuple[str, int], int]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 ENDINGS = {
     "elan": ".eaf", "textgrid": ".TextGrid", "csv": ".csv", "sheet": ".png", "film": ".mp4", "lines": ".jsonl",
+    "settings": ".settings.toml",
 }  # fmt: skip
 RATE = 10.0
 """Pictures a second of a film."""
@@ -31,6 +32,9 @@ class Options:
     textgrid: Annotated[bool, typer.Option("--textgrid", help="Tiers for Praat, FILE.TextGrid.")] = False
     csv: Annotated[bool, typer.Option("--csv", help="Tiers as a table, FILE.csv.")] = False
     lines: Annotated[bool, typer.Option("--lines", help="The lines of `engage watch --json`, FILE.jsonl.")] = False
+    settings: Annotated[
+        bool, typer.Option("--settings", help="Settings of the services, FILE.settings.toml, as for --config.")
+    ] = False
     sheet: Annotated[bool, typer.Option("--sheet", help="Pictures of the scene from above, FILE.png.")] = False
     film: Annotated[bool, typer.Option("--film", help="A film of it, FILE.mp4, or FILE.gif without ffmpeg.")] = False
     out: Annotated[
@@ -84,7 +88,7 @@ def _has_ffmpeg() -> bool:
 
 def _make(name: str, path: Path, recording: "Recording", options: Options) -> Path:
     """Make one file. Returns where it is."""
-    from engage_hri.services.recording import annotations, tiers
+    from engage_hri.services.recording import annotations, settings, tiers
 
     match name:
         case "elan":
@@ -99,6 +103,9 @@ def _make(name: str, path: Path, recording: "Recording", options: Options) -> Pa
             path.write_text(annotations.table(tiers.tiers(recording)), encoding="utf-8")
         case "lines":
             path.write_text(lines_of(recording), encoding="utf-8")
+        case "settings":
+            found = settings.settings_of(recording)
+            path.write_text(settings.configuration(found, recording.name), encoding="utf-8")
         case _:
             _draw(name, path, recording, options)
     return path

@@ -125,6 +125,11 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         """Names of the files in `repertoire`, each stronger than those before it."""
         return (self.repertoire,) if isinstance(self.repertoire, str) else self.repertoire
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of all files that hold settings."""
+        return (*([self.calibration] if self.calibration else []), *self.repertoire_files)
+
     def __post_init__(self) -> None:
         if not 1.0 <= self.state_rate <= 200.0:
             raise ValueError(f"state_rate is {self.state_rate}: expected 1..200 per second")

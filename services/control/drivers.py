@@ -98,6 +98,18 @@ def check(config: ControlConfig) -> None:
                 _settings(each, load(each.spec), config)
 
 
+def with_settings_of_drivers(config: ControlConfig) -> ControlConfig:
+    """The configuration with all settings of each driver that is asked for, those at their defaults too."""
+    found = {}
+    for each in _asked(config):
+        driver = load(each.spec)
+        settings = _settings(each, driver, config)
+        if settings is not None:
+            where = _given(each, driver, config)[1]
+            found[where.rpartition(".")[2]] = msgspec.structs.asdict(settings)
+    return replace(config, drivers={**config.drivers, **found})
+
+
 def _asked(config: ControlConfig) -> list[Named]:
     voice = [Named(config.voice, ("voice",), is_voice=True)] if config.voice else []
     return [*map(named, config.bodies), *voice]

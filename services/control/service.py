@@ -42,7 +42,7 @@ from engage_hri.services.control.body import (
 )
 from engage_hri.services.control.calibration import calibrated
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
+from engage_hri.services.control.drivers import made, with_settings_of_drivers
 from engage_hri.services.control.live import LiveBehavior
 from engage_hri.services.control.performing import Performing
 from engage_hri.services.control.questions import Questions
@@ -54,6 +54,7 @@ from engage_hri.services.control.variability import Deviations, is_lost
 from engage_hri.services.control.warned import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 
 
 async def embody(
@@ -72,7 +73,9 @@ async def embody(
 
     Raises InputRefused or RunFailed: there is no such body, or it cannot be had.
     """
-    body = body or made(config)
+    told = config
+    if body is None:
+        body, told = made(config), with_settings_of_drivers(config)
     if "speech" not in body.capabilities.types:
         # Whoever starts it is to see this, whatever the log shows.
         logging.getLogger("engage").warning(
@@ -83,6 +86,7 @@ async def embody(
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.questions.estimate)
             bus.answer(keys.DESCRIBE, control.questions.describe)
+            tell_settings(bus, "control", told, config.files, covered_for=covered_for)
             ready()
             try:
                 control.tell_held()

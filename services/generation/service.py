@@ -31,6 +31,7 @@ from engage_hri.services.runtime.action_reports import ActionReports
 from engage_hri.services.runtime.publisher import Publisher
 from engage_hri.services.runtime.reports import GoesOn, Told
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.runtime.world_report import WorldReport
 
 NAME = "generation"
@@ -52,6 +53,7 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
                 tasks.create_task(generation.perform(), name="fragments")
                 tasks.create_task(generation.keep_deadlines(), name="deadlines")
                 generation.tell_condition()
+                tell_settings(bus, "generation", config, covered_for=covered_for)
                 ready()
                 async for received in inbox:
                     with bus.containing(received):

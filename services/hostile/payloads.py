@@ -20,6 +20,7 @@ from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
+from engage_hri.schemas.settings import ServiceSettings
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.hostile.chance import Chance, happens
@@ -134,6 +135,8 @@ class Payloads:
                 return keys.open_events(_chunk(actor))
             case Statistics(actor=actor):
                 return keys.statistics(_chunk(actor))
+            case ServiceSettings(participant=name):
+                return keys.settings(_chunk(name))
         return FIXED_KEYS.get(type(message)) or keys.request_state(server)
 
     def _command(self, expression: str) -> str:

@@ -41,6 +41,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 
 Result = TypeVar("Result")
 
@@ -300,6 +301,7 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
     try:
         with bus.subscribe(*patterns) as inbox:
             realizer.steering.tell()
+            tell_settings(bus, "realizer", config)
             ready()
             async with asyncio.TaskGroup() as tasks:
                 async for received in inbox:

@@ -23,18 +23,15 @@ Find = Callable[[str, int], Received | None]
 """Finds the message of a life by its number; None: it is not there."""
 
 
-def settings_of(taken: Taken) -> RecognitionConfig | None:
-    """Return the configuration that recognition had; None: it is not told here."""
-    return msgspec.json.decode(taken.settings, type=RecognitionConfig) if taken.settings else None
-
-
 class Lack(Struct, frozen=True, kw_only=True):
     """Parts that are missing, so that the same cannot come of it.
 
     before: steps before the first that was told: recognition ran before the recording began. gaps: steps that were
-    not told in between. messages: those that steps took, and that are not in the recording.
+    not told in between. messages: those that steps took, and that are not in the recording. settings: those of
+    recognition are not in it.
     """
 
+    settings: bool = False
     before: int = 0
     gaps: int = 0
     messages: int = 0
@@ -44,11 +41,15 @@ class Lack(Struct, frozen=True, kw_only=True):
         return self == Lack()
 
 
+NOTHING = Lack()
+
+
 class Again:
     """One life of recognition, done once more. lack: what is missing so far."""
 
-    def __init__(self, robot: str, session: str, clock: str, config: RecognitionConfig) -> None:
-        self.lack = Lack()
+    def __init__(self, robot: str, session: str, clock: str, config: RecognitionConfig, lack: Lack = NOTHING) -> None:
+        """lack: what is missing before the first step."""
+        self.lack = lack
         self._clock = StepClock(clock)
         self._intake = Intake(robot, config, self._clock, session)
         self._next = 1

@@ -56,16 +56,14 @@ class StepClock:
 
 
 class Ledger:
-    """Steps of one life of recognition that are not told yet. settings: its configuration, as JSON."""
+    """Steps of one life of recognition that are not told yet."""
 
-    def __init__(self, session: str, clock: str, settings: str, began: Seconds) -> None:
+    def __init__(self, session: str, clock: str, began: Seconds) -> None:
         self._session = session
         self._clock = clock
-        self._settings = settings
         self._began = began
         self._steps: list[Step] = []
         self._first = 1
-        self._is_heard = False
         self.deadline: Seconds | None = None
         """Time at which the steps are to be told."""
 
@@ -84,7 +82,6 @@ class Ledger:
         if not self._steps:
             return None
         if not is_heard:
-            self._is_heard = False
             if now - self._began > FIRST or len(self._steps) >= MOST:
                 self._first += len(self._steps)
                 self._steps = []
@@ -92,10 +89,8 @@ class Ledger:
                 self.deadline = now + LATEST
             return None
         told = Taken(
-            session=self._session, at=Stamp(self._clock, now), first=self._first, steps=tuple(self._steps),
-            settings="" if self._is_heard else self._settings,
+            session=self._session, at=Stamp(self._clock, now), first=self._first, steps=tuple(self._steps)
         )  # fmt: skip
-        self._is_heard = True
         self._first += len(self._steps)
         self._steps = []
         return told

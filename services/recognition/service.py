@@ -3,8 +3,6 @@
 from collections.abc import Iterable
 from math import isfinite
 
-import msgspec
-
 from engage_hri.schemas import keys
 from engage_hri.schemas.ledger import ReadClock, Step
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn, session_of
@@ -16,6 +14,7 @@ from engage_hri.services.recognition.intake import Answer, Input, Intake, Mistak
 from engage_hri.services.recognition.ledger import Ledger, StepClock, step_of
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 
 
 async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
@@ -28,6 +27,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
         *RequestDesk.patterns("recognition"),
     )  # fmt: skip
     with bus.subscribe(*patterns) as inbox:
+        tell_settings(bus, "recognition", config)
         ready()
         recognition.begin()
         try:
@@ -82,7 +82,7 @@ class _Recognition:
         self._clock = _BusClock(bus)
         session = session_of(bus.run)
         self._intake = Intake(bus.robot, config, self._clock, session)
-        self._ledger = Ledger(session, bus.clock, msgspec.json.encode(config).decode(), bus.now())
+        self._ledger = Ledger(session, bus.clock, bus.now())
 
     @property
     def deadline(self) -> Seconds | None:

@@ -13,6 +13,7 @@ from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.client.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.cameras import Cameras
@@ -39,6 +40,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
         *([keys.ROBOT_MOTION] if config.perception == "raw" else []),
     ) as inbox:  # fmt: skip
         bus.publish(keys.WORLD, _whole(cameras.world(bus.now()), shared, bus.now()))
+        tell_settings(bus, "simulation", config)
         ready()
         await _wait_for(set(config.await_participants), inbox)
         if config.human != "none":

@@ -5,16 +5,23 @@ import json
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.settings import ServiceSettings
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.interface import Sample
 from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.commandline.config import load
+from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.settings import flat
 from tests.bus.places import PATIENCE, free_endpoint
 from tests.cli.command import Engage, engage, start
 from tests.cli.test_processes import line
-from tests.recording.files import bytes_of, saved
+from tests.recording.files import bytes_of, sample, saved
 from tests.recording.test_reading import told
 
 
@@ -159,3 +166,31 @@ def test_again_without_a_ledger_is_refused_and_settings_are_for_it_alone(run: En
     assert (again.code, settings.code) == (2, 2)
     assert "recognition told nothing of what it took" in again.err
     assert "is for --again" in settings.err
+
+
+def test_settings_are_exported_and_those_that_changed_are_printed(run: Engage, tmp_path: Path) -> None:
+    def settings(life: str, window: float) -> Sample:
+        message = ServiceSettings(
+            participant="recognition", run=life, version="0.0.1", at=Stamp("loop", 0.0),
+            settings={"recognition": msgspec.to_builtins(RecognitionConfig(window=window))},
+        )  # fmt: skip
+        return sample(keys.settings("recognition"), message, float(life), source="recognition", life=life)
+
+    path = saved(tmp_path / "a.mcap", [settings("1", 20.0), settings("2", 40.0)])
+
+    exported = run("export", path, "--settings")
+    analysed = run("analyse", path, "--out", tmp_path / "out")
+
+    assert exported.code == 0
+    assert load(tmp_path / "a.settings.toml").recognition == RecognitionConfig(window=40.0)
+    assert (
+        "# recognition, life 1, from 1.000 s: recognition.window = 20.0" in (tmp_path / "a.settings.toml").read_text()
+    )
+    printed = [line.split() for line in analysed.out.splitlines() if "recognition.window" in line]
+    assert printed == [
+        ["a.mcap", "recognition", "recognition.window", "=", "20.0"],
+        ["a.mcap", "recognition", "life", "2,", "from", "2.0", "s", "recognition.window", "=", "40.0"],
+    ]
+    written = (tmp_path / "out" / "settings.csv").read_text().splitlines()
+    assert "0,recorded,recognition,2,2.0,recognition.window,40.0" in written
+    assert len(written) == 1 + 2 * len(list(flat(msgspec.to_builtins(RecognitionConfig()))))

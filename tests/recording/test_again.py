@@ -207,4 +207,4 @@ async def test_nothing_is_told_while_nobody_listens() -> None:
 
         told = [one.message async for one in inbox if isinstance(one.message, Taken)]
         assert all(taken.first > 20 for taken in told)
-        assert told[0].settings
+        assert len(told) > 2
