@@ -54,7 +54,7 @@ export function head(panel) {
       const { owner } = state.head;
       from = state.head.since;
       told.replaceChildren(
-        element("strong", {}, owner ? claim(owner) : "nobody"), " ", since,
+        element("strong", {}, owner && owner.kind !== "none" ? claim(owner) : "nobody"), " ", since,
         element("span", { class: "why" }, owner?.reason ? `because: ${owner.reason}` : ""),
       );
       waiting.replaceChildren(
