@@ -20,6 +20,7 @@ from engage_hri.services.console.web.orders import (
     RIGHTS,
     AnyOrder,
     Condition,
+    InhibitGaze,
     LookAt,
     SteerOrder,
     SwitchOrder,
@@ -85,11 +86,13 @@ def test_an_address_without_the_token_lets_nobody_take_part() -> None:
 
 
 def test_the_log_has_what_was_ordered_but_not_the_words() -> None:
-    assert written(Tell(text="a secret", target="cup", asks=True)) == "asks 8 letters about cup"
+    assert written(Tell(text="a secret", target="cup", asks=True)) == "asks 8 characters about cup"
     assert written(SwitchOrder(faults=(BodyFault(kind="slow"),))) == "faults: slow"
     assert written(SteerOrder(to="hold")) == "hold"
     assert written(Condition(name="b", speech_only=True)) == "condition: b, speech only"
     assert written(Condition()) == "condition: none"
+    assert written(InhibitGaze(on=True, mode="target", target="cup")) == "keeps the gaze on cup"
+    assert written(InhibitGaze(on=True)) == "keeps the gaze where it is"
 
 
 def test_words_and_a_reference_are_a_turn_that_engage_can_read() -> None:

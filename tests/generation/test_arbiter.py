@@ -6,6 +6,8 @@ import pytest
 
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.response_policy import viewing_order
 from tests.generation.head_stories import check
 from tests.generation.heads import Stage, act, on_the_face, world
@@ -24,6 +26,12 @@ def test_nobody_owns_the_head_until_there_is_a_face() -> None:
 
     assert stage.owners == [(0.0, "none", ""), (2.0, "face", "human")]
     assert stage.shifts == [(2.0, "maintenance", "human")]
+
+
+def test_nobody_owns_the_head_since_the_first_ruling() -> None:
+    ruling = Arbiter("robot", GenerationConfig()).rule(861.0)  # clocks do not begin with the robot
+
+    assert (ruling.owner.kind, ruling.since) == ("none", 861.0)
 
 
 def test_of_two_moving_hands_the_first_is_followed_while_it_moves() -> None:

@@ -22,6 +22,8 @@ RIGHTS: dict[str, tuple[Right, ...]] = {
     "wizard": ALL_RIGHTS,
 }
 """Rights by role; no other role has any."""
+GAZE = {"hold": "where it is", "release": "at rest", "target": "on "}
+"""How the gaze is kept, in words."""
 Name = Annotated[str, Meta(max_length=80)]
 Id = Annotated[str, Meta(max_length=200)]
 Text = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
@@ -214,13 +216,13 @@ def written(order: Order) -> str:
     match order:
         case Tell(text=text, target=target, asks=asks):
             about = f" about {target}" if target else ""
-            return f"{'asks' if asks else 'says'} {len(text)} letters{about}"
+            return f"{'asks' if asks else 'says'} {len(text)} characters{about}"
         case Prepared(number=number):
             return f"performs fragment {number + 1} of the script"
         case Backchannel(how=how):
             return f"backchannel: {how}"
         case InhibitGaze(on=on, mode=mode, target=target):
-            return f"inhibits the gaze: {mode} {target}".rstrip() if on else "lets the gaze go"
+            return f"keeps the gaze {GAZE[mode]}{target}" if on else "lets the gaze go"
         case Condition(name=name, speech_only=speech_only):
             return f"condition: {words(name, speech_only)}"
         case SteerOrder(to=to):

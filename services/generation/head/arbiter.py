@@ -204,6 +204,8 @@ class Arbiter:
         """Decide on the owner by now, and on the gaze shift that takes the head to its target."""
         claims = self._claims(now)
         before, waited = self._owner, self._waiting
+        if waited is None:
+            self._since = now
         self._owner = self._next_owner(claims, now)
         if self._owner != before:
             self._lapsed = None

@@ -3,9 +3,20 @@ import { clock, element, seconds } from "./look.js";
 
 export function words(panel) {
   const list = panel.querySelector(".words");
+  const aloud = panel.querySelector("[role=status]");
+  const announced = new Set();
   let follows = true; // until somebody scrolls up
   list.addEventListener("scroll", () => (follows = list.scrollHeight - list.scrollTop - list.clientHeight < 40));
   new ResizeObserver(() => follows && (list.scrollTop = list.scrollHeight)).observe(list);
+  // A screen reader hears words once they have been said: while they come, it would begin anew with each.
+  function announce(said) {
+    const name = (each) => `${each.actor}|${each.since}`;
+    const news = said.filter((each) => !announced.has(name(each)));
+    announced.clear();
+    for (const each of said) announced.add(name(each));
+    if (news.length) aloud.textContent = news.slice(-2).map((each) => `${each.actor}: ${each.words}`).join(" ");
+  }
+
   return {
     take(state, changed) {
       if (!changed.has("words")) return;
@@ -23,6 +34,7 @@ export function words(panel) {
         );
       });
       if (follows) list.scrollTop = list.scrollHeight;
+      announce(state.words.filter((said) => said.words && !said.open));
     },
   };
 }
@@ -31,7 +43,7 @@ const claim = (each) => [each.kind, each.target].filter(Boolean).join(" → ");
 
 export function head(panel) {
   const place = panel.querySelector(".head");
-  const told = element("p", { class: "owner", "aria-live": "polite" });
+  const told = element("p", { class: "owner" });
   const since = element("span", { class: "since" });
   const waiting = element("ol", { class: "waiting" });
   place.replaceChildren(told, waiting);
@@ -42,7 +54,7 @@ export function head(panel) {
       const { owner } = state.head;
       from = state.head.since;
       told.replaceChildren(
-        element("strong", {}, owner ? claim(owner) : "nobody"), " ", since,
+        element("strong", {}, owner && owner.kind !== "none" ? claim(owner) : "nobody"), " ", since,
         element("span", { class: "why" }, owner?.reason ? `because: ${owner.reason}` : ""),
       );
       waiting.replaceChildren(
@@ -126,13 +138,23 @@ export function health(panel) {
 
 export function notes(panel) {
   const list = panel.querySelector(".notes");
+  let items = new Map();
   return {
     take(state, changed) {
       if (!changed.has("notes")) return;
       const signs = { fault: "✗", warning: "!", news: "·" };
-      list.replaceChildren(...state.notes.toReversed().map((note) => element("li", { class: note.level },
-        element("span", { class: "sign", "aria-hidden": "true" }, signs[note.level]),
-        element("span", { class: "since" }, clock(note.at)), " ", note.text)));
+      const before = items;
+      items = new Map();
+      for (const note of state.notes) {
+        let key = `${note.at}|${note.level}|${note.text}`;
+        while (items.has(key)) key += "|";
+        const known = before.get(key);
+        items.set(key, known ?? element("li", { class: note.level },
+          element("span", { class: "sign", "aria-hidden": "true" }, signs[note.level]),
+          element("span", { class: "since" }, clock(note.at)), " ", note.text));
+        if (!known) list.prepend(items.get(key)); // a screen reader says what is new, and only that
+      }
+      for (const [key, item] of before) if (!items.has(key)) item.remove();
     },
   };
 }

@@ -1,8 +1,11 @@
 // The table from above, as the person sees it who sits opposite the robot: the robot is at the top.
 import { drawn, pieceColor } from "./look.js";
+import { described, sceneInWords } from "./tell.js";
 
-const AHEAD = [-0.27, 1.5]; // metres, x of the robot: down the screen
-const ASIDE = [-0.62, 0.62]; // y of the robot: to the right
+// What is in view at least, in metres: x of the robot, which is down the screen, and y, to the right.
+const AHEAD = [-0.27, 1.5];
+const ASIDE = [-0.62, 0.62];
+const AROUND = 0.3; // room for a person and their name
 
 // Coordinates of the screen, in millimetres, of a place.
 const place = ([x, y]) => [y * 1000, x * 1000];
@@ -10,17 +13,19 @@ const points = (outline) => outline.map((corner) => place(corner).map((v) => v.t
 
 export function map(panel, order) {
   const svg = panel.querySelector("svg");
-  svg.setAttribute("viewBox", `${ASIDE[0] * 1000} ${AHEAD[0] * 1000} ${(ASIDE[1] - ASIDE[0]) * 1000} ${(AHEAD[1] - AHEAD[0]) * 1000}`);
   const layers = {};
   for (const name of ["surfaces", "cones", "objects", "labels", "lines", "hands", "bodies"]) {
     layers[name] = svg.appendChild(drawn("g", { class: name }));
   }
   const held = hands(svg, order);
+  const describe = described(svg, (state) => `The table from above. ${sceneInWords(state)}`);
   return {
     take(state, changed) {
       held.robot = state.robot;
       if (!changed.has("scene") || panel.offsetParent === null) return;
+      describe(state);
       const { body, things, people, robot } = state.scene;
+      frame(svg, things, people);
       const places = new Map(things.map((thing) => [thing.id, thing.at]));
       for (const person of people) if (person.at) places.set(person.id, person.at);
       if (body?.eyes) places.set(robot, body.eyes);
@@ -28,12 +33,27 @@ export function map(panel, order) {
       objects(layers, things, body);
       layers.lines.replaceChildren();
       layers.cones.replaceChildren();
-      layers.bodies.replaceChildren();
       layers.hands.replaceChildren(...things.filter((thing) => thing.kind === "hand").map(hand));
-      for (const person of people) drawPerson(layers, person, places, robot);
+      const there = people.filter((each) => each.at && each.present);
+      for (const person of there) drawPerson(layers, person, places, robot);
       if (body) drawRobot(layers, body, places, robot);
+      const ids = [...there.map((each) => each.id), ...(body?.eyes && body.gaze ? [robot] : [])];
+      for (const each of [...layers.bodies.children]) if (!ids.includes(each.dataset.key)) each.remove();
     },
   };
+}
+
+// Show everybody and everything: a second person sits beside the table, another world may be wider.
+function frame(svg, things, people) {
+  const seen = people.filter((each) => each.at && each.present).map((each) => each.at);
+  const lying = things.filter((each) => each.kind !== "hand").flatMap((each) => (each.outline.length ? each.outline : [each.at]));
+  const steps = (value) => Math.ceil(value * 20) / 20; // so that it stands still while somebody moves a little
+  const reach = (value) => Math.max(...seen.map((at) => steps(value(at) + AROUND)), ...lying.map((at) => steps(value(at))));
+  const left = Math.max(-ASIDE[0], reach((at) => -at[1]));
+  const right = Math.max(ASIDE[1], reach((at) => at[1]));
+  const down = Math.max(AHEAD[1], reach((at) => at[0]));
+  const box = `${-left * 1000} ${AHEAD[0] * 1000} ${(left + right) * 1000} ${(down - AHEAD[0]) * 1000}`;
+  if (svg.getAttribute("viewBox") !== box) svg.setAttribute("viewBox", box);
 }
 
 const seated = () => document.body.classList.contains("seated");
@@ -87,7 +107,7 @@ function hands(svg, order) {
       order({ do: "move", thing: shape.dataset.id, x: x + way[0], y: y + way[1] });
     } else if (event.key === "Enter" || event.key === " ") {
       mean(shape.dataset.id, false);
-    } else if (event.key === "p") {
+    } else if (event.key.toLowerCase() === "p") {
       mean(shape.dataset.id, true);
     } else return;
     event.preventDefault();
@@ -144,15 +164,24 @@ function line(from, to, kind) {
   return drawn("line", { class: kind, x1, y1, x2, y2 });
 }
 
-// A head from above, with the direction in which it faces.
-function face(at, direction, kind, id, name, speaks) {
+// A head from above, with the direction in which it faces. It stays the same element, so that it keeps the focus.
+function face(layer, at, direction, kind, id, name, speaks) {
   const [x, y] = place(at);
   const turn = (Math.atan2(direction[1], direction[0]) * 180) / Math.PI;
-  return drawn("g", { class: `${kind}${speaks ? " speaks" : ""}`, "data-id": id, transform: `translate(${x} ${y})` },
+  const shape = keyed(layer, id, () => drawn("g", { "data-id": id, tabindex: "0", role: "button" },
     drawn("ellipse", { class: "shoulders", rx: 190, ry: 75 }),
-    drawn("g", { transform: `rotate(${90 - turn})` },
-      drawn("ellipse", { class: "skull", rx: 100, ry: 78 }), drawn("circle", { class: "nose", cx: 98, cy: 0, r: 17 })),
-    drawn("text", { class: "name", y: kind === "robot" ? -105 : 150 }, speaks ? `${name} speaks` : name));
+    drawn("g", { class: "turned" }, drawn("ellipse", { class: "skull", rx: 100, ry: 78 }),
+      drawn("circle", { class: "nose", cx: 98, cy: 0, r: 17 })),
+    drawn("text", { class: "name", y: kind === "robot" ? -105 : 150 })));
+  const text = speaks ? `${name} speaks` : name;
+  shape.setAttribute("class", `${kind}${speaks ? " speaks" : ""}`);
+  shape.setAttribute("transform", `translate(${x} ${y})`);
+  shape.querySelector(".turned").setAttribute("transform", `rotate(${90 - turn})`);
+  const label = shape.querySelector(".name");
+  if (label.textContent !== text) {
+    label.textContent = text;
+    shape.setAttribute("aria-label", text);
+  }
 }
 
 function towards(from, to) {
@@ -162,13 +191,12 @@ function towards(from, to) {
 }
 
 function drawPerson(layers, person, places, robot) {
-  if (!person.at || !person.present) return;
   const target = person.looks?.length ? places.get(person.looks[0]) : null;
   const direction = target ? towards(person.at, target) : person.looks ? [-0.3, 0.95] : [-1, 0];
   if (target) layers.lines.append(line(person.at, target, person.looks[0] === robot ? "look eye" : "look"));
   for (const id of person.points) if (places.has(id)) layers.lines.append(line(person.at, places.get(id), "ray"));
   const nods = person.nods ? ` (${person.nods}s)` : "";
-  layers.bodies.append(face(person.at, direction, "person", person.id, `${person.id}${nods}`, person.speaks));
+  face(layers.bodies, person.at, direction, "person", person.id, `${person.id}${nods}`, person.speaks);
 }
 
 function drawRobot(layers, body, places, robot) {
@@ -180,7 +208,7 @@ function drawRobot(layers, body, places, robot) {
     layers.cones.append(drawn("polygon", {
       class: "cone", points: points([body.eyes, end(middle - body.spread), end(middle), end(middle + body.spread)]),
     }));
-    layers.bodies.append(face(body.eyes, body.gaze, "robot", robot, robot, Boolean(body.speaking)));
+    face(layers.bodies, body.eyes, body.gaze, "robot", robot, robot, Boolean(body.speaking));
   }
   for (const arm of body.arms) {
     layers.lines.append(line(arm.elbow, arm.hand, "arm"));

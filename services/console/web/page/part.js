@@ -13,8 +13,12 @@ export function part(panel, order) {
     return made;
   };
   const name = element("input", { type: "text", id: "your-name", maxlength: "40", autocomplete: "off", placeholder: "visitor" });
-  const sit = button("Take a seat", { class: "main" }, () => order({ do: "sit", name: name.value.trim() }));
-  const away = element("div", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name, sit);
+  const away = element("form", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name,
+    element("button", { type: "submit", class: "main" }, "Take a seat"));
+  away.addEventListener("submit", (event) => {
+    event.preventDefault();
+    order({ do: "sit", name: name.value.trim() });
+  });
 
   const hold = button("Hold to speak", { "aria-pressed": "false" }, () => {});
   const speak = (on) => {
@@ -42,7 +46,7 @@ export function part(panel, order) {
   });
   const who = element("p", { class: "owner" });
   const here = element("div", {}, who,
-    element("p", { class: "why" }, "Click something in a picture to look at it. Drag a piece from above to move it. With the keyboard: Tab to a piece, Enter looks, P points, arrows move it."),
+    element("p", { class: "why" }, "Click something in a picture to look at it. Drag a piece from above to move it. With the keyboard: Tab to a piece or a person, Enter looks, P points, arrows move a piece."),
     element("div", { class: "row" },
       button("Look at the robot", {}, () => order({ do: "look", target: here.dataset.robot })),
       button("Look away", {}, () => order({ do: "look", target: "" })),

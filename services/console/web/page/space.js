@@ -1,6 +1,7 @@
 // The scene in 3D. Drawn when a frame has changed it, or when somebody turns it: never for nothing.
 import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
 import { element, isDark, pieceColor } from "./look.js";
+import { described, sceneInWords } from "./tell.js";
 
 const SHOULDERS = 0.2; // metres from the middle of the trunk
 const VIEWS = {
@@ -84,9 +85,11 @@ export function space(panel, order) {
   });
   const robot = makeRobot(scene);
   let dark = null;
+  const describe = described(place, (state) => `The scene in 3D. ${sceneInWords(state)}`);
   return {
     take(state, changed) {
       if (!changed.has("scene")) return;
+      describe(state);
       const { body, things } = state.scene;
       robotId = state.robot;
       keep(pieces, things, (thing) => makePiece(scene, thing), (made, thing) => made.put(thing, body));

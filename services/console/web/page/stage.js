@@ -7,14 +7,14 @@ const MAIN = [
   ["above", "From above", `<svg class="map" role="group" aria-label="The table from above"></svg>`],
   ["events", "Connection events", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["behaviors", "Behaviors: planned and measured", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
-  ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0"></div>`],
+  ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0" role="group" aria-labelledby="net-title"></div>`],
   ["references", "References", `<div class="references"></div>`],
-  ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" tabindex="0"></ul>`],
+  ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" aria-labelledby="notes-title" tabindex="0"></ul>`],
 ];
 const SIDE = [
   ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
   ["wizard", "The robot by hand", `<div class="wizard"></div>`],
-  ["said", "Words", `<ol class="words" role="log" aria-live="polite" tabindex="0"></ol>`],
+  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><p class="unseen" role="status"></p>`],
   ["head", "Who owns the head", `<div class="head"></div>`],
   ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="reasons"></p>`],
   ["health", "Services", `<ul class="health"></ul>`],
@@ -26,6 +26,7 @@ const panels = (all) => all.map(([id, title, inside]) => `<section id="${id}" ar
 export default {
   props: { robot: String },
   template: `<div class="window">
+    <h1 class="unseen">Engage: {{ robot }}</h1>
     <p class="away" role="alert" hidden></p>
     <p class="switched" role="status" hidden></p>
     <div class="player row" role="group" aria-label="The recording" hidden></div>

@@ -1,4 +1,4 @@
-// The robot by hand: words, references, questions, signs of listening, its gaze, what is held, faults of the body.
+// The robot by hand: words, references, questions, signs of listening, its gaze, what is held, conditions of a study, faults of the body.
 import { element } from "./look.js";
 
 export function wizard(panel, order) {
@@ -40,8 +40,8 @@ export function wizard(panel, order) {
   const faults = element("div", { class: "row faults", role: "group", "aria-label": "Faults of the body" });
   const condition = input("condition", "Condition of a study", { maxlength: "40" });
   const alone = element("input", { type: "checkbox", id: "wizard-alone" });
-  const study = element("form", { class: "row study" }, ...condition.parts, alone,
-    element("label", { for: alone.id }, "speech only"), element("button", { type: "submit" }, "Begin it"));
+  const study = element("form", { class: "row study" }, ...condition.parts, labelled("speech only", alone, "field"),
+    element("button", { type: "submit" }, "Begin it"));
   study.addEventListener("submit", (event) => {
     event.preventDefault();
     send({ do: "condition", name: condition.field.value.trim(), speech_only: alone.checked });
@@ -51,12 +51,13 @@ export function wizard(panel, order) {
   const refused = element("p", { class: "why" });
   place.replaceChildren(refused, named, speaks, steer, study, faults);
   document.addEventListener("keydown", (event) => {
-    const busy = event.target.closest?.("input, select, textarea, button, [tabindex]") || event.ctrlKey || event.metaKey || event.altKey;
+    const busy = event.target.closest?.("input, select, textarea") || event.repeat || event.ctrlKey || event.metaKey || event.altKey;
     const number = Number(event.key) - 1;
     if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) send({ do: "prepared", number });
   });
 
-  let on = [];
+  let on = []; // kinds of faults that the body has
+  let ordered = null; // kinds that were ordered and are not there yet: the next order goes on from these
   return {
     take(state, changed) {
       if (changed.has("you")) {
@@ -75,8 +76,10 @@ export function wizard(panel, order) {
       }
       if (changed.has("switched")) {
         on = state.switched.kinds;
+        if (ordered && ordered.length === on.length && ordered.every((each) => on.includes(each))) ordered = null;
         for (const each of faults.querySelectorAll("button")) each.setAttribute("aria-pressed", String(on.includes(each.dataset.kind)));
       }
+      if (changed.has("told")) ordered = null; // it may have been refused
       if (changed.has("scene")) {
         const { things, people } = state.scene;
         options(target.field, "(nothing)", things.filter((each) => each.kind === "object").map((each) => each.id));
@@ -89,9 +92,10 @@ export function wizard(panel, order) {
   function switches(kinds) {
     if (faults.dataset.kinds === kinds.join()) return;
     faults.dataset.kinds = kinds.join();
-    faults.replaceChildren(element("span", {}, "Faults of the body"), ...kinds.map((kind) => button(kind, () => {
-      const now = on.includes(kind) ? on.filter((each) => each !== kind) : [...on, kind];
-      send({ do: "faults", faults: now.map((each) => ({ kind: each, ...PARTS[each] })) });
+    faults.replaceChildren(element("span", { class: "label" }, "Faults of the body"), ...kinds.map((kind) => button(kind, () => {
+      const before = ordered ?? on;
+      ordered = before.includes(kind) ? before.filter((each) => each !== kind) : [...before, kind];
+      send({ do: "faults", faults: ordered.map((each) => ({ kind: each, ...PARTS[each] })) });
     }, { "aria-pressed": String(on.includes(kind)), "data-kind": kind })));
   }
 }
@@ -101,12 +105,17 @@ const PARTS = { stall: { amount: 2 }, displaced: { part: "neck_yaw", amount: 15 
 
 function input(id, name, attributes) {
   const field = element("input", { type: "text", id: `wizard-${id}`, autocomplete: "off", ...attributes });
-  return { field, parts: [element("label", { for: field.id }, name), field] };
+  return { field, parts: [labelled(name, field, "field wide")] };
 }
 
 function choice(id, name) {
   const field = element("select", { id: `wizard-${id}` });
-  return { field, parts: [element("label", { for: field.id }, name), field] };
+  return { field, parts: [labelled(name, field, "field")] };
+}
+
+// A field and its name, which stay together where a line is broken.
+function labelled(name, field, kind) {
+  return element("span", { class: kind }, element("label", { for: field.id }, name), field);
 }
 
 function options(field, none, ids) {
