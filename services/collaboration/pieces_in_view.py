@@ -87,10 +87,10 @@ class PiecesInView:
         """True if the place of every piece is certain."""
         return all(self._is_steady(id, now) for id in self._known)
 
-    def person(self, now: Seconds) -> str | None:
-        """Id of the person who is there, or was a moment ago; None: nobody."""
-        recent = (id for id, at in self._people.items() if now < at + self._steady)
-        return next(iter(self._present), None) or next(recent, None)
+    def person(self, now: Seconds, known: str = "") -> str | None:
+        """Id of a person who is there, or was a moment ago, of `known` rather than of another; None: nobody."""
+        there = [*self._present, *(id for id, at in self._people.items() if now < at + self._steady)]
+        return known if known in there else next(iter(there), None)
 
     def deadline(self, now: Seconds) -> Seconds | None:
         """Next time at which any of this changes by itself, without another frame; None: never."""

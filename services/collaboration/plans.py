@@ -43,7 +43,9 @@ class AwaitPlacement(Struct, frozen=True):
 
 
 class AwaitPerson(Struct, frozen=True):
-    """Wait until a person is there. Answer: their id."""
+    """Wait until a person is there. Answer: an id, that of `known` if this one is there."""
+
+    known: str = ""
 
 
 class AwaitDeparture(Struct, frozen=True):
@@ -77,18 +79,26 @@ class Manager:
 
     def welcome(self) -> Plan[None]:
         """Wait for a person, and let them settle."""
-        person = yield AwaitPerson()
+        self._person = ""
+        yield from self._meet()
+
+    def _meet(self) -> Plan[None]:
+        """Go on with the person; with another one, or the next who comes, if this one has left. They may settle."""
+        person = yield AwaitPerson(self._person)
         assert isinstance(person, str)
-        self._person = person
-        yield Pause(self.config.arrival)
+        if person != self._person:
+            self._person = person
+            yield Pause(self.config.arrival)
 
     def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
         """Say a full turn that asks for nothing."""
+        yield from self._meet()
         yield Perform(fragment(id, sentence, addressee=self._person, universe=self._universe, look=look))
         yield Pause(self.config.pause)
 
     def approve(self, id: str) -> Plan[None]:
         """Say "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
+        yield from self._meet()
         yield Perform(
             fragment(
                 f"{id}-a", ("Ummmm,",), addressee=self._person, universe=self._universe,
@@ -106,10 +116,11 @@ class Manager:
 
         Returns True if it was right in the end.
         """
-        asked = self._request(id, instruction)
+        request_id, fix = id, False
         pieces = yield from self.observe()
         for attempt in range(1, self.config.attempts + 1):
-            yield Perform(asked)
+            yield from self._meet()
+            yield Perform(self._request(request_id, instruction, fix=fix))
             placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)
             yield Pause(self.config.settle)
             pieces = yield from self.observe()
@@ -118,7 +129,7 @@ class Manager:
                 return True
             fix = placed is True and verdict.seen
             number = f"-{attempt}" if attempt > 1 else ""
-            asked = self._request(f"{id}-{'fix' if fix else 'again'}{number}", instruction, fix=fix)
+            request_id = f"{id}-{'fix' if fix else 'again'}{number}"
         return False
 
     def observe(self) -> Plan[tuple[Entity, ...]]:

@@ -24,7 +24,7 @@ from engage_hri.services.tangram.table import tangram_table
 
 
 async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> None:
-    """Play the tangram once, with the first person who comes; return after the goodbye."""
+    """Play the tangram once, with the first person who comes, or who comes after them; return after the goodbye."""
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
@@ -76,9 +76,9 @@ class _Engine:
             case plans.AwaitPlacement(piece=piece, before=before, timeout=timeout):
                 is_placed = partial(has_been_placed, piece, before)
                 return await self._wait_until(lambda at: is_placed(view.pieces(at)), now + timeout)
-            case plans.AwaitPerson():
+            case plans.AwaitPerson(known=known):
                 await self._wait_until(lambda at: view.person(at) is not None, math.inf)
-                return view.person(self._robot.now())
+                return view.person(self._robot.now(), known)
             case plans.AwaitDeparture(timeout=timeout):
                 return await self._wait_until(lambda at: view.person(at) is None, now + timeout)
             case plans.Pause(seconds=seconds):

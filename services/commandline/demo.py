@@ -24,6 +24,8 @@ from engage_hri.services.console.log import Telling
 
 DEFAULTS = ("recognition.gaze_resolution=table",)
 """Settings for the transcript: its annotators saw that a look went to the table, but rarely to which piece."""
+FOR_YOU = ("collaboration.mode=task",)
+"""Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +60,7 @@ class Tallying:
 
 
 def main(options: Options) -> int:
-    config = options.load(defaults=DEFAULTS)
+    config = options.load(defaults=FOR_YOU if options.you else DEFAULTS)
     _check(options)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)

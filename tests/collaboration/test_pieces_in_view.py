@@ -178,3 +178,13 @@ def test_whatever_is_seen_every_piece_ever_seen_lies_within_what_was_seen(
             assert min(p[axis] for p in places) <= pieces[BLUE.id].position[axis] <= max(p[axis] for p in places)
     change = sight.deadline(now)
     assert change is None or change > now
+
+
+def test_the_person_who_is_known_counts_before_others_while_they_are_there() -> None:
+    view = PiecesInView(steady=0.5)
+    ann, ben = (Entity(id=id, kind="person", position=(1.2, 0.0, 1.2)) for id in ("ann", "ben"))
+    view.see(World(entities=(ann, ben)), 1.0)
+    both = view.person(1.0, "ben")
+    view.see(World(entities=(ann,)), 2.0)
+
+    assert (both, view.person(2.1, "ben"), view.person(2.6, "ben"), view.person(2.6)) == ("ben", "ben", "ann", "ann")

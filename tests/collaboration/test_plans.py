@@ -1,6 +1,6 @@
 """The manager's plans, played by hand: no bus, no clock, no robot."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pytest
 from msgspec.structs import replace
@@ -44,14 +44,19 @@ class Player:
     """The robot and the human. Pieces are laid where they were asked for, but for the first `wrong` times.
 
     hidden: a piece that is laid nowhere, and not seen any more once it has been moved.
+    people: who is there, one after the other; each leaves after eight fragments.
     """
 
-    def __init__(self, *, wrong: int = 0, idle: int = 0, hidden: str = "") -> None:
+    def __init__(
+        self, *, wrong: int = 0, idle: int = 0, hidden: str = "", people: Sequence[str] = ("human",)
+    ) -> None:
         self.pieces = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}
         self.performed: list[TurnFragment] = []
         self._wrong = wrong
         self._idle = idle
         self._hidden = hidden
+        self._people = people
+        self.pauses: list[float] = []
 
     def play(self, plan: Plan[None]) -> list[TurnFragment]:
         answer: object = None
@@ -68,11 +73,14 @@ class Player:
                     answer = self._seen()
                 case AwaitPlacement(piece=piece):
                     answer = self._place(piece)
-                case AwaitPerson():
-                    answer = "human"
+                case AwaitPerson(known=known):
+                    here = self._people[min(len(self.performed) // 8, len(self._people) - 1)]
+                    assert known in ("", *self._people)
+                    answer = here
                 case AwaitDeparture():
                     answer = True
-                case Pause():
+                case Pause(seconds=seconds):
+                    self.pauses.append(seconds)
                     answer = None
         raise AssertionError("the plan does not end")
 
@@ -133,6 +141,18 @@ def scripted(player: Player) -> dict[str, TurnFragment]:
 )
 def test_the_robot_says_what_it_says_in_appendix_b(step: str, words: str) -> None:
     assert spoken(scripted(Player())[step]) == words
+
+
+@pytest.mark.parametrize("mode", ["scripted", "task"])
+def test_when_somebody_leaves_the_robot_goes_on_with_who_is_there_then(mode: str) -> None:
+    player, the_manager = Player(people=("ann", "ben")), manager(arrival=4.0)
+    plan = script(the_manager, appendix_b.turns(the_manager)) if mode == "scripted" else task(the_manager)
+    performed = player.play(plan)
+    spoken_to = [fragment.addressee for fragment in performed]
+
+    assert set(spoken_to[:8]) == {"ann"}
+    assert set(spoken_to[9:]) == {"ben"}  # the ninth may be the second half of a turn that began with ann
+    assert player.pauses.count(4.0) == 2  # each may settle
 
 
 def test_the_fragments_that_look_first_are_those_of_the_transcript() -> None:

@@ -345,6 +345,7 @@ async def test_the_demo_shows_itself_and_takes_its_window_with_it(
             first = await page.value(gaze)
             if you:
                 await sit(page, "zoe")
+                await page.until("window.engage.state.nets.includes('hello')", 40)  # the task, not the transcript
             await page.until(f"{gaze} !== '{first}'", 40)
             await page.until("document.querySelector('.words').textContent.includes('tangram')", 40)
             await page.until("document.querySelectorAll('.net .fired').length", 40)

@@ -29,7 +29,7 @@ def test_nobody_owns_the_head_until_there_is_a_face() -> None:
 
 
 def test_nobody_owns_the_head_since_the_first_ruling() -> None:
-    ruling = Arbiter("robot", GenerationConfig()).rule(861.0)  # clocks do not begin with the robot
+    ruling = Arbiter("robot", GenerationConfig()).rule(861.0)  # seconds of a machine that was on long before
 
     assert (ruling.owner.kind, ruling.since) == ("none", 861.0)
 
