@@ -5,6 +5,7 @@ import webbrowser
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
+from socket import gethostname
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -19,6 +20,7 @@ from engage_hri.services.commandline.process import DONE, forever, run_until_sig
 from engage_hri.services.commandline.sources import Thing, read_source
 
 if TYPE_CHECKING:
+    from engage_hri.services.console.web.guard import Hosts
     from engage_hri.services.recording.reading import Recording
 
 PORT = 8137
@@ -51,6 +53,12 @@ class Options(Connected):
     host: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Where to listen; others than this machine see it all.")
     ] = "127.0.0.1"
+    called: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="A further name in the address of the page, as that of a proxy; may be given again."
+        ),
+    ] = None
     port: Annotated[
         int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0: any that is free.")
     ] = PORT
@@ -109,9 +117,14 @@ def _web() -> ModuleType:
     return server
 
 
-def _hosts(options: Options) -> tuple[str, ...]:
-    """Names by which the page may be called."""
-    return ("127.0.0.1", "localhost", "[::1]") if options.host in LOCAL else ("*",)
+def _hosts(options: Options) -> "Hosts":
+    """Names by which the page may be called: else a page of others could call it by a name of theirs."""
+    from engage_hri.services.console.web.guard import Hosts
+
+    if options.host in LOCAL:
+        return Hosts((*LOCAL, *(options.called or ())))
+    own = gethostname()
+    return Hosts((*LOCAL, options.host, own, f"{own}.local", *(options.called or ())), addresses=True)
 
 
 async def _serve(options: Options, app: Any, token: str, stay: Callable[[], Awaitable[None]]) -> None:
@@ -120,7 +133,7 @@ async def _serve(options: Options, app: Any, token: str, stay: Callable[[], Awai
         async with _web().serving(app, options.host, options.port) as port:
             url = _address(options, port, token)
             print(url, flush=True)
-            if _hosts(options) == ("*",):
+            if options.host not in LOCAL:
                 complain(_open_to_all(options))
             if options.browser:
                 webbrowser.open(url)

@@ -84,6 +84,22 @@ async def test_a_late_subscriber_gets_the_last_state_once(place: Place, apart: b
     assert numbers(await messages(inbox)) == [5]
 
 
+async def test_of_a_state_that_several_publish_the_newest_value_is_the_last_word_for_whoever_comes_late(place: Place):
+    speakers = [(await place.process()).join(f"speaker-{number}") for number in range(5)]
+    reader = (await place.process()).join("reader")
+    for turn in range(5):
+        for number, speaker in enumerate(speakers[turn:] + speakers[:turn]):
+            speaker.publish(keys.WORLD, state(10 * turn + number))
+        with reader.subscribe(keys.WORLD, keys.ANY_FAULT) as inbox:
+            for number, speaker in enumerate(speakers):  # what each hands out has come once this has
+                speaker.publish(keys.fault(f"speaker-{number}"), state(100 + turn))
+            seen: list[int] = []
+            while seen.count(100 + turn) < len(speakers):
+                seen += numbers(await messages(inbox))
+
+        assert [number for number in seen if number < 100][-1] == 10 * turn + 4
+
+
 @pytest.mark.parametrize("apart", [True, False])
 async def test_a_state_that_was_withdrawn_comes_to_nobody_until_it_is_published_again(place: Place, apart: bool):
     process = await place.process()

@@ -3,11 +3,8 @@
 import asyncio
 import importlib.util
 import json
-import os
-import subprocess
-import sys
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +16,7 @@ from engage_hri.schemas.body import RobotState
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
+from tests.console.windows import URL, engage
 
 pytestmark = [
     pytest.mark.real_time,
@@ -35,7 +33,6 @@ NAMELESS = """
 """
 """What a screen reader could not name."""
 EXAMPLE = Path(__file__).parents[2] / "examples" / "browser"
-URL = rb"(http://[^\s]+)"
 
 
 class Place(NamedTuple):
@@ -44,21 +41,6 @@ class Place(NamedTuple):
     url: str
     port: int
     log: Path
-
-
-@contextmanager
-def engage(told: Path, *arguments: str, **settings: str) -> Iterator["subprocess.Popen[bytes]"]:
-    """`engage` as a process that writes what it says to a file."""
-    with told.open("wb") as log:
-        process = subprocess.Popen(
-            (sys.executable, "-m", "engage_hri", *arguments), stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", **settings},
-        )  # fmt: skip
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait(30)
 
 
 @pytest.fixture(scope="module")
@@ -220,8 +202,6 @@ async def test_a_program_gets_the_messages_of_the_types_that_it_asks_for_as_json
         async with session.ws_connect(f"{home}messages?only=no_such") as socket:
             await socket.receive(timeout=60)
             assert socket.close_code == 4400
-        with pytest.raises(aiohttp.WSServerHandshakeError):
-            await session.ws_connect(f"{home}messages", headers={"Origin": "http://elsewhere.example"})
 
 
 @needs_browser
@@ -281,16 +261,6 @@ async def test_who_does_not_draw_gets_one_frame_and_nobody_else_waits(place: Pla
 
     assert set(first["sections"]) > set(second.get("sections", {}))
     assert second["now"] > first["now"] + 0.3
-
-
-@pytest.mark.parametrize("origin", ["http://evil.example", "", "http://localhost:1"])
-async def test_a_page_from_elsewhere_gets_no_frames(place: Place, origin: str) -> None:
-    frames = place.url.replace("http", "ws").replace("/?", "/frames?")
-    async with aiohttp.ClientSession() as session:
-        with pytest.raises(aiohttp.WSServerHandshakeError):
-            await session.ws_connect(frames, headers={"Origin": origin} if origin else {})
-        async with session.get(place.url, headers={"Host": "evil.example"}) as answer:
-            assert answer.status == 400
 
 
 async def test_what_is_no_order_is_told_and_ends_nothing(place: Place) -> None:

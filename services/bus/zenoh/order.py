@@ -30,6 +30,8 @@ KEPT = 4096
 """Number of messages that a process keeps for subscribers that missed them."""
 KEPT_BYTES = 16 * 1024 * 1024
 """Bytes of these messages, of all together; the last is kept whatever its size."""
+STATES_KEPT = 1024
+"""Number of states of which a subscription knows when the newest value was sent."""
 PULSE_FOR: Seconds = 3.0
 """Time after a message for which its count is published, for receivers that lost the last one of a burst."""
 
@@ -292,6 +294,30 @@ class Follower:
         del self._seen[key]
         last = self._last.pop(key, None)
         self.forged += last is not None and last.number > dropped
+
+
+class NewestStates:
+    """The newest value of each state that a subscription has got, of whichever process, and when it was sent.
+
+    Several processes may publish one state, as the world. Each hands out its own last value, at its own pace, and the
+    oldest of these may come last.
+    """
+
+    def __init__(self) -> None:
+        self._newest: dict[str, tuple[str, Seconds]] = {}
+
+    def delivered(self, written: Written, run: str, sent: Seconds) -> None:
+        """Note a value that is delivered. sent: local time at which it was."""
+        if _may_skip(written.key):
+            self._newest.pop(written.key, None)
+            self._newest[written.key] = (run, sent)
+            if len(self._newest) > STATES_KEPT:
+                del self._newest[next(iter(self._newest))]
+
+    def has_overtaken(self, written: Written, run: str, sent: Seconds) -> bool:
+        """Tell whether a value is a state of which another process' newer value has been delivered."""
+        by, newest = self._newest.get(written.key, (run, sent))
+        return by != run and sent < newest
 
 
 def _may_skip(key: str) -> bool:

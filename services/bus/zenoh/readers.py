@@ -13,12 +13,21 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
 from engage_hri.services.bus.payloads import read_payload, unreadable
 from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
-from engage_hri.services.bus.zenoh.order import Counts, Envelope, Follower, Missing, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.order import (
+    Counts,
+    Envelope,
+    Follower,
+    Missing,
+    NewestStates,
+    Past,
+    SentLog,
+    Written,
+)
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.session import Arrived, LoopBridge
 
@@ -46,6 +55,7 @@ class _Reader:
         self.subscription = subscription
         self.kept = tuple(filter(keys.has_past, subscription.patterns))
         self.followers: dict[str, Follower] = {}
+        self.newest = NewestStates()
 
     def follower(self, run: str, there: Collection[str], now: Seconds) -> Follower:
         """The follower of a process, also of one that is new. there: processes that are not forgotten for it."""
@@ -110,6 +120,7 @@ class Readers:
             if isinstance(reader.subscription, Tap):
                 reader.subscription.offer(_sample(written, self._sent.run, now))
             else:
+                reader.newest.delivered(written, self._sent.run, now)
                 reader.subscription.offer(received)
 
     def want(self, key: str) -> bool:
@@ -212,11 +223,14 @@ class Readers:
         if isinstance(message, Unreadable) and reader.bus.name != keys.server_of(written.key):
             return
         if message is not None:
-            envelope = written.envelope
-            received = Received(
-                written.key, message, envelope.source, self._loop.time(), past, run, envelope.number
-            )  # fmt: skip
-            reader.subscription.offer(received)
+            envelope, now = written.envelope, self._loop.time()
+            reader.newest.delivered(written, run, min(now, self._sent_at(written)))
+            reader.subscription.offer(
+                Received(written.key, message, envelope.source, now, past, run, envelope.number)
+            )
+
+    def _sent_at(self, written: Written) -> Seconds:
+        return self._peers.clocks.local(Stamp(written.envelope.clock, written.envelope.sent))
 
     def _decode(self, bus: Bus, written: Written) -> Message | None:
         """Decode a message. A bad one is counted, and told as a fault; returns the notice for its server, if any."""
@@ -265,7 +279,10 @@ class Readers:
             trusted = tuple(one for one in past.written if self._is_trusted(one, run))
             past = msgspec.structs.replace(past, written=trusted)
         for written, is_past in follower.catch_up(past):
-            self._deliver(reader, written, run, past=is_past)
+            # What was answered late is not to be the last word: another process may have said a newer one.
+            is_tap = isinstance(reader.subscription, Tap)
+            if is_tap or not reader.newest.has_overtaken(written, run, self._sent_at(written)):
+                self._deliver(reader, written, run, past=is_past)
         if follower.forged > known:
             LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
         if follower.again:

@@ -4,14 +4,12 @@ import asyncio
 import contextlib
 import secrets
 import socket
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import uvicorn
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from nicegui import ui
-from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.staticfiles import StaticFiles
 
 from engage_hri.schemas.faults import InputRefused
@@ -19,6 +17,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web import orders
 from engage_hri.services.console.web.frames import Viewer, You
+from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.page import build
 from engage_hri.services.console.web.played import PlayedPicture
@@ -38,23 +37,20 @@ MESSAGES = "/messages"
 PAGES = "/pages"
 """Path of pages of others."""
 MOST_PROGRAMS = 100
+NO_TEXT = 1003
+"""Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
 
-def application(window: Window, hosts: Sequence[str], token: str, pages: Path | None = None) -> FastAPI:
-    """The page and its frames, for requests that name one of these hosts; `*` stands for all.
+def application(window: Window, hosts: Hosts, token: str, pages: Path | None = None) -> App:
+    """The page and its frames, for requests that name one of these hosts.
 
-    pages: a folder of pages of somebody else, which may listen to the messages.
-
-    A page of somebody else's in the same browser may call 127.0.0.1, too: the name that it calls, and the page that a
-    WebSocket is from, have to be ours. token: who takes part has it in the address of the page.
+    pages: a folder of pages of somebody else, which may listen to the messages. token: who takes part has it in the
+    address of the page.
     """
-    app = _guarded(hosts)
+    app = _empty()
 
     @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
-        if not _is_ours(browser):
-            await browser.close(4403, "the page is from elsewhere")
-            return
         if window.viewers >= MOST_VIEWERS:
             await browser.close(4429, f"{MOST_VIEWERS} browsers look on already")
             return
@@ -67,9 +63,6 @@ def application(window: Window, hosts: Sequence[str], token: str, pages: Path | 
     @app.websocket(MESSAGES)
     async def messages(program: WebSocket) -> None:
         only = frozenset(filter(None, program.query_params.get("only", "").split(",")))
-        if "origin" in program.headers and not _is_ours(program):  # a program that is no browser has none
-            await program.close(4403, "the page is from elsewhere: --pages serves yours from here")
-            return
         await program.accept()  # who is refused before learns no reason
         if unknown := sorted(only - types()):
             await program.close(4400, f"there is no message of type {unknown[0]!r}"[:120])
@@ -83,18 +76,15 @@ def application(window: Window, hosts: Sequence[str], token: str, pages: Path | 
         app.mount(PAGES, StaticFiles(directory=pages, html=True))
 
     _with_page(app, window.bus.robot)
-    return app
+    return Guarded(app, hosts, {MESSAGES})
 
 
-def recorded(recording: Recording, hosts: Sequence[str]) -> FastAPI:
+def recorded(recording: Recording, hosts: Hosts) -> App:
     """The page, playing a recording."""
-    app, viewers = _guarded(hosts), set[WebSocket]()
+    app, viewers = _empty(), set[WebSocket]()
 
     @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
-        if not _is_ours(browser):
-            await browser.close(4403, "the page is from elsewhere")
-            return
         if len(viewers) >= MOST_VIEWERS:
             await browser.close(4429, f"{MOST_VIEWERS} browsers look on already")
             return
@@ -108,18 +98,23 @@ def recorded(recording: Recording, hosts: Sequence[str]) -> FastAPI:
             viewers.discard(browser)
 
     _with_page(app, recording.robot)
-    return app
+    return Guarded(app, hosts)
 
 
-def _guarded(hosts: Sequence[str]) -> FastAPI:
-    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts])
-    return app
+def _empty() -> FastAPI:
+    return FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
 
-def _is_ours(browser: WebSocket) -> bool:
-    """True if the page that calls is one that this server has sent."""
-    return bool(urlsplit(browser.headers.get("origin", "")).netloc == browser.headers.get("host"))
+async def _text(socket: WebSocket) -> str:
+    """Wait for a text. Raises WebSocketDisconnect when the other side has gone, or sends something else."""
+    message = await socket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message["code"])
+    text = message.get("text")
+    if text is None:
+        await socket.close(NO_TEXT, "send text, not bytes")
+        raise WebSocketDisconnect(NO_TEXT)
+    return str(text)
 
 
 def _with_page(app: FastAPI, robot: str) -> None:
@@ -143,7 +138,7 @@ async def _show(browser: WebSocket, take: Callable[[str], bool], frame: Callable
 
     async def listen() -> None:
         while True:
-            if take(await browser.receive_text()):
+            if take(await _text(browser)):
                 drawn.set()
 
     listening = asyncio.create_task(listen(), name="browser")
@@ -215,7 +210,7 @@ async def _tell(window: Window, program: WebSocket, outbox: Outbox) -> None:
 
     async def listen() -> None:
         while True:  # what it says means nothing
-            await program.receive_text()
+            await _text(program)
 
     window.listeners.add(take)
     listening = asyncio.create_task(listen(), name="program")
@@ -244,13 +239,19 @@ class _Quiet(uvicorn.Server):
         await super().startup(sockets)
         self.stands.set()
 
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Wait for no connection, but let the application end in order: its task would be left behind."""
+        await super().shutdown(sockets)
+        if self.force_exit:
+            await self.lifespan.shutdown()
+
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         yield
 
 
 @contextlib.asynccontextmanager
-async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
+async def serving(app: App, host: str, port: int) -> AsyncIterator[int]:
     """Serve while the body of `async with` runs. port: 0: any that is free. Returns the port.
 
     Raises OSError if the port is taken.
