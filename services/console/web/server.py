@@ -274,6 +274,8 @@ async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
         server.should_exit = True
         server.force_exit = True
         await asyncio.wait([running])
+        if server.stands.is_set():  # who ends by force leaves this out, and then it ends by a traceback, with the loop
+            await server.lifespan.shutdown()
 
 
 def _bound(host: str, port: int) -> socket.socket:
