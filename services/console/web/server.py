@@ -274,7 +274,7 @@ async def serving(app: FastAPI, host: str, port: int) -> AsyncIterator[int]:
         server.should_exit = True
         server.force_exit = True
         await asyncio.wait([running])
-        if server.stands.is_set():  # who ends by force leaves this out, and then it ends by a traceback, with the loop
+        if server.stands.is_set():  # an end by force leaves this out, and the loop then ends it by a traceback
             await server.lifespan.shutdown()
 
 
