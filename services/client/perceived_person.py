@@ -12,7 +12,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
 from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.perceived_actions import PerceivedActions
@@ -190,6 +190,13 @@ class PerceivedPerson:
         self.tell(self._utterances.typed(text, self._bus.stamp(), _ids(to)))
 
     # -- beginnings and ends ------------------------------------------------------------------------------------
+
+    def stamp(self, ago: Seconds = 0.0) -> Stamp:
+        """Return the instant that it is now, as messages have it, for the words of `tell`.
+
+        ago: seconds by which the instant is earlier.
+        """
+        return self._bus.stamp(self._bus.now() - ago)
 
     def begin(self, action: Action, *targets: str) -> None:
         """Begin an action, which goes on until its `end`; a look until the next one.

@@ -154,7 +154,8 @@ def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterabl
     if before:
         yield f"{before} events that began before the recording are not counted"
     if len(lives) > 1:
-        yield f"recognition was restarted {len(lives) - 1} times: what was open then is lost"
+        often = "once" if len(lives) == 2 else f"{len(lives) - 1} times"
+        yield f"recognition was restarted {often}: what was open then is lost"
     if not lives:
         yield "there is no connection event in it"
 

@@ -27,9 +27,10 @@ def opened(path: Path) -> "Recording":
 
     recording = read(path)
     if not recording.is_whole:
+        behind = f", {recording.lost_bytes} bytes behind them are not" if recording.lost_bytes else ""
         complain(
             f"{path}: its recorder did not end in order; {len(recording)} messages until {recording.duration:.2f} s"
-            f" are whole, {recording.lost_bytes} bytes behind them are not"
+            f" are whole{behind}"
         )
     for chunk in recording.damaged:
         complain(f"{path}: a damaged chunk at byte {chunk.offset} is left out: {chunk.reason}")

@@ -124,6 +124,16 @@ def test_a_cut_file_is_read_and_repaired_and_that_is_said(run: Engage, tmp_path:
     assert read(path).is_whole
 
 
+def test_of_a_file_that_ends_between_two_chunks_no_bytes_are_said_to_be_lost(run: Engage, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(bytes_of(told(), is_whole=False))
+
+    shown = run("export", path, "--csv")
+
+    assert "did not end in order" in shown.err
+    assert shown.err.splitlines()[0].endswith(" are whole")
+
+
 def test_exports_lie_beside_the_recording_and_are_not_overwritten(run: Engage, tmp_path: Path) -> None:
     path = saved(tmp_path / "a.mcap", told())
 

@@ -14,6 +14,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.world import World
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline import roster
@@ -38,10 +39,15 @@ def named(message: Message) -> str:
     return ""
 
 
-async def test_the_program_of_the_page_runs_over_zenoh(tmp_path: Path) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    program, endpoint = tmp_path / "people.py", free_endpoint()
-    program.write_text(code)
+def written(program: Path, number: int) -> Path:
+    """A file with a program of the page."""
+    program.write_text(re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[number])
+    return program
+
+
+async def told_by(program: Path, actor: str) -> tuple[list[Message], World]:
+    """What a program of the page says of a person until this one has left, and what the world is then."""
+    endpoint = free_endpoint()
     services = {
         "recognition": roster.service("recognition", Config()),
         "simulation": partial(show_world, world=tangram_world()),
@@ -62,21 +68,42 @@ async def test_the_program_of_the_page_runs_over_zenoh(tmp_path: Path) -> None:
             )
             async for received in inbox:
                 message = received.message
-                if getattr(message, "actor", "ann") == "ann":
+                if getattr(message, "actor", actor) == actor:
                     told.append(message)
                 if isinstance(message, ActorLost):
                     break
             assert await process.wait() == 0
         with robot.worlds() as worlds:
             async for world in worlds:
-                if world.entity("ann") is None and (moved := world.entity("blue-square")) is not None:
+                if world.entity(actor) is None and world.entity("blue-square") is not None:
                     break
+    return told, world
+
+
+def pairs_about(told: list[Message]) -> set[str]:
+    """Words of the adjacency pairs."""
+    return {event.words for event in told if isinstance(event, ConnectionEvent) and event.kind == "adjacency_pair"}
+
+
+async def test_the_program_of_the_page_runs_over_zenoh(tmp_path: Path) -> None:
+    told, world = await told_by(written(tmp_path / "people.py", 0), "ann")
+    moved = world.entity("blue-square")
 
     assert [text for text in map(named, told) if text] == [
         "ActorFound", "+ look seen", "+ speak", "- speak", "Is that blue one mine?", "+ point blue-square",
         "- point blue-square", "+ act blue-square", "- act blue-square", "+ nod", "- nod", "thanks", "- look seen",
         "ActorLost",
     ]  # fmt: skip
-    words = {event.words for event in told if isinstance(event, ConnectionEvent) and event.kind == "adjacency_pair"}
-    assert "Is that blue one mine?" in words
+    assert "Is that blue one mine?" in pairs_about(told)
+    assert moved is not None
     assert moved.position == (0.5, 0.1, 0.72)
+
+
+async def test_the_recognizer_of_the_page_runs_over_zenoh(tmp_path: Path) -> None:
+    told, _ = await told_by(written(tmp_path / "recognizer.py", 1), "ben")
+    words = [(each.text, each.final) for each in told if isinstance(each, Utterance)]
+
+    done = ["ActorFound", "+ speak", "- speak", "Is that mine?", "ActorLost"]
+    assert [text for text in map(named, told) if text] == done
+    assert words == [("", False), ("is that", False), ("Is that mine?", True)]
+    assert "Is that mine?" in pairs_about(told)

@@ -154,3 +154,24 @@ async def test_all_letters_stand_out_from_what_they_are_drawn_on(place: Place) -
             ratios = {pair: await page.value(CONTRAST % pair) for pair in TEXTS}
 
             assert {pair: ratio for pair, ratio in ratios.items() if ratio < 4.5} == {}
+
+
+@needs_browser
+async def test_kinds_and_people_are_told_apart_without_colours_and_signs_of_the_net_are_explained(
+    place: Place,
+) -> None:
+    drawn = """window.drawn = new Set(); { const own = CanvasRenderingContext2D.prototype.fillText;
+      CanvasRenderingContext2D.prototype.fillText = function (text, ...more) {
+        if (this.canvas.closest('#measures')) window.drawn.add(text);
+        return own.call(this, text, ...more);
+      }; }"""
+    async with opened(place) as page:
+        await page.value(drawn)
+        await sit(page, "wim")
+        legend = "document.querySelectorAll('#measures .legend b')"
+        marks = await page.value(f"[...{legend}].map((each) => each.textContent)")
+        await page.until("window.drawn.has('wim')")
+        await page.until(f"{marks}.some((each) => window.drawn.has(each))")
+
+        assert len(set(marks)) == 4
+        assert "[ stroke start" in await page.value("document.querySelector('#net .legend').textContent")

@@ -328,3 +328,4 @@ async def test_the_demo_shows_itself_and_takes_its_window_with_it(
             demo.terminate()
             assert demo.wait(30) == 143
             await page.until("document.querySelector('.away').textContent.includes('does not answer')", 40)
+    assert "Traceback" not in (tmp_path / "demo").read_text()

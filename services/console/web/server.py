@@ -275,6 +275,8 @@ async def serving(app: App, host: str, port: int) -> AsyncIterator[int]:
         server.should_exit = True
         server.force_exit = True
         await asyncio.wait([running])
+        if server.stands.is_set():  # an end by force leaves this out, and the loop then ends it by a traceback
+            await server.lifespan.shutdown()
 
 
 def _bound(host: str, port: int) -> socket.socket:

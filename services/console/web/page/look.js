@@ -1,9 +1,10 @@
 // Colours and sizes that several pictures share. Colours of the theme are read from the style sheet.
+// Kinds of connection events: name, colour, and the mark that tells them apart where there is only a dot.
 export const KINDS = [
-  ["directed_gaze", "directed gaze", "--gaze"],
-  ["mutual_facial_gaze", "mutual gaze", "--mutual"],
-  ["adjacency_pair", "adjacency pair", "--pair"],
-  ["backchannel", "backchannel", "--back"],
+  ["directed_gaze", "directed gaze", "--gaze", "●"],
+  ["mutual_facial_gaze", "mutual gaze", "--mutual", "■"],
+  ["adjacency_pair", "adjacency pair", "--pair", "▲"],
+  ["backchannel", "backchannel", "--back", "◆"],
 ];
 
 const PIECES = {

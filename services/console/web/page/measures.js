@@ -1,9 +1,11 @@
 // Engagement, MTBCE and delays over the whole time.
-import { clock, color, KINDS, sized } from "./look.js";
+import { clock, color, element, KINDS, sized } from "./look.js";
 
 export function measures(panel) {
   const canvas = panel.querySelector("canvas");
   const reasons = panel.querySelector(".reasons");
+  panel.querySelector(".legend").replaceChildren(
+    ...KINDS.map(([, name, shade, mark]) => element("span", {}, element("b", { style: `color: var(${shade})` }, mark), ` ${name}`)));
   let stale = true;
   new ResizeObserver(() => (stale = true)).observe(canvas);
   let theme = null;
@@ -34,7 +36,7 @@ function draw(canvas, state) {
   const part = height / 3;
   context.font = "12px system-ui, sans-serif";
   const left = 38;
-  const x = (time) => left + (time / end) * (width - left - 8);
+  const x = (time) => left + (Math.max(0, time) / end) * (width - left - 8); // what was before the window is at its edge
   const charts = [
     ["engagement", 1, persons.map((each, index) => [each.engagement, ["--gaze", "--pair", "--point"][index % 3]])],
     ["MTBCE (s)", ceiling(everyone?.mtbce ?? [], 5), [[everyone?.mtbce ?? [], "--mutual"]]],
@@ -42,15 +44,16 @@ function draw(canvas, state) {
   charts.forEach(([name, most, courses], index) => {
     const y = frame(context, name, most, index * part, part, left, width);
     for (const [course, shade] of courses) curve(context, course, x, y, color(shade));
+    if (!index) persons.forEach((each, number) => signed(context, each, x, y, color(courses[number][1]), number));
   });
   const most = ceiling(delays, 2);
   const y = frame(context, "delays (s)", most, 2 * part, part, left, width);
-  const shades = new Map(KINDS.map(([kind, , shade]) => [kind, shade]));
+  const looks = new Map(KINDS.map(([kind, , shade, mark]) => [kind, [shade, mark]]));
+  context.textAlign = "center";
   for (const [at, delay, kind] of delays) {
-    context.fillStyle = color(shades.get(kind));
-    context.beginPath();
-    context.arc(x(at), y(Math.min(delay, most)), 3, 0, 7);
-    context.fill();
+    const [shade, mark] = looks.get(kind);
+    context.fillStyle = color(shade);
+    context.fillText(mark, x(at), y(Math.min(delay, most)) + 4);
   }
   context.fillStyle = color("--quiet");
   context.textAlign = "right";
@@ -79,6 +82,15 @@ function frame(context, name, most, top, size, left, width) {
   context.textAlign = "left";
   context.fillText(name, left, top + 12);
   return (value) => low - (Math.max(0, value) / most) * (low - high);
+}
+
+// The name of a person at the end of their curve; several take turns above and below.
+function signed(context, { actor, engagement }, x, y, shade, number) {
+  if (!engagement.length) return;
+  const [at, value] = engagement.at(-1);
+  context.fillStyle = shade;
+  context.textAlign = "right";
+  context.fillText(actor, Math.max(x(at) - 3, 90), y(value) + (number % 2 ? 13 : -4));
 }
 
 function curve(context, course, x, y, shade) {

@@ -6,11 +6,13 @@ const ROW = 34;
 const NAMES = 138;
 const LEFT = 34; // with the tokens at rest
 const TOP = 40;
+const LEGEND = ["s start", "r ready", "[ stroke start", "* stroke", "] stroke end", "x relax", "e end", "m mark", "● token", "above: seconds as planned"];
 const WAY = 320; // ms that a token is shown on its way
 
 export function net(panel) {
   const place = panel.querySelector(".net");
   const choose = panel.querySelector(".choose");
+  panel.querySelector(".legend").replaceChildren(...LEGEND.map((each) => element("span", {}, each)));
   let shown = null; // { block, layout, svg, spots, bars }
   let wanted = ""; // the block that somebody has chosen
   const buttons = new Map();

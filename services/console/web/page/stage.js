@@ -7,7 +7,7 @@ const MAIN = [
   ["above", "From above", `<svg class="map" role="group" aria-label="The table from above"></svg>`],
   ["events", "Connection events", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["behaviors", "Behaviors: planned and measured", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
-  ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0" role="group" aria-labelledby="net-title"></div>`],
+  ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0" role="group" aria-labelledby="net-title"></div><p class="legend"></p>`],
   ["references", "References", `<div class="references"></div>`],
   ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" aria-labelledby="notes-title" tabindex="0"></ul>`],
 ];
@@ -16,7 +16,7 @@ const SIDE = [
   ["wizard", "The robot by hand", `<div class="wizard"></div>`],
   ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><p class="unseen" role="status"></p>`],
   ["head", "Who owns the head", `<div class="head"></div>`],
-  ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="reasons"></p>`],
+  ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p><p class="reasons"></p>`],
   ["health", "Services", `<ul class="health"></ul>`],
 ];
 
