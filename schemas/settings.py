@@ -32,6 +32,6 @@ def _is_plain(value: object) -> bool:
     match value:
         case dict():
             return all(isinstance(name, str) and _is_plain(one) for name, one in value.items())
-        case list():
+        case list() | tuple():
             return all(map(_is_plain, value))
     return value is None or isinstance(value, bool | int | float | str)

@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import quote
 
 import typer
 
@@ -13,6 +14,7 @@ from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.process import DONE
 
 if TYPE_CHECKING:
+    from engage_hri.services.recording import annotations
     from engage_hri.services.recording.reading import Recording
 
 ENDINGS = {
@@ -89,13 +91,12 @@ def _has_ffmpeg() -> bool:
 def _make(name: str, path: Path, recording: "Recording", options: Options) -> Path:
     """Make one file. Returns where it is."""
     from engage_hri.services.recording import annotations, settings, tiers
+    from engage_hri.services.recording.reading import BILLION
 
     match name:
         case "elan":
-            date = recording.facts.get("began at", time.strftime("%Y-%m-%dT%H:%M:%S+00:00", time.gmtime(0)))
-            film = path.with_suffix(".mp4")
-            media = film.name if options.film or film.exists() else ""
-            path.write_bytes(annotations.eaf(tiers.tiers(recording), date=date, media=media))
+            date = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(recording.wall / BILLION))
+            path.write_bytes(annotations.eaf(tiers.tiers(recording), date=date, media=_media(path, options)))
         case "textgrid":
             text = annotations.textgrid(tiers.tiers(recording), recording.duration)
             path.write_text(text, encoding="utf-8")
@@ -109,6 +110,20 @@ def _make(name: str, path: Path, recording: "Recording", options: Options) -> Pa
         case _:
             _draw(name, path, recording, options)
     return path
+
+
+def _media(path: Path, options: Options) -> "annotations.Media | None":
+    """The film that belongs to annotations: one that is made with them, or lies beside them already.
+
+    ELAN shows no `.gif`, and a film of another speed has other times.
+    """
+    from engage_hri.services.recording.annotations import Media
+
+    film = _path(options, "film") if options.out is None else path.with_suffix(".mp4")
+    is_its = options.film and options.speed == 1.0
+    if film.suffix != ".mp4" or not (is_its or (film.exists() and not options.film)):
+        return None
+    return Media(film.resolve().as_uri(), f"./{quote(film.name)}")
 
 
 def lines_of(recording: "Recording") -> str:

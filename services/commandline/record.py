@@ -4,6 +4,7 @@ import asyncio
 import os
 import time
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -94,6 +95,6 @@ def _facts(options: Options) -> dict[str, str]:
     """Facts for the beginning of the file that only its user knows, and the version."""
     told = {
         "engage": installed_version(), "condition": options.condition, "participant": options.participant,
-        "notes": "\n".join(options.note or ()), "began at": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "notes": "\n".join(options.note or ()), "began at": datetime.now().astimezone().isoformat(timespec="seconds"),
     }  # fmt: skip
     return {name: value for name, value in told.items() if value}

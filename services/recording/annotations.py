@@ -3,41 +3,52 @@
 import csv
 import io
 from collections.abc import Sequence
+from typing import NamedTuple
+from unicodedata import category
 
 from lxml import etree
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import printable
-from engage_hri.services.recording.tiers import Tier, milliseconds, rows
+from engage_hri.services.recording.lanes import Tier, rows
 
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 _FORMAT = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
+MICROSECONDS = 1_000_000
 COLUMNS = ("tier", "actor", "begin", "end", "value")
 
 
-def eaf(tiers: Sequence[Tier], *, date: str, media: str = "", author: str = "engage") -> bytes:
-    """An ELAN document. date: of the recording, ISO 8601. media: address of a film of it; empty: none."""
+class Media(NamedTuple):
+    """A film of a recording, from its beginning on and as fast as it was. relative: address from the document."""
+
+    address: str
+    relative: str
+
+
+def eaf(tiers: Sequence[Tier], *, date: str, media: Media | None = None, author: str = "engage") -> bytes:
+    """An ELAN document. date: of the recording, as XML Schema has it. media: a film of it."""
     root = etree.Element("ANNOTATION_DOCUMENT", nsmap={"xsi": _XSI})
     for name, value in (("AUTHOR", author), ("DATE", date), ("FORMAT", "3.0"), ("VERSION", "3.0")):
         root.set(name, value)
     root.set(f"{{{_XSI}}}noNamespaceSchemaLocation", _FORMAT)
     header = etree.SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")
-    if media:
-        mime = "video/mp4" if media.endswith(".mp4") else "image/gif"
-        etree.SubElement(header, "MEDIA_DESCRIPTOR", MEDIA_URL=media, MIME_TYPE=mime, RELATIVE_MEDIA_URL=media)
-    times = sorted({milliseconds(at) for tier in tiers for one in tier.annotations for at in (one.begin, one.end)})
+    if media is not None:
+        address, relative = media
+        etree.SubElement(
+            header, "MEDIA_DESCRIPTOR", MEDIA_URL=address, MIME_TYPE="video/mp4", RELATIVE_MEDIA_URL=relative
+        )  # fmt: skip
+    times = sorted({at for tier in tiers for one in tier.annotations for at in one.milliseconds})
     slots = {at: f"ts{number}" for number, at in enumerate(times, 1)}
     order = etree.SubElement(root, "TIME_ORDER")
     for at, slot in slots.items():
         etree.SubElement(order, "TIME_SLOT", TIME_SLOT_ID=slot, TIME_VALUE=str(at))
     number = 0
-    for tier in tiers:
+    for tier, name in zip(tiers, _unique([_xml(tier.name) for tier in tiers]), strict=True):
         element = etree.SubElement(
-            root, "TIER", LINGUISTIC_TYPE_REF="default-lt", PARTICIPANT=_xml(tier.actor), TIER_ID=_xml(tier.name)
+            root, "TIER", LINGUISTIC_TYPE_REF="default-lt", PARTICIPANT=_xml(tier.actor), TIER_ID=name
         )  # fmt: skip
         for one in tier.annotations:
             number += 1
-            begin, end = (slots[milliseconds(at)] for at in (one.begin, one.end))
+            begin, end = (slots[at] for at in one.milliseconds)
             holder = etree.SubElement(element, "ANNOTATION")
             annotation = etree.SubElement(
                 holder, "ALIGNABLE_ANNOTATION", ANNOTATION_ID=f"a{number}", TIME_SLOT_REF1=begin, TIME_SLOT_REF2=end
@@ -49,6 +60,18 @@ def eaf(tiers: Sequence[Tier], *, date: str, media: str = "", author: str = "eng
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
 
+def _unique(names: Sequence[str]) -> list[str]:
+    """The same names, each with a number behind it if there was one like it."""
+    found: dict[str, None] = {}
+    for name in names:
+        new, number = name, 1
+        while new in found:
+            number += 1
+            new = f"{name} ({number})"
+        found[new] = None
+    return list(found)
+
+
 def _xml(text: str) -> str:
     """Text without what XML cannot hold."""
     return "".join(
@@ -58,36 +81,57 @@ def _xml(text: str) -> str:
 
 def textgrid(tiers: Sequence[Tier], duration: Seconds) -> str:
     """A TextGrid in Praat's long form. Each tier fills the whole time; what nothing is said of is empty."""
-    end = max([duration, *(one.end for tier in tiers for one in tier.annotations)], default=0.0)
+    filled = [_intervals(tier) for tier in tiers]
+    end = max([_micro(duration), 1, *(intervals[-1][1] for intervals in filled if intervals)])
     lines = [
-        'File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end:.6f}",
+        'File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {_shown(end)}",
         "tiers? <exists>", f"size = {len(tiers)}", "item []:",
     ]  # fmt: skip
-    for number, tier in enumerate(tiers, 1):
-        intervals: list[tuple[Seconds, Seconds, str]] = []
-        at = 0.0
-        for one in tier.annotations:
-            if one.begin - at > 5e-7:
-                intervals.append((at, one.begin, ""))
-            begin = max(at, one.begin)
-            intervals.append((begin, max(one.end, begin + 1e-6), one.value))
-            at = intervals[-1][1]
-        if end - at > 5e-7:
+    names = _unique([_line(tier.name) for tier in tiers])
+    for number, (intervals, name) in enumerate(zip(filled, names, strict=True), 1):
+        at = intervals[-1][1] if intervals else 0
+        if end > at:
             intervals.append((at, end, ""))
         lines += [
-            f"    item [{number}]:", '        class = "IntervalTier"', f"        name = {_quoted(tier.name)}",
-            "        xmin = 0", f"        xmax = {end:.6f}", f"        intervals: size = {len(intervals)}",
+            f"    item [{number}]:", '        class = "IntervalTier"', f"        name = {_quoted(name)}",
+            "        xmin = 0", f"        xmax = {_shown(end)}", f"        intervals: size = {len(intervals)}",
         ]  # fmt: skip
         for place, (begin, until, value) in enumerate(intervals, 1):
             lines += [
-                f"        intervals [{place}]:", f"            xmin = {begin:.6f}",
-                f"            xmax = {until:.6f}", f"            text = {_quoted(value)}",
+                f"        intervals [{place}]:", f"            xmin = {_shown(begin)}",
+                f"            xmax = {_shown(until)}", f"            text = {_quoted(value)}",
             ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
+def _intervals(tier: Tier) -> list[tuple[int, int, str]]:
+    """Intervals in microseconds without gaps, from 0 to the end of the last annotation."""
+    intervals: list[tuple[int, int, str]] = []
+    at = 0
+    for one in tier.annotations:
+        begin = max(at, _micro(one.begin))
+        if begin > at:
+            intervals.append((at, begin, ""))
+        at = max(_micro(one.end), begin + 1)
+        intervals.append((begin, at, one.value))
+    return intervals
+
+
+def _micro(at: Seconds) -> int:
+    return round(at * MICROSECONDS)
+
+
+def _shown(at: int) -> str:
+    return f"{at // MICROSECONDS}.{at % MICROSECONDS:06}"
+
+
 def _quoted(text: str) -> str:
-    return '"' + printable(text).replace("\n", " ").replace('"', '""') + '"'
+    return '"' + _line(text).replace('"', '""') + '"'
+
+
+def _line(text: str) -> str:
+    """Text on one line, without control characters. What joins letters stays: other scripts are written with it."""
+    return "".join(" " if category(letter) in ("Cc", "Zl", "Zp") else letter for letter in text)
 
 
 def table(tiers: Sequence[Tier]) -> str:

@@ -43,7 +43,7 @@ class Ongoing:
                 if len(self._actions) > MOST:
                     del self._actions[next(iter(self._actions))]
             case ActionEnded():
-                ended = [key for key, begun in self._actions.items() if _ends(event, begun)]
+                ended = [key for key, begun in self._actions.items() if ends(event, begun)]
                 for key in ended:
                     del self._actions[key]
             case ActorFound():
@@ -56,7 +56,7 @@ class Ongoing:
         self._actions = {which(begun): begun for begun in actions}
 
 
-def _ends(ended: ActionEnded, begun: ActionBegan) -> bool:
+def ends(ended: ActionEnded, begun: ActionBegan) -> bool:
     """Tell whether an end is that of this action. One without targets ends all that are else the same."""
     is_same = ended.action == begun.action and (ended.behavior == begun.behavior or ended.action == "look")
     return is_same and ended.targets in ((), begun.targets)

@@ -15,9 +15,10 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.recording.annotations import eaf, table, textgrid
+from engage_hri.services.recording.annotations import Media, eaf, table, textgrid
+from engage_hri.services.recording.lanes import Annotation, Tier, apart
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.tiers import Annotation, Tier, _apart, tiers
+from engage_hri.services.recording.tiers import tiers
 from tests.recording.files import recording, sample
 
 DATE = "2026-11-24T17:00:00+00:00"
@@ -60,7 +61,7 @@ def test_looks_of_both_sides_are_those_that_were_told(task: Recording) -> None:
 
 def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
     made = tiers(task)
-    (tmp_path / "a.eaf").write_bytes(eaf(made, date=DATE, media="a.mp4"))
+    (tmp_path / "a.eaf").write_bytes(eaf(made, date=DATE, media=Media("file:///films/a.mp4", "./a.mp4")))
 
     document = pympi.Elan.Eaf(str(tmp_path / "a.eaf"))
 
@@ -68,9 +69,9 @@ def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_
     for tier in made:
         found = sorted(document.get_annotation_data_for_tier(tier.name))
         assert [(begin, end, value) for begin, end, value, *_ in found] == [
-            (round(one.begin * 1000), round(one.end * 1000), one.value) for one in tier.annotations
+            (*one.milliseconds, one.value) for one in tier.annotations
         ]
-    assert document.get_linked_files()[0]["MEDIA_URL"] == "a.mp4"
+    assert document.get_linked_files()[0]["MEDIA_URL"] == "file:///films/a.mp4"
 
 
 def test_a_textgrid_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
@@ -106,19 +107,19 @@ annotations = st.builds(
 
 @given(st.lists(annotations, max_size=30))
 def test_nothing_overlaps_within_a_tier_and_nothing_is_lost(given: list[Annotation]) -> None:
-    apart = list(_apart("a", "b", given))
+    lanes = list(apart("a", "b", given))
 
-    for tier in apart:
+    for tier in lanes:
         ends = [one.end for one in tier.annotations]
         assert all(one.begin >= end - 1e-9 for one, end in zip(tier.annotations[1:], ends, strict=False))
-    kept = sorted((one.begin, one.end) for tier in apart for one in tier.annotations)
+    kept = sorted((one.begin, one.end) for tier in lanes for one in tier.annotations)
     assert kept == sorted((one.begin, one.end) for one in given)
 
 
 @given(st.lists(annotations, max_size=10), st.text(max_size=20))
 def test_any_text_and_any_times_are_valid_files(given: list[Annotation], text: str) -> None:
     made = [Tier(tier.name, "a", tuple(Annotation(one.begin, one.end, text) for one in tier.annotations))
-            for tier in _apart("a", "b", given)]  # fmt: skip
+            for tier in apart("a", "b", given)]  # fmt: skip
 
     from lxml import etree
 
