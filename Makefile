@@ -12,7 +12,7 @@ demo: $(READY)
 # mypy keeps one processor busy for as long as others would wait for it: it runs beside the tests.
 test: style
 	@$(BIN)/mypy --no-error-summary & types=$$!; \
-	$(BIN)/pytest -n auto --dist loadfile $(ARGS); tests=$$?; \
+	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder $(ARGS); tests=$$?; \
 	wait $$types && exit $$tests
 
 lint: style
@@ -26,7 +26,7 @@ style: $(READY)
 coverage: $(READY)
 	@PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install -qq -e '.[coverage]'
 	@$(BIN)/coverage erase
-	@$(BIN)/coverage run -m pytest -n auto --dist loadfile $(ARGS)
+	@$(BIN)/coverage run -m pytest -n auto --dist loadfile --no-loadscope-reorder $(ARGS)
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report
 
