@@ -1,6 +1,7 @@
 """Every async test runs on the virtual clock unless it asks for real time, and fails if it leaves a task behind.
 
-Property tests try the same examples each time. To search for new ones: `pytest --hypothesis-profile=search`.
+Property tests try the same examples each time, and of many only a share (`random_cases.py`). To try all of them:
+`pytest --hypothesis-profile=long`. To search for new ones: `pytest --hypothesis-profile=search`.
 """
 
 import asyncio
@@ -23,6 +24,7 @@ pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generat
 
 # No deadline: how long an example takes on a busy machine says nothing.
 settings.register_profile("same", derandomize=True, database=None, deadline=None)
+settings.register_profile("long", parent=settings.get_profile("same"))
 settings.register_profile("search", parent=settings.get_profile("default"), deadline=None)
 settings.load_profile("same")
 
