@@ -3,8 +3,9 @@
 
 BIN := .venv/bin
 READY := .venv/.ready
+PROFILE := same
 
-.PHONY: demo test lint style docs generate coverage bench reachy-mini clean
+.PHONY: demo test test-long lint style docs generate coverage bench reachy-mini clean
 
 demo: $(READY)
 	@$(BIN)/engage demo $(ARGS)
@@ -12,8 +13,12 @@ demo: $(READY)
 # mypy keeps one processor busy for as long as others would wait for it: it runs beside the tests.
 test: style
 	@$(BIN)/mypy --no-error-summary & types=$$!; \
-	$(BIN)/pytest -n auto --dist loadfile $(ARGS); tests=$$?; \
+	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) $(ARGS); tests=$$?; \
 	wait $$types && exit $$tests
+
+# All random cases; `make test` tries one of three (tests/random_cases.py).
+test-long: PROFILE := long
+test-long: test
 
 lint: style
 	@$(BIN)/mypy --no-error-summary
@@ -26,7 +31,7 @@ style: $(READY)
 coverage: $(READY)
 	@PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install -qq -e '.[coverage]'
 	@$(BIN)/coverage erase
-	@$(BIN)/coverage run -m pytest -n auto --dist loadfile $(ARGS)
+	@$(BIN)/coverage run -m pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=long $(ARGS)
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report
 

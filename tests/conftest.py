@@ -1,9 +1,11 @@
 """Every async test runs on the virtual clock unless it asks for real time, and fails if it leaves a task behind.
 
-Property tests try the same examples each time. To search for new ones: `pytest --hypothesis-profile=search`.
+Property tests try the same examples each time, and of many only a share (`random_cases.py`). To try all of them:
+`pytest --hypothesis-profile=long`. To search for new ones: `pytest --hypothesis-profile=search`.
 """
 
 import asyncio
+import gc
 import logging
 import os
 import signal
@@ -16,11 +18,13 @@ from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
+from tests.longest import LONGEST
 
 pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generation.head_stories")
 
 # No deadline: how long an example takes on a busy machine says nothing.
 settings.register_profile("same", derandomize=True, database=None, deadline=None)
+settings.register_profile("long", parent=settings.get_profile("same"))
 settings.register_profile("search", parent=settings.get_profile("default"), deadline=None)
 settings.load_profile("same")
 
@@ -43,6 +47,18 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
     config.addinivalue_line("markers", "each_bus: runs twice: virtual time (memory bus) and wall clock (Zenoh)")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Long files first: whoever gets the last ones ends soon after the others."""
+    places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Leave the tests themselves out of each later search for garbage: half a million objects, which all stay."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_asyncio_loop_factories(

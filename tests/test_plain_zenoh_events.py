@@ -15,6 +15,7 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
+from tests.random_cases import share_of
 from tests.test_examples import example
 
 plain = example("plain_zenoh_events")
@@ -137,7 +138,7 @@ STEPS = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=500)
+@settings(max_examples=share_of(500))
 @given(st.lists(STEPS, min_size=8, max_size=30))
 def test_it_tells_what_the_client_tells_through_cuts_and_restarts(steps: list[tuple[Any, ...]]):
     link = Link()

@@ -15,6 +15,7 @@ from engage_hri.services.console import nets
 from engage_hri.services.console.live import LiveNets, NetLog
 from engage_hri.services.console.net_drawing import drawing, legend, picture
 from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
+from tests.random_cases import share_of
 
 AT = Stamp("clock", 0.0)
 GAZE, POINT, SPEECH = "gaze-1", "point-1", "speech-1"
@@ -192,7 +193,7 @@ def any_nets(draw: st.DrawFn) -> NetPlanned:
     )  # fmt: skip
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share_of(100), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(any_nets(), any_nets(), st.integers(1, 120), st.integers(1, 40))
 def test_whatever_is_told_is_drawn_within_the_terminal(
     first: NetPlanned, second: NetPlanned, width: int, height: int

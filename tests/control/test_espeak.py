@@ -24,6 +24,7 @@ from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynth
 from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.sounding import EspeakVoice
 from engage_hri.services.control.voice.synthesis import Phrase
+from tests.random_cases import trials
 
 pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
 
@@ -32,6 +33,8 @@ ENGINE = EspeakSynthesizer(EspeakSettings())
 
 
 class TestEspeakWithTheTorso(BodyContract):
+    seeds = trials()
+
     def make(self):
         torso = SimulatedBody()
         parts = tuple(part for part in torso.capabilities.parts if part != "voice")

@@ -40,6 +40,7 @@ from engage_hri.services.control.testing import (
 )
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
+from tests.random_cases import share_of
 
 TARGETS = ("human", "near-right", "far-left")
 HANDS: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
@@ -240,7 +241,7 @@ async def test_a_plan_is_performed_as_it_was_rehearsed(
         assert taken == pytest.approx([phase.natural for phase in told[id]], abs=1e-3), id
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(share_of(24)))
 async def test_what_is_on_target_says_so_and_stays_there_whatever_the_trunk_does(
     body: SimulatedBody, seed: int
 ) -> None:
@@ -278,7 +279,7 @@ async def test_what_is_on_target_says_so_and_stays_there_whatever_the_trunk_does
     assert violations(recording, body.capabilities.joints) == []
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", range(share_of(16)))
 async def test_no_joint_leaves_its_limits_in_a_hurry_while_the_trunk_moves(body: SimulatedBody, seed: int) -> None:
     """Looks, pointings and nods that are to be quicker than by themselves, while the trunk leans to and fro."""
     chance, stages = Random(f"hurry {seed}"), []

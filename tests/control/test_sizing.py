@@ -16,6 +16,7 @@ from engage_hri.services.control.testing import WORLD, Recording, recorded, time
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.sizing import SIZES
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 
 BEAT = Gesture(id="beat", lexeme="BEAT")
 NOD = Head(id="nod", lexeme="NOD")
@@ -132,7 +133,7 @@ PACES = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(behavior=st.sampled_from(MOVING), paces=PACES, held=st.booleans())
 def test_no_pace_breaks_limits_or_loses_a_point(
     behavior: BlockBehavior, paces: list[tuple[float, str, float]], held: bool

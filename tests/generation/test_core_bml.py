@@ -31,11 +31,12 @@ from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.still import tangram_world
+from tests.random_cases import share_of
 from tests.schemas.grammar import violations
 
 WORLD = tangram_world()
 OBJECTS = [entity.id for entity in WORLD.entities if entity.kind == "object"]
-FEW = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+FEW = settings(max_examples=share_of(50), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 MISESTIMATED: Seconds = 2.0
 """By how much a block may take longer than is expected of a body that is at home before each behavior."""
 

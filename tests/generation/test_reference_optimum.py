@@ -13,6 +13,7 @@ from engage_hri.services.generation.references.pairs import GESTURES
 from engage_hri.services.generation.references.policy import Choices, choose
 from tests.generation.oracle import Best, Problem, optimum, optimum_by_gestures
 from tests.generation.tables import option, refer
+from tests.random_cases import share_of
 
 POINT = "directed_gaze_with_pointing"
 NAMES = ("a", "b", "c", "d", "e")
@@ -75,7 +76,7 @@ def assert_best(problem: Problem, best: Best | None) -> None:
     assert tuple(pairs_of(choices)) == best[2]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(problems(1, 2, 5))
 def test_of_one_or_two_references_the_best_of_all_sequences_is_chosen(problem: Problem) -> None:
     assert_best(problem, optimum(problem))
@@ -96,7 +97,7 @@ def test_of_four_references_with_two_phrases_the_best_of_all_sequences_is_chosen
     assert_best(problem, optimum(problem))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(problems(4, 5, 5))
 def test_of_five_references_with_five_phrases_the_best_of_all_sequences_of_gestures_is_chosen(
     problem: Problem,
@@ -104,7 +105,7 @@ def test_of_five_references_with_five_phrases_the_best_of_all_sequences_of_gestu
     assert_best(problem, optimum_by_gestures(problem))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(problems(1, 4, 4))
 def test_what_holds_for_every_choice(problem: Problem) -> None:
     choices = chosen(problem)
@@ -128,7 +129,7 @@ def test_what_holds_for_every_choice(problem: Problem) -> None:
             assert pair.reason
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(problems(1, 3, 4), st.randoms(use_true_random=False))
 def test_the_order_of_the_options_decides_nothing_but_ties(problem: Problem, random: object) -> None:
     def shuffled(reference: Reference) -> Reference:

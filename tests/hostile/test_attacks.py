@@ -6,13 +6,14 @@ from engage_hri.services.commandline.hostile import attack
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.hostile.trial import Kind, Report
 from tests.hostile.own import CarelessBody, broken_client, deaf_client, good_client
+from tests.random_cases import share_of
 
 
 def told(reports: list[Report]) -> str:
     return "\n".join(f"seed {report.attack.seed}: {line}" for report in reports for line in report.wrong)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(share_of(4)))
 def test_random_messages_end_nothing_and_leave_nothing_behind(seed: int) -> None:
     report = attack(seed, kinds=("messages",), seconds=10.0)
 
@@ -29,7 +30,7 @@ def test_a_lying_body_and_cuts_leave_each_request_with_one_outcome(seed: int) ->
     assert report.counts["honest requests"] > 5
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(share_of(3)))
 def test_a_body_of_ones_own_is_tried_behind_the_real_control(seed: int) -> None:
     report = attack(seed, kinds=("messages", "body"), seconds=10.0, body=SimulatedBody, client=good_client)
 

@@ -18,6 +18,7 @@ from tests.judge.reading import Place, Term, read, term
 from tests.judge.shrinking import shrink
 from tests.judge.story import Deed, Story
 from tests.judge.story import read as story_of
+from tests.random_cases import share_of
 
 ENFORCED = (
     "hang", "crash", "end", "points", "losses", "required", "words", "wrong length", "out of turn", "parts",
@@ -36,9 +37,9 @@ MANY: dict[tuple[Kind, bool], int] = {
     ("alone", True): 9, ("streams", True): 6, ("webs", False): 24, ("webs", True): 12,
 }  # fmt: skip
 """Number of stories of each kind, without and with a body that has faults; more by `python -m tests.judge`."""
-PREDICTED_BESIDE_OTHERS, OFF_BESIDE_OTHERS = 60, 0.1
+PREDICTED_BESIDE_OTHERS, OFF_BESIDE_OTHERS = share_of(60), 0.1
 """The same of stories with several blocks, and the share of blocks there."""
-PREDICTED, OTHERS = 200, 31
+PREDICTED, OTHERS = share_of(200), 31
 """Number of single blocks of which the predictions are judged, and their seed."""
 HELD: dict[tuple[Kind, bool], int] = {
     ("alone", False): 20,
@@ -58,7 +59,7 @@ WHOLE: dict[Kind, tuple[int, ...]] = {
 @pytest.mark.parametrize(("kind", "faults"), MANY)
 def test_no_story_breaks_a_law_that_is_enforced(kind: Kind, faults: bool) -> None:
     found = []
-    for number in range(MANY[kind, faults]):
+    for number in range(share_of(MANY[kind, faults])):
         story = generate.story(SEED, number, kind, faults=faults)
         record = playing.play(story, asks=kind == "sentences")
         assert record.told, story.seed
@@ -93,7 +94,7 @@ def test_points_of_blocks_in_streams_come_when_predicted_mostly() -> None:
 @pytest.mark.parametrize(("kind", "faults"), HELD)
 def test_what_is_held_makes_nothing_late_and_goes_on_where_it_stopped(kind: Kind, faults: bool) -> None:
     found = []
-    for number in range(HELD[kind, faults]):
+    for number in range(share_of(HELD[kind, faults])):
         story = generate.story(SEED, number, kind, faults=faults, holds=True)
         record = playing.play(story)
         assert record.steered, story.seed

@@ -26,6 +26,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_steps
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import at, timed
 from tests.realizer.stage import block, stage
@@ -138,7 +139,7 @@ def again(chance: Random, made: Plan, known: Known) -> Known:
     return replace(known, points={**known.points, **starts}, begun=begun, due=due)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(share_of(4)))
 def test_random_blocks_are_planned_alone_beside_others_and_again(seed: int) -> None:
     chance = Random(seed)
     made: list[Plan] = []

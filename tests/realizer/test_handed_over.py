@@ -27,6 +27,7 @@ from engage_hri.schemas.body import PerformBehavior
 from engage_hri.services.control.config import Variability
 from engage_hri.services.realizer.plan.handover import entering
 from engage_hri.services.realizer.plan.phases import chain
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.puppet import bml, puppet
@@ -221,7 +222,7 @@ def crowd(chance: Random) -> Block:
     return block(behaviors)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(share_of(60)))
 async def test_within_a_block_nobody_loses_a_stroke_to_another(seed: int) -> None:
     chance = Random(seed)
     example = crowd(chance)

@@ -20,6 +20,7 @@ from engage_hri.services.realizer.perform import steering
 from engage_hri.services.realizer.perform.holding import Holds
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import FakeRecognition, after, block, stage, together
@@ -161,7 +162,7 @@ async def test_what_is_not_performed_cannot_be_held(named: tuple[str, str]) -> N
         await performing.outcome
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(blocks(), st.integers(0, 10_000))
 def test_whatever_is_held_and_let_go_at_random_each_block_has_the_end_that_it_has_without(
     made: Block, seed: int

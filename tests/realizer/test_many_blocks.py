@@ -37,6 +37,7 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script, parts_of
 from tests.realizer.stage import Stage, stage
 from tests.realizer.test_simulated_body import FAULTS, robot
@@ -186,7 +187,7 @@ SCRIPTS = st.dictionaries(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(several(), SCRIPTS, st.booleans())
 def test_many_blocks_end_once_each_on_any_body(
     story: tuple[Sent, ...], scripts: dict[str, Script], pauses: bool
@@ -206,7 +207,7 @@ def test_many_blocks_end_once_each_on_any_body(
     run_virtual(main())
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=share_of(30), deadline=None)
 @given(several(), FAULTS)
 def test_many_blocks_leave_the_robot_safe(story: tuple[Sent, ...], faults: object) -> None:
     async def main() -> None:
@@ -266,7 +267,7 @@ def broken(story: Sequence[Sent], seen: Stage) -> list[str]:
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(several())
 def test_ties_between_blocks_hold_or_somebody_is_told(story: tuple[Sent, ...]) -> None:
     async def main() -> None:

@@ -28,6 +28,7 @@ from engage_hri.services.realizer.net.petri_net import (
 from engage_hri.services.realizer.net.pnml import read_pnml
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.oracle import estimated, random_blocks
 from tests.realizer.stage import after, before, block, together
@@ -147,7 +148,7 @@ def test_an_event_that_may_outlast_its_block_cannot_pile_up() -> None:
     assert max(marking) == 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(random_blocks())
 def test_every_net_is_live_safe_and_comes_back_from_pnml_equal(example: Block) -> None:
     made = estimated(example)

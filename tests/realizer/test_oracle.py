@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.behaviors import Pointing, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.plan.plan import Plan
+from tests.random_cases import share_of
 from tests.realizer.oracle import (
     consult,
     estimated,
@@ -41,7 +42,7 @@ def are_equally_whole(one: Plan, other: Plan) -> bool:
     return set(one.dropped) == set(other.dropped) and not (one.given_up or other.given_up)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(random_blocks())
 def test_what_can_be_scheduled_is_and_nothing_else(example: Block) -> None:
     plan = estimated(example)
@@ -49,7 +50,7 @@ def test_what_can_be_scheduled_is_and_nothing_else(example: Block) -> None:
     assert (plan is not None and not (plan.dropped or plan.given_up)) == consult(example).is_possible()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.one_of(possible_blocks(), possible_blocks(), random_blocks(10)))
 def test_the_schedule_is_the_earliest_there_is(example: Block) -> None:
     plan = estimated(example)
@@ -68,7 +69,7 @@ def test_the_schedule_is_the_earliest_there_is(example: Block) -> None:
         }
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(random_blocks())
 def test_every_schedule_keeps_what_was_asked_and_what_behaviors_can_do(example: Block) -> None:
     plan = estimated(example)
@@ -96,7 +97,7 @@ def test_every_schedule_keeps_what_was_asked_and_what_behaviors_can_do(example: 
             assert abs(apart) < CLOSE or (kind is not Synchronize and (apart > 0) == (kind.__name__ == "After"))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(st.one_of(possible_blocks(), random_blocks()), st.randoms(use_true_random=False))
 def test_any_order_of_elements_gives_the_same_net(example: Block, chance: random.Random) -> None:
     """Up to the order within a type and, where something must be dropped, who is the later: same loss, same net."""

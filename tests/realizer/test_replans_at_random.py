@@ -25,6 +25,7 @@ from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.services.control.config import Variability
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, before, block, stage
@@ -142,7 +143,7 @@ def differences(told: Story, stage_of: Callable[[], AbstractAsyncContextManager[
     return found
 
 
-@pytest.mark.parametrize("seed", [*range(60), 129, 1168])
+@pytest.mark.parametrize("seed", [*range(share_of(60)), 129, 1168])
 def test_a_block_that_was_held_goes_on_the_same_if_it_is_planned_again(seed: int) -> None:
     assert differences(story(seed), lambda: stage(FakeBody(pauses=True))) == []
 

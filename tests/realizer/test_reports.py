@@ -18,6 +18,7 @@ from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import Act, FakeBody
 from tests.realizer.oracle import estimate, possible_blocks
 from tests.realizer.stage import after, block, stage
@@ -27,7 +28,7 @@ NOWHERE = (Point("g", "m-9"), Point("nobody", "start"), Point("b2:s", "end"), OR
 WRONG_TIMES = (nan, inf, -inf, 1e300, -1e300, -1.0, 1e9)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(blocks() | possible_blocks(8), st.data())
 def test_no_sequence_of_reports_ends_the_authority_or_makes_it_tell_a_point_twice(block, data) -> None:  # type: ignore[no-untyped-def]
     plan = planned(block)
@@ -124,7 +125,7 @@ class Liar(FakeBody):
         self.bus.publish(keys.SYNC_POINT, lie)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=share_of(80), deadline=None)
 @given(blocks(), st.integers(0, 1000))
 def test_the_feedback_of_a_block_never_goes_back_in_time_whatever_the_body_says(block, seed) -> None:  # type: ignore[no-untyped-def]
     async def main() -> list[object]:

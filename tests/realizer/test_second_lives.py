@@ -14,10 +14,11 @@ from engage_hri.services.realizer.perform.live_blocks import LIFE
 from tests.judge import generate, playing
 from tests.judge.record import Record
 from tests.judge.story import Deed, Story
+from tests.random_cases import share_of
 
 SECOND = 14.0
 """Seconds after which the second stream begins: most first ones are over by then."""
-MANY = 14
+MANY = share_of(14)
 """Number of stories that are tried; the first stream is over in time in most of them."""
 BEAT = 'lexeme="BEAT" mode="RIGHT_HAND"'
 

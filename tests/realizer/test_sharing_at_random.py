@@ -33,6 +33,7 @@ from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.control.config import Variability
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, parts_of, type_of
 from tests.realizer.stage import Stage, stage
 from tests.realizer.test_simulated_body import Robot, robot
@@ -162,7 +163,7 @@ def with_ends(seen: Stage | Robot) -> Times:
     return times_of(seen.feedback) | ends  # type: ignore[return-value]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(streams())
 def test_nobody_loses_a_part_to_another_block_in_silence(story: tuple[Sent, ...]) -> None:
     async def main() -> None:

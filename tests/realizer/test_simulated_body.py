@@ -30,6 +30,7 @@ from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.stage import block, together
 from tests.realizer.test_properties import blocks
 
@@ -180,7 +181,7 @@ FAULTS = st.builds(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=share_of(40), deadline=None)
 @given(blocks(), FAULTS, st.sampled_from((None, None, 0.4, 1.3)))
 def test_whatever_fails_the_block_ends_once_and_the_arms_are_home(
     example: Block, faults: Variability, cancelled: float | None

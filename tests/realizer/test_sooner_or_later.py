@@ -11,6 +11,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gestur
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.control.config import Slow, Stall, Variability
 from engage_hri.services.requests.ends import RequestRefused
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, stage
@@ -99,7 +100,7 @@ def _block(random: Random, number: int) -> Block:
     return block((wait, *parts.values()), id=f"k{number}")
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(share_of(30)))
 async def test_nothing_is_lost_to_another_block_whenever_waits_are_cut_short(seed: int) -> None:
     """Blocks come at random times, and some waits end early: all is performed, and each part has one user."""
     random = Random(seed)

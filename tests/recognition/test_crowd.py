@@ -17,6 +17,7 @@ from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from tests.random_cases import share_of
 from tests.recognition.kept import kinds
 from tests.recognition.observations import HUMAN, ROBOT, Log, stamp, world
 from tests.recognition.passers import Lobby, visit
@@ -257,7 +258,7 @@ def told(stream: Stream, forgotten_after: float) -> tuple[Counter[object], Stati
     return kept, published.overall(end), known
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(st.integers(0, 10**6).map(Crowd))
 def test_events_and_totals_are_the_same_as_if_nobody_were_forgotten(stream):
     events, totals, known = told(stream, 6.3)

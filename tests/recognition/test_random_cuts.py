@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from tests.bus.cuttable import CuttableHub
 from tests.conftest import virtual_loop
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT
 from tests.recognition.reporting import GRACE, SERVICES, SPEECH, Actor, Running, Stage
 
@@ -105,7 +106,7 @@ FAULTS = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=200)
+@settings(max_examples=share_of(200))
 @given(st.integers(0, 10**6), st.integers(1, 40), FAULTS)
 def test_after_healing_recognition_believes_what_is_true(seed: int, steps: int, faults: dict[str, Any]):
     assert believed_wrongly(seed, steps, **faults) == []

@@ -18,6 +18,7 @@ from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.statistics.tally import KINDS
 from engage_hri.services.runtime.reports import GoesOn
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 
 Stream = list[tuple[float, Observation]]
@@ -158,7 +159,7 @@ def run(stream, resolution="object"):
     return session, effects, asked, signaled
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(any_streams, st.sampled_from(("object", "table")))
 def test_every_event_ends_exactly_once_and_every_request_is_answered(stream, resolution):
     session, effects, asked, signaled = run(stream, resolution)
@@ -180,7 +181,7 @@ def test_every_event_ends_exactly_once_and_every_request_is_answered(stream, res
     assert session.deadline is None
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(any_streams)
 def test_times_of_an_event_never_run_backwards(stream):
     _, effects, _, _ = run(stream)

@@ -20,6 +20,7 @@ from engage_hri.schemas.syncref import is_id
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.services.commandline.config import load
 from engage_hri.services.simulation.still import EXAMPLE, load_world
+from tests.random_cases import share_of
 
 FORMS: dict[str, Callable[[Message], bytes]] = {"application/json": encode_json, "application/msgpack": encode}
 XML = b'<bml id="b">\n<speech id="s">caf\xc3\xa9 <sync id="m"/></speech><gaze id="g" target="cup" start="s:m"/></bml>'
@@ -55,7 +56,7 @@ def damaged(draw: st.DrawFn, good: bytes) -> bytes:
     return bytes(bytes_)
 
 
-@settings(max_examples=400, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@settings(max_examples=share_of(400), suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(message=messages(), form=st.sampled_from(list(FORMS)), data=st.data())
 def test_a_damaged_message_is_a_message_or_is_refused(message: Message, form: str, data: st.DataObject) -> None:
     try:
@@ -91,7 +92,7 @@ READERS: dict[str, tuple[Callable[[bytes], Any], bytes]] = {
 }
 
 
-@settings(max_examples=300)
+@settings(max_examples=share_of(300))
 @pytest.mark.parametrize("reader", READERS)
 @given(data=st.data())
 def test_a_damaged_document_is_read_or_refused(reader: str, data: st.DataObject) -> None:
@@ -100,7 +101,7 @@ def test_a_damaged_document_is_read_or_refused(reader: str, data: st.DataObject)
         read(data.draw(damaged(good)))
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=share_of(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @pytest.mark.parametrize(("read", "good"), [(load, TOML), (load_world, EXAMPLE.encode())])
 @given(data=st.data())
 def test_a_damaged_file_is_read_or_refused(

@@ -19,13 +19,14 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message, decode
 from engage_hri.services.hostile.typed import RandomMessages, Words, distorted
+from tests.random_cases import share_of
 from tests.schemas.strategies import blocks, fragments
 
 SCHEMA: dict[str, Any] = json.loads((EXPORTED / BUNDLE).read_bytes())
 REGISTRY: Registry[Any] = Registry().with_resource(ID, Resource.from_contents(SCHEMA)).crawl()
 """Crawled once: what has not been is crawled anew at each look-up of a name."""
 MESSAGES = [kind.__name__ for kind in get_args(Message)]
-quick = settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+quick = settings(max_examples=share_of(30), suppress_health_check=[HealthCheck.too_slow], deadline=None)
 
 
 def validator(name: str) -> Draft202012Validator:

@@ -10,11 +10,13 @@ pytest.importorskip("icub_models", reason="needs the package icub-models, which 
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.testing import BodyContract
+from tests.random_cases import trials
 
 ICUB = Path(__file__).parent / "robots" / "icub.toml"
 
 
 class TestDescribedBody(BodyContract):
+    seeds = trials()
     tolerance = 0.1
 
     def make(self) -> Body:

@@ -20,6 +20,7 @@ from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.testing.suite import Suite
 from engage_hri.services.control.testing.witness import ARMS, LOOKS, Witness
 from engage_hri.services.control.torso import kinematics
+from tests.random_cases import share_of
 
 POINT = Pointing(id="point", target="near-right", mode="RIGHT_HAND")
 LOOK = Gaze(id="look", target="near-right")
@@ -255,7 +256,7 @@ async def test_what_cannot_be_played_is_refused_and_changes_nothing(fault: BodyF
     assert body.faults == ()
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(share_of(6)))
 @pytest.mark.parametrize("kind", ["slow", "weak", "blocked"])
 async def test_looks_and_shifts_over_one_another_tell_their_points_from_the_first_on(kind: str, seed: int):
     """A shift over which a look comes before the joints have let it set out told its end alone."""

@@ -11,6 +11,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.body import Body
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.testing import BodyContract
+from tests.random_cases import trials
 
 PAN_TILT = """
 <mujoco>
@@ -51,6 +52,7 @@ class TestPanTiltInPhysics(BodyContract):
     """A head without arms, trunk or face."""
 
     tolerance = 0.1
+    seeds = trials()
 
     @pytest.fixture(autouse=True)
     def _here(self, folder: Path) -> None:

@@ -1,0 +1,19 @@
+"""How many random cases a test tries: a share in `make test`, all in `make test-long`.
+
+Only tests that take long ask here. A share begins like the whole: what fails in it fails in the whole, too.
+"""
+
+from hypothesis import settings
+
+SHARE = 3
+"""`make test` tries one of so many cases, the first ones."""
+
+
+def share_of(whole: int) -> int:
+    """Number of random cases to try, of so many in all. The profile of Hypothesis decides (`conftest.py`)."""
+    return -(-whole // SHARE) if settings.get_current_profile_name() == "same" else whole
+
+
+def trials() -> int | None:
+    """Number of random trials of each law, of a body that takes long to try; None: all. For `BodyContract.seeds`."""
+    return 1 if settings.get_current_profile_name() == "same" else None
