@@ -107,7 +107,7 @@ def _keys(node: ast.ClassDef, module: ast.Module) -> tuple[str, list[Key]]:
         below = node.body[node.body.index(field) + 1 :][:1]
         if below and isinstance(below[0], ast.Expr) and isinstance(below[0].value, ast.Constant):
             documented[name] = str(below[0].value.value)
-        default = ast.unparse(field.value) if field.value else ""
+        default = ast.unparse(_value(field.value, module)) if field.value else ""
         meaning = _cell(documented.get(name, ""))
         keys.append(Key(name, _cell(_kind(field.annotation, module)), _cell(default), _capitalized(meaning)))
     return general, keys
@@ -124,6 +124,22 @@ def _kind(annotation: ast.expr, module: ast.Module) -> str:
         ):
             return ast.unparse(statement.value)
     return ast.unparse(annotation)
+
+
+def _value(default: ast.expr, module: ast.Module) -> ast.expr:
+    """The default as written, with a constant from another module of this project in place of its name."""
+    for statement in module.body:
+        if (
+            isinstance(default, ast.Name)
+            and isinstance(statement, ast.ImportFrom)
+            and statement.module is not None
+            and any(alias.name == default.id for alias in statement.names)
+        ):
+            place = ROOT.joinpath(*statement.module.split(".")[1:]).with_suffix(".py")
+            for other in ast.parse(place.read_text(encoding="utf-8")).body:
+                if isinstance(other, ast.AnnAssign) and ast.unparse(other.target) == default.id and other.value:
+                    return other.value
+    return default
 
 
 def _capitalized(text: str) -> str:

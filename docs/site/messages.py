@@ -26,6 +26,7 @@ from engage_hri.schemas import (
     presence,
     recognition,
     requests,
+    settings,
     status,
     units,
     world,
@@ -33,7 +34,7 @@ from engage_hri.schemas import (
 
 MODULES: tuple[ModuleType, ...] = (
     fragments, blocks, behaviors, feedback, holds, nets, recognition, ledger, attention, conditions, actions,
-    perception, world, body, body_faults, requests, faults, presence, status, units,
+    perception, world, body, body_faults, requests, faults, presence, status, settings, units,
 )  # fmt: skip
 
 HEAD = """\
