@@ -140,7 +140,7 @@ async def _listen(bus: Bus, inbox: Subscription, told: PerceivedPerson) -> None:
 
 
 def check_id(person: str, other: str) -> None:
-    """Refuse what can be no person's id. other: an id that is somebody else's, as the robot's. Raises InputRefused."""
+    """Refuse what can be no person's id. other: an id that is taken, as the robot's. Raises InputRefused."""
     if not bus_keys.is_chunk(person) or person == other:
         advice = f"a person's id has {bus_keys.CHUNK}, and is not {other!r}"
         raise InputRefused(Fault(reason=f"{person!r} can't be a person's id", advice=advice))
