@@ -48,7 +48,7 @@ export function wizard(panel, order) {
   const refused = element("p", { class: "why" });
   place.replaceChildren(refused, speaks, steer, faults);
   document.addEventListener("keydown", (event) => {
-    const busy = event.target.closest?.("input, select, textarea, button, [tabindex]") || event.ctrlKey || event.metaKey || event.altKey;
+    const busy = event.repeat || event.target.closest?.("input, select, textarea, button, [tabindex]") || event.ctrlKey || event.metaKey || event.altKey;
     const number = Number(event.key) - 1;
     if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) send({ do: "prepared", number });
   });
