@@ -25,6 +25,8 @@ PATIENCE: Seconds = 3.0
 """Time that the robot has to be there."""
 LOOK_AROUND: Seconds = 0.5
 """Time in which the world, if anybody tells it, is known."""
+ANSWERED: Seconds = 0.1
+"""Silence after which all have said what they know of the world."""
 TELLERS = ("perception", "wizard")
 """Roles that may tell what people do."""
 
@@ -59,23 +61,26 @@ async def perceive(
     timeout: seconds that the robot's recognition has to be there; None: for ever.
 
     Raises:
-        InputRefused: the keys are those of another role, or no good; or the id can be no person's.
+        InputRefused: the keys are those of another role, or no good; or the id can be no person's, for it is the
+            robot's, or that of a thing of the world.
         RunFailed: no robot is there within `timeout`.
         ValueError: a name that cannot be in a key, or that the hub has already.
     """
-    _check_id(person, "all")
+    check_id(person, "all")
     async with AsyncExitStack() as stack:
         if hub is None:
             hub = await stack.enter_async_context(
                 await _opened(robot=robot, connect=tuple(connect), mode=mode, listen=listen, keys=keys)
             )
-        _check_id(person, hub.robot)
+        check_id(person, hub.robot)
         bus = hub.join(name or f"perceive-{uuid.uuid4().hex[:8]}", role="perception")
         stack.push_async_callback(bus.leave)
         told = PerceivedPerson(person, bus)
         inbox = stack.enter_context(bus.subscribe(bus_keys.ANY_ALIVE, bus_keys.WORLD))
         bus.declare_alive()
         await _robot_there(bus, inbox, told, timeout)
+        if position is None and told._entity(person) is None:
+            await _all_answered(bus, inbox, told)
         told._enter(position)
         listening = asyncio.create_task(_listen(bus, inbox, told), name=f"world around {person}")
         try:
@@ -112,12 +117,19 @@ async def _robot_there(bus: Bus, inbox: Subscription, told: PerceivedPerson, tim
         if received is not None:
             told._take(received)
         elif is_there:
-            return
+            return  # nobody tells a world
         else:
             reason, advice = f"no robot {bus.robot!r} here within {timeout} s", "`engage up` starts one"
             raise RunFailed(Fault(reason=reason, where="recognition", advice=advice))
         if isinstance(received.message, PeerAlive) and received.message.participant == "recognition":
             is_there, deadline = True, bus.now() + LOOK_AROUND
+
+
+async def _all_answered(bus: Bus, inbox: Subscription, told: PerceivedPerson) -> None:
+    """Wait until all have said what they know of the world: in an old one a seat seems free that is taken."""
+    until = bus.now() + LOOK_AROUND
+    while (received := await inbox.next(min(until, bus.now() + ANSWERED))) is not None:
+        told._take(received)
 
 
 async def _listen(bus: Bus, inbox: Subscription, told: PerceivedPerson) -> None:
@@ -127,7 +139,8 @@ async def _listen(bus: Bus, inbox: Subscription, told: PerceivedPerson) -> None:
             told._take(received)
 
 
-def _check_id(person: str, other: str) -> None:
+def check_id(person: str, other: str) -> None:
+    """Refuse what can be no person's id. other: an id that is taken, as the robot's. Raises InputRefused."""
     if not bus_keys.is_chunk(person) or person == other:
         advice = f"a person's id has {bus_keys.CHUNK}, and is not {other!r}"
         raise InputRefused(Fault(reason=f"{person!r} can't be a person's id", advice=advice))

@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
+from itertools import count, islice
 
 from msgspec.structs import replace
 
@@ -290,11 +291,12 @@ class PerceivedPerson:
     def _enter(self, position: Vector | None) -> None:
         """Let the person come; `perceive` calls this.
 
-        position: of the face; None: a free seat, unless the world has the person.
+        position: of the face; None: a free seat, unless the world has the person. Raises InputRefused: it has a thing
+        with this id.
         """
-        known = self._entity(self.id)
-        if position is not None or known is None or known.kind != "person":
-            place = position or _free_seat([each.position for each in self._world.entities if each.kind == "person"])
+        not_a_thing(self.id, World(entities=self._world.entities))
+        if position is not None or self._entity(self.id) is None:
+            place = position or free_seat([each.position for each in self._world.entities if each.kind == "person"])
             self._own[self.id] = Entity(id=self.id, kind="person", position=place)
             self._own[f"{self.id}-hand"] = Entity(
                 id=f"{self.id}-hand", kind="hand", owner=self.id, position=_sum(place, LAP)
@@ -341,12 +343,28 @@ def _between(start: Vector, end: Vector, share: float) -> Vector:
     )
 
 
-def _free_seat(taken: list[Vector]) -> Vector:
-    """Place of a face opposite the robot, as far to the left and right as it takes to be beside the others."""
-    number = 0
-    while any(math.dist(_seat(number), other) < BESIDE / 2 for other in taken):
-        number += 1
-    return _seat(number)
+def free_seat(taken: Collection[Vector], skip: int = 0) -> Vector:
+    """Place of a face opposite the robot, as far to the left and right as it takes to be beside the others.
+
+    skip: so many free places, for those who sit down at the same time.
+    """
+    seats = (_seat(number) for number in count())
+    free = (seat for seat in seats if not any(math.dist(seat, other) < BESIDE / 2 for other in taken))
+    return next(islice(free, skip, None))
+
+
+def not_a_thing(person: str, world: World) -> None:
+    """Refuse a person who has the id of a thing, or whose hand would: it would take that thing out of the world.
+
+    Raises InputRefused.
+    """
+    for entity in world.entities:
+        is_own = (entity.id == person and entity.kind == "person") or (
+            entity.id == f"{person}-hand" and entity.kind == "hand" and entity.owner == person
+        )
+        if entity.id in (person, f"{person}-hand") and not is_own:
+            reason = f"{person!r} can't be a person's id: the world has {entity.id!r}, of kind {entity.kind!r}"
+            raise InputRefused(Fault(reason=reason, advice="give the person another id"))
 
 
 def _seat(number: int) -> Vector:

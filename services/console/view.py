@@ -3,6 +3,8 @@
 `feed(scene, message, at)` gives the next scene; `services/console/render.py` draws one. Nothing here knows the bus.
 """
 
+from collections.abc import Iterable
+
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -17,6 +19,7 @@ from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncP
 from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
@@ -28,6 +31,8 @@ NOTES_KEPT = 3
 ENDED_BLOCKS_KEPT = 2
 LOST_KEPT = 3
 """Number of people that are shown as gone: those who left last."""
+LOST = "lost"
+"""Status of a block whose realizer has gone from the bus in the middle of it."""
 SAME_SPEECH: Seconds = 1.0
 """Greatest distance of the beginnings of a speech and of its words."""
 OWN_BLOCKS = ("maintenance-", "response-")
@@ -122,6 +127,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     faults: tuple[BodyFault, ...] = ()
     condition: StudyCondition | None = None
     """Condition of the study; None: generation has not told of one."""
+    realizer: str = ""
+    """Life of the realizer; empty: unknown."""
 
     def actor(self, id: str) -> Actor:
         return self.actors.get(id) or Actor(id=id)
@@ -157,6 +164,10 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
         case PredictionFeedback(block=block) if not block.startswith(OWN_BLOCKS):
             points = tuple(PointInView(behavior=p.behavior, sync=p.sync, planned=p.time) for p in message.points)
             return _points(scene, block, points)
+        case PeerAlive(participant="realizer", run=run):
+            return replace(_changed(scene, LOST, "") if run == scene.realizer else scene, realizer=run)
+        case PeerGone(participant="realizer"):
+            return _changed(scene, "", LOST)
         case ConnectionEvent():
             return _event(scene, message, at)
         case HeadOwner(owner=owner, waiting=waiting):
@@ -250,9 +261,20 @@ def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
         others = tuple(block for block in scene.blocks if block.id != message.block)
         return replace(scene, blocks=(*others, BlockInView(id=message.block, began=at)))
     blocks = [replace(block, status=message.status) if block.id == message.block else block for block in scene.blocks]
-    ended = [block for block in blocks if block.status]
-    forgotten = {block.id for block in ended[:-ENDED_BLOCKS_KEPT]}
-    return replace(scene, blocks=tuple(block for block in blocks if block.id not in forgotten))
+    return replace(scene, blocks=_without_old(blocks))
+
+
+def _changed(scene: Scene, status: str, other: str) -> Scene:
+    """Give all blocks of a status another one."""
+    blocks = [replace(block, status=other) if block.status == status else block for block in scene.blocks]
+    return replace(scene, blocks=_without_old(blocks))
+
+
+def _without_old(blocks: Iterable[BlockInView]) -> tuple[BlockInView, ...]:
+    """The blocks without those that ended before the last ones."""
+    kept = tuple(blocks)
+    forgotten = {block.id for block in [block for block in kept if block.status][:-ENDED_BLOCKS_KEPT]}
+    return tuple(block for block in kept if block.id not in forgotten)
 
 
 def _points(scene: Scene, id: str, news: tuple[PointInView, ...]) -> Scene:

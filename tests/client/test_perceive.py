@@ -19,7 +19,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.perceive import perceive
-from engage_hri.services.client.perceived_person import PerceivedPerson
+from engage_hri.services.client.perceived_person import SEAT, PerceivedPerson
 from engage_hri.services.client.robot import connect
 from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.simulation.still import show_world
@@ -91,7 +91,7 @@ async def test_everything_that_they_do_has_a_beginning_and_an_end(hub: MemoryHub
 
 
 async def test_words_come_while_they_are_spoken_and_are_final_a_moment_later(hub: MemoryHub) -> None:
-    async with scene(hub) as told, perceive("ann", hub=hub) as ann:
+    async with scene(hub) as told, perceive("ann", hub=hub, position=SEAT) as ann:
         await ann.say("yes that one", seconds=3.0, delay=0.5, to="robot")
 
     words = [each for each in told if isinstance(each, Utterance)]
@@ -257,6 +257,43 @@ async def test_what_can_be_no_persons_id_is_refused(hub: MemoryHub, person: str)
     with pytest.raises(InputRefused, match="can't be a person's id"):
         async with perceive(person, hub=hub):
             pass
+
+
+@pytest.mark.parametrize(
+    ("person", "id", "kind"),
+    [("cup", "cup", "object"), ("table", "table", "surface"), ("gripper", "gripper-hand", "object"),
+     ("bob", "bob-hand", "hand")],
+)  # fmt: skip
+async def test_a_thing_is_no_person_and_stays_what_it_is(hub: MemoryHub, person: str, id: str, kind: Any) -> None:
+    thing = Entity(id=id, kind=kind, owner="eve", position=(0.4, 0.0, 0.7))
+    async with scene(hub, World(entities=(*THINGS.entities, thing))) as told:
+        with pytest.raises(InputRefused, match=f"'{person}' can't be a person's id: the world has '{id}', of kind"):
+            async with perceive(person, hub=hub):
+                pass
+        assert (await places(hub)).keys() == {"cup", "ball", id}
+
+    assert told == []
+
+
+async def test_who_comes_does_not_sit_where_an_old_world_says_that_nobody_sits(hub: MemoryHub) -> None:
+    async with running(hub, {"recognition": idle}):
+        coming = asyncio.create_task(stay(hub, "ann"))
+        await asyncio.sleep(0.05)  # a slow process tells of bob only now
+        seated = Entity(id="bob", kind="person", position=SEAT)
+        hub.join("camera", role="perception").publish(keys.WORLD, World(entities=(*THINGS.entities, seated)))
+        await asyncio.sleep(1.0)
+        there = await places(hub)
+        coming.cancel()
+        await asyncio.wait([coming])
+
+    assert there["bob"] == SEAT
+    assert there["ann"][:2] == (SEAT[0], -0.6)
+
+
+async def stay(hub: MemoryHub, name: str) -> None:
+    hub.join("first", role="perception").publish(keys.WORLD, THINGS)
+    async with perceive(name, hub=hub):
+        await asyncio.get_running_loop().create_future()
 
 
 async def test_keys_of_another_role_are_refused_before_anything_is_told(

@@ -367,3 +367,32 @@ def test_no_order_of_messages_breaks_the_picture(order: range) -> None:
     made = picture(*messages)
 
     assert all(json.loads(made.section(name)) is not None for name in made.versions)
+
+
+def test_a_block_whose_realizer_died_is_lost_and_leaves_unless_the_same_life_comes_back() -> None:
+    begun: tuple[Timed, ...] = (
+        (PeerAlive(participant="realizer", run="1"), 10.0),
+        (BlockProgress(block="b", progress="start", at=at(10.0)), 10.0),
+        (PeerGone(participant="realizer"), 12.0),
+    )
+    made = picture(*begun)
+    lost = section(made, f"{BLOCK}b")
+    assert (lost["status"], lost["until"]) == ("lost", 2.0)
+
+    made.feed(PeerAlive(participant="realizer", run="1"), 13.0, 13.0)
+    assert (section(made, f"{BLOCK}b")["status"], section(made, f"{BLOCK}b")["until"]) == ("", None)
+
+    other = picture(*begun, (PeerAlive(participant="realizer", run="2"), 13.0))
+    assert section(other, f"{BLOCK}b")["status"] == "lost"
+    other.advance(12.0 + KEPT + 1.0)
+    assert f"{BLOCK}b" not in other.versions
+
+
+def test_two_references_of_one_name_are_two() -> None:
+    choice = ReferenceChoice(
+        reference="r", target="blue", gesture="gaze", phrase="it", reliability=0.9, cost=1.0, pairs=()
+    )
+    outcome = FragmentOutcome(id="1", fragment="f", status="done", choices=(choice,))
+    made = picture((outcome, 10.0), (outcome, 11.0))
+
+    assert [each["number"] for each in section(made, "references")] == [0, 1]

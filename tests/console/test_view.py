@@ -13,6 +13,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.console import tally, view
 from engage_hri.services.console.render import render
 from tests.console.scenes import SCENE, at, event, fed
@@ -102,6 +103,19 @@ def test_only_the_last_ended_blocks_are_kept(scene: view.Scene) -> None:
     assert [block.id for block in scene.blocks] == ["b", "n3", "n4"]
     assert scene.block is not None
     assert scene.block.id == "b"
+
+
+def test_blocks_of_a_realizer_that_died_are_lost_and_do_not_pile_up(scene: view.Scene) -> None:
+    for number in range(50):
+        scene = view.feed(scene, PeerAlive(participant="realizer", run=f"{number}"), 13.0)
+        scene = view.feed(scene, BlockProgress(block=f"n{number}", progress="start", at=at(13.0)), 13.0)
+        scene = view.feed(scene, PeerGone(participant="realizer"), 14.0)
+
+    assert [(block.id, block.status) for block in scene.blocks] == [("n48", "lost"), ("n49", "lost")]
+
+    scene = view.feed(scene, PeerAlive(participant="realizer", run="49"), 15.0)  # only its link was cut
+    assert scene.block is not None
+    assert (scene.block.id, scene.block.status) == ("n49", "")
 
 
 def test_a_completed_event_keeps_its_decision(scene: view.Scene) -> None:

@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.nets import NetPlanned
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.view import OWN_BLOCKS
+from engage_hri.services.console.view import LOST, OWN_BLOCKS
 from engage_hri.services.console.web.sections import BehaviorLane, BlockLane, EventShown, SyncShown
 
 KEPT: Seconds = 90.0
@@ -69,6 +70,8 @@ class BlockLanes:
 
     def __init__(self) -> None:
         self._blocks: dict[str, _Block] = {}
+        self._run = ""
+        """Life of the realizer; empty: unknown."""
 
     def feed(self, message: BlockProgress | SyncPointProgress | PredictionFeedback | NetPlanned, at: Seconds) -> str:
         """Take feedback about a block, or its net. at: its local instant. Returns the id of the block, if any."""
@@ -88,6 +91,25 @@ class BlockLanes:
             case NetPlanned():
                 block.tie(message)
         return message.block
+
+    def presence(self, message: PeerAlive | PeerGone, at: Seconds) -> tuple[str, ...]:
+        """Take news of who is on the bus. Without its realizer no block goes on; the same life goes on with its own.
+
+        Returns the ids of the blocks that this changes.
+        """
+        changed: list[str] = []
+        match message:
+            case PeerAlive(participant="realizer", run=run):
+                if run == self._run:
+                    changed = [id for id, block in self._blocks.items() if block.status == LOST]
+                for id in changed:
+                    self._blocks[id].until, self._blocks[id].status = None, ""
+                self._run = run
+            case PeerGone(participant="realizer"):
+                changed = [id for id, block in self._blocks.items() if block.until is None]
+                for id in changed:
+                    self._blocks[id].until, self._blocks[id].status = at, LOST
+        return tuple(changed)
 
     def forget(self, now: Seconds) -> tuple[str, ...]:
         """Forget what ended long ago. Returns the ids of these blocks."""

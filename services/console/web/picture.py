@@ -6,6 +6,7 @@ which sections there are, and which have changed; `section(name)` gives one as J
 
 from collections import deque
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import msgspec
@@ -71,6 +72,7 @@ class Picture:
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
+        self._numbers = count()
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
         self._notes: deque[Note] = deque(maxlen=NOTES_KEPT)
@@ -129,6 +131,8 @@ class Picture:
             case PeerAlive() | PeerGone() | Status():
                 self._health.feed(message)
                 self._changed("health")
+                if not isinstance(message, Status):
+                    self._changed(*(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
         self._note(message, at)
@@ -168,7 +172,8 @@ class Picture:
         for made in outcome.choices:
             self._choices.append(
                 Choice(
-                    fragment=outcome.fragment, reference=made.reference, target=made.target, gesture=made.gesture,
+                    number=next(self._numbers), fragment=outcome.fragment,
+                    reference=made.reference, target=made.target, gesture=made.gesture,
                     phrase=made.phrase, reliability=made.reliability, cost=made.cost, pairs=made.pairs,
                 )
             )  # fmt: skip

@@ -145,7 +145,10 @@ class BehaviorLane(Struct, frozen=True):
 
 
 class BlockLane(Struct, frozen=True):
-    """A block. until, status: of its end. ties: sync points of several behaviors that are one instant."""
+    """A block. until, status: of its end; `lost` with its realizer.
+
+    ties: sync points of several behaviors that are one instant.
+    """
 
     id: str
     since: Seconds
@@ -206,8 +209,12 @@ class Tokens(Struct, frozen=True):
 
 
 class Choice(Struct, frozen=True):
-    """A reference as it was made, with all pairs of gesture and phrase that were weighed."""
+    """A reference as it was made, with all pairs of gesture and phrase that were weighed.
 
+    number: of all references since the picture began; a fragment may come again under its name.
+    """
+
+    number: int
     fragment: str
     reference: str
     target: str

@@ -21,6 +21,7 @@ from engage_hri.services.console.follow import FOLLOWED, following
 from engage_hri.services.console.web.health import NOTABLE
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.script import Script
+from engage_hri.services.console.web.seats import Seats
 
 PATTERNS = (
     *FOLLOWED, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
@@ -46,6 +47,7 @@ class Window:
         self.robot = robot
         self.script = script
         self.picture = Picture(bus.robot, bus.now())
+        self.seats = Seats()
         self.viewers = 0
         self.listeners: set[Callable[[Message], None]] = set()
         self._here: set[str] = set()
@@ -53,6 +55,7 @@ class Window:
 
     def __call__(self, message: Message, at: Seconds) -> None:
         """Take a message. at: its local instant."""
+        self.seats.feed(message)
         match message:
             case PeerAlive(participant=name):
                 self._here.add(name)

@@ -2,7 +2,8 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Coroutine
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import asynccontextmanager
 from typing import Any
 
 from msgspec.structs import replace
@@ -11,13 +12,14 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.summary import summary
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.services.client.inputs import fragment_in
-from engage_hri.services.client.perceive import perceive
-from engage_hri.services.client.perceived_person import PerceivedPerson
+from engage_hri.services.client.perceive import check_id, perceive
+from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
 from engage_hri.services.console.web.frames import You
 from engage_hri.services.console.web.laying import laid
+from engage_hri.services.console.web.seats import SETTLED
 from engage_hri.services.console.web.service import Window
 
 REACH: Seconds = 0.9
@@ -37,6 +39,7 @@ class Visitor:
         self._told: deque[str] = deque(maxlen=TOLD_KEPT)
         self._tasks: set[asyncio.Task[None]] = set()
         self._person: PerceivedPerson | None = None
+        self._sitting: asyncio.Task[None] | None = None
         self._stands_up = asyncio.Event()
         self._lets_go = asyncio.Event()
         self._inhibits = False
@@ -86,9 +89,9 @@ class Visitor:
 
     def _be(self, order: orders.SeatOrder) -> None:
         if isinstance(order, orders.Sit):
-            if self._person is None:
+            if self._sitting is None or self._sitting.done():
                 self._stands_up.clear()
-                self._begin(self._sit(self._free_name(order.name.strip())))
+                self._sitting = self._begin(self._sit(order.name.strip()))
             return
         if self._person is None:
             raise InputRefused(Fault(reason="you have no seat", advice="take a seat first"))
@@ -108,23 +111,37 @@ class Visitor:
             case orders.Move(thing=thing, x=x, y=y):
                 self._lay(self._person, thing, x, y)
 
-    def _free_name(self, wanted: str) -> str:
-        taken = {each.id for each in self._window.picture.world.people}
-        if wanted:
-            if wanted in taken:
-                raise InputRefused(Fault(reason=f"{wanted!r} is there already", advice="take another name"))
-            return wanted
-        names = ("visitor", *(f"visitor-{number}" for number in range(2, len(taken) + 3)))
-        return next(name for name in names if name not in taken)
+    async def _sit(self, wanted: str) -> None:
+        async with self._seat(wanted) as (name, position):
+            try:
+                async with perceive(name, hub=self._window.hub, position=position) as person:
+                    self._person = person
+                    person.begin("look", self._window.bus.robot)
+                    await self._stands_up.wait()
+            finally:
+                self._person = None
 
-    async def _sit(self, name: str) -> None:
-        try:
-            async with perceive(name, hub=self._window.hub) as person:
-                self._person = person
-                person.begin("look", self._window.bus.robot)
-                await self._stands_up.wait()
-        finally:
-            self._person = None
+    @asynccontextmanager
+    async def _seat(self, wanted: str) -> AsyncIterator[tuple[str, Vector]]:
+        """Take a name, and a place before the robot, that nobody has, in no window either. Raises InputRefused."""
+        seats, window = self._window.seats, self._window
+        while True:
+            name = seats.name(wanted, {each.id for each in window.picture.world.people})
+            for other in ("all", window.bus.robot):
+                check_id(name, other)
+            not_a_thing(name, window.picture.world)
+            claim = seats.claim(name)
+            bus = window.hub.join(claim, role="perception")
+            try:
+                bus.declare_alive()
+                await asyncio.sleep(SETTLED)
+                if seats.is_first(claim):
+                    people = {each.id: each.position for each in window.picture.world.people}
+                    yield name, free_seat([*people.values()], skip=seats.before(claim, people))
+                    return
+            finally:
+                seats.give_up(claim)
+                await bus.leave()
 
     def _lay(self, person: PerceivedPerson, thing: str, x: float, y: float) -> None:
         if self._acting is not None and not self._acting.done():

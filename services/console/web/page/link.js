@@ -9,12 +9,13 @@ export function follow(take, tell) {
 
   function open() {
     socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/frames${location.search}`);
+    let isFirst = true;
     socket.onopen = () => tell(true);
     socket.onmessage = (message) => {
       heard = performance.now();
       tell(true);
-      const frame = JSON.parse(message.data);
-      take(frame);
+      take(JSON.parse(message.data), isFirst);
+      isFirst = false;
       requestAnimationFrame(() => socket.readyState === WebSocket.OPEN && socket.send('{"do":"drawn"}'));
     };
     socket.onclose = () => {

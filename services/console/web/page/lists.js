@@ -96,12 +96,12 @@ export function references(panel) {
       if (!changed.has("references")) return;
       const keys = new Set();
       for (const choice of state.references) {
-        const key = `${choice.fragment}:${choice.reference}`;
+        const key = choice.number; // a fragment may come again under its name
         keys.add(key);
         if (shown.has(key)) continue;
         const details = element("details", {}, element("summary", {},
           element("strong", {}, choice.target), ` “${choice.phrase}” by ${GESTURES[choice.gesture] ?? choice.gesture}`,
-          element("span", { class: "why" }, `R ${choice.reliability.toFixed(2)}, ${seconds(choice.cost)}; ${key}`)));
+          element("span", { class: "why" }, `R ${choice.reliability.toFixed(2)}, ${seconds(choice.cost)}; ${choice.fragment}:${choice.reference}`)));
         details.addEventListener("toggle", () => {
           if (details.open && details.children.length === 1) details.append(table(choice));
         });

@@ -27,15 +27,16 @@ export function begin(root, robot) {
   const clock = runningClock();
   state.now = clock.now;
 
-  function take(frame) {
+  // isFirst: of a new link, whose window may be another one: nothing that was known before holds.
+  function take(frame, isFirst) {
     clock.hear(frame.now, Boolean(frame.place));
     const changed = new Set();
+    if (isFirst || (frame.place && frame.place.visit !== state.place?.visit)) {
+      state.blocks.clear();
+      state.layouts.clear();
+      changed.add("blocks").add("layouts");
+    }
     if (frame.place) {
-      if (frame.place.visit !== state.place?.visit) {
-        state.blocks.clear();
-        state.layouts.clear();
-        changed.add("blocks").add("layouts");
-      }
       state.place = frame.place;
       changed.add("place");
     }
@@ -60,24 +61,35 @@ export function begin(root, robot) {
       changed.add("told");
     }
     for (const name of frame.gone ?? []) {
-      state.blocks.delete(name.slice(EACH[0].length));
-      state.layouts.delete(name.slice(EACH[1].length));
+      const [kept, what] = name.startsWith(EACH[0]) ? [state.blocks, "blocks"] : [state.layouts, "layouts"];
+      kept.delete(name.slice(name.indexOf("/") + 1));
+      changed.add(what);
     }
-    for (const part of drawn) part.take(state, changed);
-    warning.take(state, changed);
+    for (const part of [...drawn, warning]) alone(part, () => part.take(state, changed));
     root.dataset.frames = Number(root.dataset.frames ?? 0) + 1;
+  }
+
+  // A panel that fails does not stop the others, nor the frames that come after. Each says so once.
+  const failed = new Set();
+  function alone(part, draw) {
+    try {
+      draw();
+    } catch (error) {
+      if (!failed.has(part)) console.error(error);
+      failed.add(part);
+    }
   }
 
   let running = true;
   function tick() {
     if (!running) return;
-    for (const part of drawn) part.tick?.(state);
+    for (const part of drawn) alone(part, () => part.tick?.(state));
     requestAnimationFrame(tick);
   }
   requestAnimationFrame(tick);
   const link = follow(take, warning.link);
   send = link.send;
-  window.engage = { state, send: link.send }; // for who looks into the page with the browser's tools
+  window.engage = { state, send: link.send, take, drawn }; // for who looks into the page with the browser's tools
   return () => {
     running = false;
     link.end();

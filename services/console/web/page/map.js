@@ -105,6 +105,8 @@ function hands(svg, order) {
     if (way && shape.classList.contains("object")) {
       const [x, y] = shape.dataset.at.split(",").map(Number);
       order({ do: "move", thing: shape.dataset.id, x: x + way[0], y: y + way[1] });
+    } else if (event.repeat) {
+      return; // a key that is held means one thing once
     } else if (event.key === "Enter" || event.key === " ") {
       mean(shape.dataset.id, false);
     } else if (event.key.toLowerCase() === "p") {

@@ -1,0 +1,117 @@
+"""The page itself, in a real browser at a window without a robot: frames are made up, and given to it."""
+
+import importlib.util
+import json
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from typing import Any, NamedTuple
+
+import pytest
+
+from tests.bus.places import free_endpoint
+from tests.console import browser
+from tests.console.browser import Page, waited
+from tests.console.windows import URL, engage
+
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="the extra `console` is not installed"),
+    pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium on this machine"),
+]
+SCRIPT = [{"turn_status": "full", "parts": [{"say": "Good morning."}]}]
+SENT = """
+window.sent = [];
+const send = WebSocket.prototype.send;
+WebSocket.prototype.send = function (text) { window.sent.push(JSON.parse(text).do); return send.call(this, text); };
+"""
+
+
+class Place(NamedTuple):
+    """Address of a window, and the port of a browser."""
+
+    url: str
+    port: int
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "script.json").write_text(json.dumps(SCRIPT))
+    (folder / "browser").mkdir()
+    here = ("--connect", free_endpoint(), "--port", "0", "--role", "wizard", "--script", str(folder / "script.json"))
+    with engage(folder / "console", "console", *here) as window, browser.running(folder / "browser") as port:
+        yield Place(waited(window, folder / "console", URL), port)
+
+
+@asynccontextmanager
+async def opened(place: Place) -> AsyncIterator[Page]:
+    async with browser.at_port(place.port) as running, running.page() as page:
+        await page.go(place.url)
+        await page.until("window.engage?.state.you && window.engage.state.nets", 60)
+        yield page
+
+
+async def take(page: Page, is_first: bool = False, **frame: Any) -> None:
+    """Give the page a frame, as if the window had sent it."""
+    told = json.dumps({"now": 1.0, **frame})
+    await page.value(f"window.engage.take({told}, {str(is_first).lower()})")
+
+
+def block(id: str, until: float | None = None) -> dict[str, Any]:
+    return {"id": id, "since": 0.5, "until": until, "status": "", "own": False, "behaviors": [], "ties": []}
+
+
+BLOCKS = "[...window.engage.state.blocks.keys()].join()"
+
+
+async def test_a_net_that_is_gone_takes_no_block_with_it(place: Place) -> None:
+    async with opened(place) as page:
+        await take(page, sections={f"block/{id}": block(id) for id in ("a", "xxa", "b")})
+        await take(page, gone=["net/xxa"])
+        assert await page.value(BLOCKS) == "a,xxa,b"
+
+        await take(page, gone=["block/xxa"])
+        assert await page.value(BLOCKS) == "a,b"
+
+
+async def test_blocks_of_another_window_are_not_drawn_any_more(place: Place) -> None:
+    async with opened(place) as page:
+        await take(page, sections={"block/old": block("old")})
+        await take(page, is_first=True, sections={"block/new": block("new")})
+
+        assert await page.value(BLOCKS) == "new"
+
+
+async def test_a_panel_that_fails_stops_neither_the_others_nor_the_next_frames(place: Place) -> None:
+    async with opened(place) as page:
+        await page.value("void (window.engage.drawn[0].take = () => { throw new Error('broken panel'); })")
+        await page.value("void (window.engage.drawn[1].tick = () => { throw new Error('broken clock'); })")
+        word = {"actor": "robot", "since": 1.0, "words": "still here", "open": False}
+        await take(page, sections={"words": [word]})
+        await page.until("document.querySelector('.words').textContent.includes('still here')")
+        frames = "Number(document.querySelector('.window').dataset.frames)"
+        before = await page.value(frames)
+        await page.until(f"{frames} > {before} + 2")
+
+        assert [sum(what in error for error in page.errors) for what in ("broken panel", "broken clock")] == [1, 1]
+
+
+async def test_two_references_of_one_name_are_both_listed(place: Place) -> None:
+    async with opened(place) as page:
+        choice = {"fragment": "f", "reference": "r", "target": "blue", "gesture": "gaze", "phrase": "it",
+                  "reliability": 0.9, "cost": 1.0, "pairs": []}  # fmt: skip
+        await take(page, sections={"references": [{"number": number, **choice} for number in range(2)]})
+
+        assert await page.value("document.querySelectorAll('.references details').length") == 2
+
+
+async def test_a_key_that_is_held_sends_its_fragment_once(place: Place) -> None:
+    async with opened(place) as page:
+        await page.until("document.querySelectorAll('.script button').length")
+        await page.value(SENT)
+        await page.value("document.activeElement.blur()")
+        for repeat in ("false", "true", "true", "true"):
+            key = f"new KeyboardEvent('keydown', {{ key: '1', repeat: {repeat} }})"
+            await page.value(f"document.dispatchEvent({key})")
+
+        assert await page.value("window.sent.filter((each) => each === 'prepared').length") == 1

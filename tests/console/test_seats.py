@@ -1,0 +1,124 @@
+"""Visitors who sit down at the same instant: each is a person of their own, in one window and in two."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.console.web.script import Script
+from engage_hri.services.console.web.seats import Seats
+from engage_hri.services.console.web.service import window
+from engage_hri.services.console.web.visitor import Visitor
+from engage_hri.services.runtime.service import Ready, running
+
+CUP = Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7))
+
+
+async def idle(bus: Bus, ready: Ready) -> None:
+    """Recognition that only stands there."""
+    ready()
+    await asyncio.get_running_loop().create_future()
+
+
+@asynccontextmanager
+async def visitors(hub: MemoryHub, windows: int, each: int) -> AsyncIterator[list[Visitor]]:
+    """Visitors with the token, so many at each window."""
+    async with AsyncExitStack() as stack:
+        await stack.enter_async_context(running(hub, {"recognition": idle}))
+        hub.join("camera", role="perception").publish(keys.WORLD, World(entities=(CUP,)))
+        made = []
+        for number in range(windows):
+            bus = hub.join(f"console-{number}", role="wizard")
+            shown = await stack.enter_async_context(window(hub, bus, Script(())))
+            bus.declare_alive()
+            made += [Visitor(shown, True) for _ in range(each)]
+        await asyncio.sleep(0.1)
+        yield made
+        for visitor in made:
+            await visitor.leave()
+
+
+async def places(hub: MemoryHub) -> list[tuple[float, ...]]:
+    with hub.join("reader").subscribe(keys.WORLD) as inbox:
+        received = await inbox.next()
+        await asyncio.sleep(0)
+    assert received is not None
+    assert isinstance(received.message, World)
+    return [person.position for person in received.message.people]
+
+
+def told(visitor: Visitor) -> str:
+    return " ".join(visitor.told())
+
+
+@pytest.mark.parametrize(("windows", "each"), [(1, 2), (2, 1), (2, 2), (3, 3)])
+async def test_who_takes_one_name_at_once_gets_it_alone_and_the_others_are_told(
+    hub: MemoryHub, windows: int, each: int
+) -> None:
+    async with visitors(hub, windows, each) as everybody:
+        for visitor in everybody:
+            visitor.take('{"do": "sit", "name": "ann"}')
+        await asyncio.sleep(3.0)
+
+        assert sorted(visitor.you.person for visitor in everybody) == [""] * (windows * each - 1) + ["ann"]
+        assert all("'ann' is there already" in told(visitor) for visitor in everybody if not visitor.you.person)
+
+
+@pytest.mark.parametrize(("windows", "each"), [(1, 2), (2, 1), (2, 2), (3, 3)])
+async def test_who_takes_any_seat_at_once_gets_a_name_and_a_place_of_their_own(
+    hub: MemoryHub, windows: int, each: int
+) -> None:
+    async with visitors(hub, windows, each) as everybody:
+        for visitor in everybody:
+            visitor.take('{"do": "sit"}')
+        await asyncio.sleep(10.0)
+
+        names = {visitor.you.person for visitor in everybody}
+        assert len(names) == windows * each
+        assert "" not in names
+        assert len(set(await places(hub))) == windows * each
+
+
+async def test_who_asks_twice_sits_once_and_may_come_again_after_leaving(hub: MemoryHub) -> None:
+    async with visitors(hub, 1, 1) as [visitor]:
+        visitor.take('{"do": "sit", "name": "ann"}')
+        visitor.take('{"do": "sit", "name": "bob"}')
+        await asyncio.sleep(2.0)
+        assert (visitor.you.person, len(await places(hub))) == ("ann", 1)
+
+        visitor.take('{"do": "leave"}')
+        await asyncio.sleep(1.0)
+        visitor.take('{"do": "sit", "name": "ann"}')
+        await asyncio.sleep(2.0)
+        assert visitor.you.person == "ann"
+
+
+async def test_a_seat_whose_window_was_killed_is_free_again(hub: MemoryHub) -> None:
+    seats = Seats()
+    claim = seats.claim("ann")
+    other = Seats()
+    other.feed(PeerAlive(participant=f"holder-{claim}", run="1"))
+
+    with pytest.raises(InputRefused, match="'ann' is there already"):
+        other.name("ann", ())
+    assert other.name("", ()) == "visitor"
+
+    other.feed(PeerGone(participant=f"holder-{claim}"))
+    assert other.name("ann", ()) == "ann"
+
+
+@pytest.mark.parametrize("name", ["cup", "robot", "all", "a/b"])
+async def test_a_name_of_a_thing_or_of_the_robot_is_refused_with_the_reason(hub: MemoryHub, name: str) -> None:
+    async with visitors(hub, 1, 1) as [visitor]:
+        visitor.take(f'{{"do": "sit", "name": "{name}"}}')
+        await asyncio.sleep(2.0)
+
+        assert visitor.you.person == ""
+        assert "can't be a person's id" in told(visitor)
