@@ -49,6 +49,7 @@ class RecordingFile:
             _sync_folder(path)
         except OSError as error:
             os.close(self._file)
+            path.unlink(missing_ok=True)  # else it would be in the way of the next attempt
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
 
     def write(self) -> bool:

@@ -9,6 +9,7 @@ from array import array
 from bisect import bisect_left, bisect_right
 from collections import Counter, OrderedDict
 from io import BytesIO
+from math import isfinite
 from typing import Any
 
 import msgspec
@@ -33,7 +34,16 @@ from engage_hri.services.recording.losses import LOST, MORE, Losses
 from engage_hri.services.recording.writing import PROFILE, Contents
 
 _HEAD = struct.Struct("<BQ")
-_BAD = (McapError, struct.error, ValueError, UnicodeDecodeError, zstandard.ZstdError)
+_BAD = (McapError, struct.error, ValueError, OverflowError, UnicodeDecodeError, zstandard.ZstdError)
+_OURS = (Opcode.HEADER, Opcode.CHUNK, Opcode.METADATA)
+"""Records that may stand before the end of the data, besides indexes."""
+_DATA_END, _INDEX = 4, 2 + 4
+"""Lengths of the end of the data, and of an index of no messages."""
+_ZSTD = b"\x04\0\0\0zstd"
+"""Name of the compression in the head of each of our chunks, and its place behind the chunk's beginning."""
+_ZSTD_AT = _HEAD.size + 8 + 8 + 8 + 4
+LARGEST_CHUNK = 64 * 1024 * 1024
+"""Bytes of a chunk's content. Ours have one MiB, and one message more."""
 CHUNKS_KEPT = 16
 """Number of chunks that are kept decompressed."""
 BILLION = 1_000_000_000
@@ -68,6 +78,8 @@ class Recording:
         """Begin and end of each chunk's content in the file."""
         self._indexed: ChunkIndex | None = None
         """The chunk to which the indexes belong that come next."""
+        self._is_over = False
+        """The end of the data has been read: what comes repeats it."""
         self._open: OrderedDict[int, bytes] = OrderedDict()
         self._times = array("q")
         self._of_channel = array("H")
@@ -78,6 +90,13 @@ class Recording:
         if not self.facts:
             reason = "nothing in it can be read" if not self._channels else "it is a recording of another program"
             raise InputRefused(Fault(reason=reason, where=name, advice="`engage record` makes recordings"))
+        try:
+            is_readable = isfinite(self.began) and self.wall >= 0
+        except ValueError:
+            is_readable = False
+        if not is_readable:
+            raise InputRefused(Fault(reason="what it says of its beginning is damaged", where=name))
+        self._leave_out_unknown()
 
     # -- what it says of itself ---------------------------------------------------------------------------------
 
@@ -201,23 +220,74 @@ class Recording:
         while at + _HEAD.size <= size:
             opcode, length = _HEAD.unpack_from(data, at)
             begin, end = at + _HEAD.size, at + _HEAD.size + length
-            if end > size or not 0 < opcode <= Opcode.DATA_END:
-                break
+            if end > size or not self._may_be(opcode, length, end):
+                if (found := self._next_chunk(at)) is None:
+                    break
+                self._damage(at, "no record is here")
+                at = found
+                continue
             if opcode == Opcode.FOOTER:
-                self.is_whole = bytes(data[end:size]) == MCAP0_MAGIC
+                self.is_whole = True
                 return good
+            self._is_over |= opcode == Opcode.DATA_END
             try:
                 self._take(opcode, data[begin:end], at, begin, end)
             except _BAD as error:
-                if opcode != Opcode.CHUNK:
+                found = self._next_chunk(at)
+                if found is None and opcode != Opcode.CHUNK:
                     break
-                self._indexed = None
-                self.damaged.append(Damaged(at, f"{type(error).__name__}: {error}"))
+                self._damage(at, f"{type(error).__name__}: {error}")
+                at = end if found is None else found
+                continue
             at = end
             if opcode in (Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA):
                 good = at
         self.lost_bytes = size - good
         return good
+
+    def _may_be(self, opcode: int, length: int, end: int) -> bool:
+        """Tell whether a record of this kind and length can stand here. Where a length is damaged none can."""
+        match opcode:
+            case Opcode.FOOTER:
+                return bytes(self._data[end:]) == MCAP0_MAGIC
+            case Opcode.DATA_END:
+                return length == _DATA_END
+            case Opcode.MESSAGE_INDEX:
+                told = int.from_bytes(self._data[end - length + 2 : end - length + _INDEX], "little")
+                return not self._is_over and told == length - _INDEX
+        return 0 < opcode < Opcode.DATA_END if self._is_over else opcode in _OURS
+
+    def _damage(self, at: int, reason: str) -> None:
+        self._indexed = None
+        self.damaged.append(Damaged(at, reason))
+
+    def _next_chunk(self, at: int) -> int | None:
+        """Find the next chunk behind a damaged record that can be read whole."""
+        data, place = self._data, at + 1 + _ZSTD_AT
+        while (place := data.find(_ZSTD, place)) >= 0:
+            begin = place - _ZSTD_AT
+            opcode, length = _HEAD.unpack_from(data, begin)
+            if opcode == Opcode.CHUNK and length <= len(data) - begin - _HEAD.size:
+                try:
+                    _plain(_chunk(data[begin + _HEAD.size : begin + _HEAD.size + length]))
+                except _BAD:
+                    pass
+                else:
+                    return begin
+            place += 1
+        return None
+
+    def _leave_out_unknown(self) -> None:
+        """Leave out messages whose channel nobody tells of any more: that stood in a chunk that is damaged."""
+        known = [number for number, channel in enumerate(self._of_channel) if channel in self._channels]
+        lost = len(self._of_channel) - len(known)
+        if lost:
+            where = self.damaged[0].offset if self.damaged else 0
+            self.damaged.append(Damaged(where, f"{lost} later messages are of channels that only it told of"))
+            for name in ("_times", "_of_channel", "_of_chunk", "_places"):
+                values = getattr(self, name)
+                setattr(self, name, array(values.typecode, [values[number] for number in known]))
+        self._contents.counts = Counter(self._of_channel)
 
     def _take(self, opcode: int, body: bytes, at: int, begin: int, end: int) -> None:
         stream = ReadDataStream(BytesIO(body))
@@ -226,6 +296,8 @@ class Recording:
         elif opcode == Opcode.MESSAGE_INDEX and self._indexed is not None:
             self._indexed.message_index_offsets[MessageIndex.read(stream).channel_id] = at
             self._indexed.message_index_length += end - at
+        elif opcode == Opcode.CHANNEL:  # told again at the end, also those of a chunk that is damaged
+            self._tell_of(Channel.read(stream))
         elif opcode == Opcode.METADATA:
             told = Metadata.read(stream)
             self._contents.metadata.append(MetadataIndex(offset=at, length=end - at, name=told.name))
@@ -253,9 +325,7 @@ class Recording:
                     self._contents.schemas.append(schema)
             place = inner + length
         for channel in channels:
-            if channel.id not in self._channels:
-                self._contents.channels.append(channel)
-            self._channels[channel.id] = channel
+            self._tell_of(channel)
         self._chunks.append((begin, end))
         self._indexed = ChunkIndex(
             chunk_length=end - at, chunk_start_offset=at, compression=chunk.compression,
@@ -265,13 +335,15 @@ class Recording:
         )  # fmt: skip
         self._contents.chunks.append(self._indexed)
         for log_time, channel, place in found:
-            if channel not in self._channels:  # told of in a chunk that is damaged
-                continue
             self._times.append(log_time)
             self._of_channel.append(channel)
             self._of_chunk.append(number)
             self._places.append(place)
-            self._contents.counts[channel] += 1
+
+    def _tell_of(self, channel: Channel) -> None:
+        if channel.id not in self._channels:
+            self._contents.channels.append(channel)
+        self._channels[channel.id] = channel
 
 
 def received(sample: Sample) -> Received | None:
@@ -290,6 +362,11 @@ def _chunk(body: bytes) -> Chunk:
     chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     if len(chunk.data) != len(body) - (8 + 8 + 8 + 4 + 4 + len(chunk.compression) + 8):
         raise ValueError("it is cut off")
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd" and zstandard.frame_content_size(chunk.data) not in (size, -1):
+        raise ValueError("its two sizes differ")  # and memory for the greater one may not be there
+    if size > LARGEST_CHUNK:
+        raise ValueError(f"it says that it has {size} bytes")
     return chunk
 
 

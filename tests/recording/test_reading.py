@@ -2,6 +2,7 @@
 
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -151,6 +152,48 @@ def test_a_damaged_chunk_is_left_out_and_told(tmp_path: Path) -> None:
     assert [each.offset for each in recording.damaged] == [second.chunk_start_offset]
     assert all_of(recording) == told()[:7] + told()[14:]
     assert recording.is_whole
+
+
+@pytest.mark.parametrize("change", [lambda byte: byte ^ 0x80, lambda byte: byte ^ 1, lambda byte: 0])
+def test_a_damaged_byte_anywhere_costs_one_chunk_at_most(change: Callable[[int], int]) -> None:
+    data, whole = bytes_of(told()), told()
+    chunks = Recording(data).contents.chunks
+    end = chunks[-1].chunk_start_offset + chunks[-1].chunk_length
+    heads = (0, 1, 2, 5, 8, 9, 17, 25, 32, 33, 37, 40, 41, 45)
+    places = {one.chunk_start_offset + at for one in chunks for at in heads}
+    places |= {*range(chunks[1].chunk_start_offset, end, 3), *range(chunks[0].chunk_start_offset, end, 301)}
+    for place in sorted(places):
+        bad = bytearray(data)
+        if bad[place] == change(bad[place]):
+            continue
+        bad[place] = change(bad[place])
+
+        found = all_of(Recording(bytes(bad)))
+
+        assert found == [one for one in whole if one in found]
+        assert len(whole) - len(found) <= 7, place
+
+
+@pytest.mark.parametrize("name", ["began", "wall"])
+def test_a_beginning_that_is_damaged_is_refused_in_words(name: str) -> None:
+    value = FACTS[name].encode()
+    data = bytes_of(told())
+    assert data.count(name.encode() + len(value).to_bytes(4, "little") + value) == 1
+
+    with pytest.raises(InputRefused, match="what it says of its beginning is damaged"):
+        Recording(data.replace(name.encode() + len(value).to_bytes(4, "little") + value,
+                               name.encode() + len(value).to_bytes(4, "little") + b"x" * len(value)))  # fmt: skip
+
+
+def test_a_chunk_that_says_that_it_is_huge_is_damaged_and_takes_no_memory() -> None:
+    data = bytearray(bytes_of(told()))
+    second = Recording(bytes(data)).contents.chunks[1]
+    data[second.chunk_start_offset + 25 : second.chunk_start_offset + 33] = (2**40).to_bytes(8, "little")
+
+    recording = Recording(bytes(data))
+
+    assert all_of(recording) == told()[:7] + told()[14:]
+    assert [each.offset for each in recording.damaged] == [second.chunk_start_offset]
 
 
 def test_zeros_behind_a_crash_are_no_records() -> None:

@@ -15,7 +15,7 @@ from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.status import Status
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.recording import disk
-from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.disk import RecordingFile, read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.service import FLUSH
 from tests.recording.conftest import Anchor
@@ -170,3 +170,14 @@ async def test_presence_is_kept_though_it_is_never_sent(tmp_path: Path) -> None:
     came, gone = [one for one in told if one.key == keys.alive("there")]
     assert came.message == PeerAlive(participant="there", run=there.run)
     assert gone.at - came.at == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_file_that_could_not_be_begun_is_not_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*given: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(InputRefused, match="No space left on device"):
+        RecordingFile(tmp_path / "a.mcap", {}, print)
+
+    assert not list(tmp_path.iterdir())
