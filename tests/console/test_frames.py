@@ -6,7 +6,7 @@ from typing import Any
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.web.frames import HEARTBEAT, Viewer, You
+from engage_hri.services.console.web.frames import HEARTBEAT, Told, Viewer, You
 from engage_hri.services.console.web.lanes import KEPT
 from engage_hri.services.console.web.picture import BLOCK, SECTIONS, Picture
 from tests.console.scenes import at
@@ -61,4 +61,6 @@ def test_a_heartbeat_comes_when_nothing_happens_and_news_for_the_visitor_at_once
 
     assert frame(viewer, made, 10.0 + HEARTBEAT) == {"now": HEARTBEAT}
     assert frame(viewer, made, 11.1, you=You(person="ann"))["you"]["person"] == "ann"
-    assert frame(viewer, made, 11.2, you=You(person="ann"), told=("no",)) == {"now": 1.2, "told": ["no"]}
+    assert frame(viewer, made, 11.2, you=You(person="ann"), told=(Told("part", "no"),)) == {
+        "now": 1.2, "told": [{"panel": "part", "text": "no"}],
+    }  # fmt: skip

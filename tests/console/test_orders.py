@@ -112,6 +112,14 @@ def json_codec_fragment(value: dict[str, object]) -> TurnFragment:
     return fragment
 
 
+def test_a_prepared_fragment_is_for_whom_it_names_or_else_for_whom_the_wizard_has_chosen() -> None:
+    made = Script((TurnFragment(id="a", addressee="ann"), TurnFragment(id="b")))
+    taken = [made.take(0, "kim"), made.take(1, "kim"), made.take(1)]
+
+    assert [isinstance(each, TurnFragment) and each.addressee for each in taken] == ["ann", "kim", ""]
+    assert backchannel("nod", "kim")["addressee"] == "kim"
+
+
 def test_each_performance_of_the_script_has_an_id_of_its_own() -> None:
     hello = TurnFragment(
         id="hello", behaviors=(Speech(id="s", text="Look at"), Reference(id="r", target="cup"))

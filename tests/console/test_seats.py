@@ -55,7 +55,7 @@ async def places(hub: MemoryHub) -> list[tuple[float, ...]]:
 
 
 def told(visitor: Visitor) -> str:
-    return " ".join(visitor.told())
+    return " ".join(each.text for each in visitor.told())
 
 
 @pytest.mark.parametrize(("windows", "each"), [(1, 2), (2, 1), (2, 2), (3, 3)])

@@ -1,6 +1,7 @@
 """Frames: what a browser gets next, which is all that has changed since the last one that it drew. Pure."""
 
 from collections.abc import Iterable
+from typing import Literal
 
 from msgspec import Raw, Struct
 from msgspec.json import Encoder
@@ -10,6 +11,13 @@ from engage_hri.services.console.web.picture import Picture
 
 HEARTBEAT: Seconds = 1.0
 """Time after which a browser gets a frame though nothing has changed, so that it knows that the window is there."""
+
+
+class Told(Struct, frozen=True):
+    """News of an order for who gave it. panel: where it was given: the seat (`part`), or the robot by hand."""
+
+    panel: Literal["part", "wizard"]
+    text: str
 
 
 class Frame(Struct, frozen=True, omit_defaults=True):
@@ -22,7 +30,7 @@ class Frame(Struct, frozen=True, omit_defaults=True):
     sections: dict[str, Raw] = {}
     gone: tuple[str, ...] = ()
     you: "You | None" = None
-    told: tuple[str, ...] = ()
+    told: tuple[Told, ...] = ()
     place: "Place | None" = None
 
 
@@ -70,7 +78,7 @@ class Viewer:
         picture: Picture,
         now: Seconds,
         you: You | None = None,
-        told: Iterable[str] = (),
+        told: Iterable[Told] = (),
         place: Place | None = None,
         clock: Seconds | None = None,
     ) -> bytes | None:

@@ -113,15 +113,17 @@ class Tell(WizardOrder, frozen=True, kw_only=True, tag="tell"):
 
 
 class Prepared(WizardOrder, frozen=True, kw_only=True, tag="prepared"):
-    """Perform a fragment of the script. number: its place there, from 0."""
+    """Perform a fragment of the script. number: its place there, from 0. addressee: if the fragment names nobody."""
 
     number: Annotated[int, Meta(ge=0)]
+    addressee: Id = ""
 
 
 class Backchannel(WizardOrder, frozen=True, kw_only=True, tag="backchannel"):
     """Show that the robot listens. how: by a nod or a word."""
 
     how: Literal["nod", "uh-huh"] = "nod"
+    addressee: Id = ""
 
 
 class InhibitGaze(WizardOrder, frozen=True, kw_only=True, tag="inhibit"):

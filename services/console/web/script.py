@@ -28,13 +28,16 @@ class Script:
         """A title for each: its words and what it refers to, or its id."""
         return tuple(map(title, self._things))
 
-    def take(self, number: int) -> Thing:
-        """The thing at a place, with a new id. Raises IndexError if there is none."""
+    def take(self, number: int, addressee: str = "") -> Thing:
+        """The thing at a place, with a new id. Raises IndexError if there is none.
+
+        addressee: id of the person for whom a fragment is that names nobody.
+        """
         thing = self._things[number]
         id = f"{thing.id}-{next(self._numbers)}"
         if isinstance(thing, Block):
             return with_names(thing, {thing.id: id})
-        return replace(thing, id=id)
+        return replace(thing, id=id, addressee=thing.addressee or addressee)
 
 
 def title(thing: Thing) -> str:
@@ -57,7 +60,7 @@ def told(text: str, target: str, asks: bool, addressee: str) -> dict[str, object
     return {"turn_status": "full", "turn_index": 1 if asks else 3, "parts": parts, "addressee": addressee}
 
 
-def backchannel(how: str) -> dict[str, object]:
-    """A short sign that the robot listens. how: nod, or a word."""
+def backchannel(how: str, addressee: str = "") -> dict[str, object]:
+    """A short sign that the robot listens. how: nod, or a word. addressee: empty: the only one."""
     part = {"gesture": "nod"} if how == "nod" else {"say": how}
-    return {"turn_status": "backchannel", "parts": [part]}
+    return {"turn_status": "backchannel", "parts": [part], "addressee": addressee}

@@ -16,7 +16,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web import orders
-from engage_hri.services.console.web.frames import Viewer, You
+from engage_hri.services.console.web.frames import Told, Viewer, You
 from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.page import build
@@ -174,7 +174,7 @@ async def _show_robot(window: Window, browser: WebSocket, visitor: Visitor) -> N
 async def _show_recording(recording: Recording, browser: WebSocket) -> None:
     """Each browser has a place of its own in the recording."""
     now = asyncio.get_running_loop().time
-    viewer, told, played = Viewer(), list[str](), PlayedPicture(recording, now())
+    viewer, told, played = Viewer(), list[Told](), PlayedPicture(recording, now())
     reason = "this is a recording"
     you = You(denied=dict.fromkeys(orders.ALL_RIGHTS, reason))
 
@@ -182,7 +182,7 @@ async def _show_recording(recording: Recording, browser: WebSocket) -> None:
         try:
             order = orders.decoded_in_recording(text)
         except InputRefused as error:
-            told.append(str(error))
+            told.append(Told("part", str(error)))
             return False
         if isinstance(order, orders.Play):
             at = now()

@@ -17,7 +17,7 @@ from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.perceive import check_id, perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
-from engage_hri.services.console.web.frames import You
+from engage_hri.services.console.web.frames import Told, You
 from engage_hri.services.console.web.laying import laid
 from engage_hri.services.console.web.seats import SETTLED
 from engage_hri.services.console.web.service import Window
@@ -36,7 +36,7 @@ class Visitor:
         self._window = window
         self._trusted = trusted
         self._denied = orders.denied(window.bus.role, trusted)
-        self._told: deque[str] = deque(maxlen=TOLD_KEPT)
+        self._told: deque[Told] = deque(maxlen=TOLD_KEPT)
         self._tasks: set[asyncio.Task[None]] = set()
         self._person: PerceivedPerson | None = None
         self._sitting: asyncio.Task[None] | None = None
@@ -56,7 +56,7 @@ class Visitor:
             inhibits=self._inhibits,
         )
 
-    def told(self) -> tuple[str, ...]:
+    def told(self) -> tuple[Told, ...]:
         """News of the orders since this was asked last."""
         news = tuple(self._told)
         self._told.clear()
@@ -64,6 +64,7 @@ class Visitor:
 
     def take(self, text: str) -> bool:
         """Carry out an order, or begin to. Returns True if it says that a frame was drawn; what fails is told."""
+        order = None
         try:
             order = orders.decoded(text)
             if reason := orders.missing(order, self._window.bus.role, self._trusted):
@@ -75,8 +76,11 @@ class Visitor:
             else:
                 self._drive(order)
         except EngageError as error:
-            self._told.append(str(error))
+            self._tell(str(error), is_by_hand=order is not None and order.needs not in ("", "seat"))
         return False
+
+    def _tell(self, text: str, *, is_by_hand: bool) -> None:
+        self._told.append(Told("wizard" if is_by_hand else "part", text))
 
     async def leave(self) -> None:
         """End all that this visitor does. The person leaves, and a lease on the gaze ends."""
@@ -169,30 +173,33 @@ class Visitor:
             case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
                 if not text.strip() and not target:
                     raise InputRefused(Fault(reason="nothing to say", advice="write words, or choose an object"))
-                self._begin(self._perform(script.told(text, target, asks, addressee)))
-            case orders.Prepared(number=number):
+                self._drives(self._perform(script.told(text, target, asks, addressee)))
+            case orders.Prepared(number=number, addressee=addressee):
                 if number >= len(self._window.script):
                     raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))
-                self._begin(self._perform(self._window.script.take(number)))
-            case orders.Backchannel(how=how):
-                self._begin(self._perform(script.backchannel(how)))
+                self._drives(self._perform(self._window.script.take(number, addressee)))
+            case orders.Backchannel(how=how, addressee=addressee):
+                self._drives(self._perform(script.backchannel(how, addressee)))
             case orders.InhibitGaze(on=True, mode=mode, target=target):
                 if not self._inhibits:
                     self._lets_go.clear()
-                    self._begin(self._inhibit(mode, target))
+                    self._drives(self._inhibit(mode, target))
             case orders.InhibitGaze():
                 self._lets_go.set()
             case orders.SteerOrder(to="hold"):
-                self._begin(_done(robot.hold(timeout=PATIENCE)))
+                self._drives(_done(robot.hold(timeout=PATIENCE)))
             case orders.SteerOrder(to="continue"):
-                self._begin(_done(robot.resume(timeout=PATIENCE)))
+                self._drives(_done(robot.resume(timeout=PATIENCE)))
             case orders.SteerOrder(to="stop"):
-                self._begin(_done(robot.stop(timeout=PATIENCE)))
+                self._drives(_done(robot.stop(timeout=PATIENCE)))
             case orders.SwitchOrder(faults=faults):
-                self._begin(_done(robot.switch_faults(faults, timeout=PATIENCE)))
+                self._drives(_done(robot.switch_faults(faults, timeout=PATIENCE)))
             case orders.Condition(name=name, speech_only=speech_only, by=who):
                 named = name.strip()
-                self._begin(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))
+                self._drives(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))
+
+    def _drives(self, work: Coroutine[Any, Any, None]) -> None:
+        self._begin(work, is_by_hand=True)
 
     async def _perform(self, thing: Any) -> None:
         if isinstance(thing, Block):
@@ -201,7 +208,7 @@ class Visitor:
         fragment = fragment_in(thing, self._window.new_id())
         outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
         if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
-            self._told.append("; ".join(problems))
+            self._tell("; ".join(problems), is_by_hand=True)
 
     async def _inhibit(self, mode: Any, target: str) -> None:
         async with self._window.robot.inhibit_gaze(mode, target=target, timeout=PATIENCE):
@@ -211,12 +218,12 @@ class Visitor:
             finally:
                 self._inhibits = False
 
-    def _begin(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    def _begin(self, work: Coroutine[Any, Any, None], *, is_by_hand: bool = False) -> asyncio.Task[None]:
         async def contained() -> None:
             try:
                 await work
             except EngageError as error:
-                self._told.append(str(error))
+                self._tell(str(error), is_by_hand=is_by_hand)
 
         task = asyncio.create_task(contained(), name="visitor")
         self._tasks.add(task)

@@ -60,3 +60,16 @@ export function drawn(name, attributes = {}, ...children) {
   made.append(...children);
   return made;
 }
+
+// News of the orders that were given in a panel: shown for a while in its line for them.
+export function news(panel) {
+  const line = panel.querySelector(".told");
+  let clearing = null;
+  return (told) => {
+    const texts = told.filter((each) => each.panel === panel.id).map((each) => each.text);
+    if (!texts.length) return;
+    line.textContent = texts.join(" ");
+    clearTimeout(clearing);
+    clearing = setTimeout(() => (line.textContent = ""), 9000);
+  };
+}

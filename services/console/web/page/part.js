@@ -1,11 +1,10 @@
 // The seat: whoever looks at the page becomes a person before the robot.
-import { element } from "./look.js";
+import { element, news } from "./look.js";
 
 export function part(panel, order) {
   const place = panel.querySelector(".part");
-  const told = panel.querySelector(".told");
   let speaking = false;
-  let clearing = null;
+  const told = news(panel);
 
   const button = (text, attributes, act) => {
     const made = element("button", { type: "button", ...attributes }, text);
@@ -70,11 +69,7 @@ export function part(panel, order) {
         who.replaceChildren("You are ", element("strong", {}, person), ".");
         document.body.classList.toggle("seated", Boolean(person));
       }
-      if (changed.has("told")) {
-        told.textContent = state.told.join(" ");
-        clearTimeout(clearing);
-        clearing = setTimeout(() => (told.textContent = ""), 9000);
-      }
+      if (changed.has("told")) told(state.told);
     },
   };
 }

@@ -2,6 +2,7 @@
 import { clock, element } from "./look.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 10];
+const STEP = 5; // seconds that an arrow key goes
 const EACH = 250; // ms between two places while the slider is dragged
 
 export function player(bar, order) {
@@ -18,6 +19,13 @@ export function player(bar, order) {
   };
   slider.addEventListener("input", () => dragged(false));
   slider.addEventListener("change", () => dragged(true));
+  slider.addEventListener("keydown", (event) => {
+    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    if (!way) return;
+    event.preventDefault(); // the browser would go on by a tenth of a second
+    slider.value = String(Number(slider.value) + way * STEP);
+    dragged(true);
+  });
   const speed = element("select", { "aria-label": "Speed" },
     ...SPEEDS.map((each) => element("option", { value: String(each) }, `${each} x`)));
   speed.value = "1";

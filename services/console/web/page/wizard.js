@@ -1,8 +1,9 @@
 // The robot by hand: words, references, questions, signs of listening, its gaze, what is held, conditions of a study, faults of the body.
-import { element } from "./look.js";
+import { element, news } from "./look.js";
 
 export function wizard(panel, order) {
   const place = panel.querySelector(".wizard");
+  const told = news(panel);
   const by = input("by", "Your name, for the log", { maxlength: "40" });
   const send = (what) => order({ ...what, by: by.field.value.trim() });
   const button = (text, act, attributes = {}) => {
@@ -31,8 +32,8 @@ export function wizard(panel, order) {
     const at = gaze.field.value;
     send({ do: "inhibit", on, mode: at ? "target" : "hold", target: at });
   }, { "aria-pressed": "false" });
-  const signs = element("div", { class: "row" }, button("Nod", () => send({ do: "backchannel", how: "nod" })),
-    button("Uh-huh", () => send({ do: "backchannel", how: "uh-huh" })), ...gaze.parts, inhibit);
+  const signs = element("div", { class: "row" }, button("Nod", () => send({ do: "backchannel", how: "nod", addressee: whom.field.value })),
+    button("Uh-huh", () => send({ do: "backchannel", how: "uh-huh", addressee: whom.field.value })), ...gaze.parts, inhibit);
   const steer = element("div", { class: "row", role: "group", "aria-label": "What the robot performs" },
     button("Stop", () => send({ do: "steer", to: "stop" }), { class: "stop" }),
     button("Hold", () => send({ do: "steer", to: "hold" })), button("Go on", () => send({ do: "steer", to: "continue" })));
@@ -53,7 +54,7 @@ export function wizard(panel, order) {
   document.addEventListener("keydown", (event) => {
     const busy = event.target.closest?.("input, select, textarea") || event.repeat || event.ctrlKey || event.metaKey || event.altKey;
     const number = Number(event.key) - 1;
-    if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) send({ do: "prepared", number });
+    if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) send({ do: "prepared", number, addressee: whom.field.value });
   });
 
   let on = []; // kinds of faults that the body has
@@ -71,7 +72,7 @@ export function wizard(panel, order) {
         inhibit.setAttribute("aria-pressed", String(Boolean(inhibits)));
         inhibit.textContent = inhibits ? "Let go" : "Keep";
         script.replaceChildren(...titles.map((title, number) => element("li", {},
-          button(`${number < 9 ? `${number + 1}  ` : ""}${title}`, () => send({ do: "prepared", number })))));
+          button(`${number < 9 ? `${number + 1}  ` : ""}${title}`, () => send({ do: "prepared", number, addressee: whom.field.value })))));
         switches(kinds);
       }
       if (changed.has("switched")) {
@@ -79,7 +80,10 @@ export function wizard(panel, order) {
         if (ordered && ordered.length === on.length && ordered.every((each) => on.includes(each))) ordered = null;
         for (const each of faults.querySelectorAll("button")) each.setAttribute("aria-pressed", String(on.includes(each.dataset.kind)));
       }
-      if (changed.has("told")) ordered = null; // it may have been refused
+      if (changed.has("told")) {
+        ordered = null; // it may have been refused
+        told(state.told);
+      }
       if (changed.has("scene")) {
         const { things, people } = state.scene;
         options(target.field, "(nothing)", things.filter((each) => each.kind === "object").map((each) => each.id));
