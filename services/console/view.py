@@ -124,6 +124,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     held: tuple[HoldInView, ...] = ()
     faults: tuple[BodyFault, ...] = ()
+    faults_by: str = ""
+    """Participant that switched them; empty: the configuration."""
     realizer: str = ""
     """Life of the realizer; empty: unknown."""
 
@@ -174,8 +176,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             lasts = [each.until.seconds - each.since.seconds for each in holds]
             held = zip(holds, since, lasts, strict=True)
             return replace(scene, held=tuple(HoldInView(hold, began, began + last) for hold, began, last in held))
-        case BodyFaults(faults=faults):
-            return replace(scene, faults=faults)
+        case BodyFaults(faults=faults, by=by):
+            return replace(scene, faults=faults, faults_by=by)
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
         case WarningFeedback(kind=kind, message=text):

@@ -131,6 +131,7 @@ class Picture:
                 self._health.feed(message)
                 self._changed("health")
                 if not isinstance(message, Status):
+                    self._changed("switched")
                     self._changed(*(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
             case Held() | BodyFaults():
                 self._changed("switched")
@@ -274,7 +275,10 @@ class Picture:
     def _switched(self) -> Switched:
         held = tuple(wording.held(each.hold) for each in self._scene.held)
         kinds = dict.fromkeys(each.kind for each in self._scene.faults)
-        return Switched(held, tuple(map(words, self._scene.faults)), tuple(kinds))
+        by = self._scene.faults_by if kinds else ""
+        if by and not self._health.has(by):
+            by += ", which has left the bus"
+        return Switched(held, tuple(map(words, self._scene.faults)), tuple(kinds), by)
 
     def _changed(self, *names: str) -> None:
         for name in names:

@@ -262,8 +262,9 @@ class Note(Struct, frozen=True):
 
 
 class Switched(Struct, frozen=True):
-    """Holds, and faults of the body that are on, in words. kinds: of these faults."""
+    """Holds, and faults of the body that are on, in words. kinds: of these faults. by: who switched them on."""
 
     held: tuple[str, ...]
     faults: tuple[str, ...]
     kinds: tuple[str, ...]
+    by: str = ""

@@ -141,10 +141,10 @@ export function switched(place) {
   return {
     take(state, changed) {
       if (!changed.has("switched")) return;
-      const { held, faults } = state.switched;
+      const { held, faults, by } = state.switched;
       const told = [
         held.length ? `Held: ${held.join(", ")}.` : "",
-        faults.length ? `Faults of the body that are on: ${faults.join(", ")}.` : "",
+        faults.length ? `Faults of the body that are on: ${faults.join(", ")}${by ? ` (switched by ${by})` : ""}.` : "",
       ].filter(Boolean).join(" ");
       place.hidden = !told;
       place.textContent = told;
