@@ -46,11 +46,12 @@ class BodyFaults(Struct, frozen=True, kw_only=True, tag="body_faults", omit_defa
 
     Published at the start and at every change; a late subscriber gets the last one.
 
-    at: when it was published.
+    at: when it was published. by: participant that switched last; empty: the configuration did.
     """
 
     at: Stamp
     faults: tuple[BodyFault, ...] = ()
+    by: str = ""
 
 
 KINDS: Mapping[str, FaultKind] = {

@@ -127,6 +127,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     faults: tuple[BodyFault, ...] = ()
     condition: StudyCondition | None = None
     """Condition of the study; None: generation has not told of one."""
+    faults_by: str = ""
+    """Participant that switched them; empty: the configuration."""
     realizer: str = ""
     """Life of the realizer; empty: unknown."""
 
@@ -177,8 +179,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             lasts = [each.until.seconds - each.since.seconds for each in holds]
             held = zip(holds, since, lasts, strict=True)
             return replace(scene, held=tuple(HoldInView(hold, began, began + last) for hold, began, last in held))
-        case BodyFaults(faults=faults):
-            return replace(scene, faults=faults)
+        case BodyFaults(faults=faults, by=by):
+            return replace(scene, faults=faults, faults_by=by)
         case StudyCondition():
             return replace(scene, condition=message)
         case Statistics(actor="", session=session):

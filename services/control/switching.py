@@ -15,6 +15,8 @@ class FaultSwitch:
         self._bus = bus
         self._body = body
         self._desk = desk
+        self._by = ""
+        """Participant that switched last; its faults stay on when it goes, or is killed."""
 
     def serve(self, request: SwitchFaults) -> None:
         """Carry out a request, and answer it."""
@@ -31,9 +33,10 @@ class FaultSwitch:
             self._desk.refuse(request.id, error.fault)
             return
         self._desk.accept(request.id)
+        self._by = request.requester
         self.tell()
         self._desk.end(FaultsSwitched(id=request.id, faults=self._body.faults))
 
     def tell(self) -> None:
         """Publish what is on."""
-        self._bus.publish(keys.BODY_FAULTS, BodyFaults(at=self._bus.stamp(), faults=self._body.faults))
+        self._bus.publish(keys.BODY_FAULTS, BodyFaults(at=self._bus.stamp(), faults=self._body.faults, by=self._by))

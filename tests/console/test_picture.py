@@ -388,6 +388,18 @@ def test_a_block_whose_realizer_died_is_lost_and_leaves_unless_the_same_life_com
     assert f"{BLOCK}b" not in other.versions
 
 
+def test_faults_that_a_killed_window_left_on_are_told_with_who_did_it() -> None:
+    slow = BodyFaults(at=at(11.0), faults=(BodyFault(kind="slow", amount=2.0),), by="console-1")
+    made = picture((PeerAlive(participant="console-1", run="1"), 10.0), (slow, 11.0))
+    assert section(made, "switched")["by"] == "console-1"
+
+    made.feed(PeerGone(participant="console-1"), 12.0, 12.0)
+    assert section(made, "switched")["by"] == "console-1, which has left the bus"
+
+    made.feed(BodyFaults(at=at(13.0), by="console-2"), 13.0, 13.0)
+    assert section(made, "switched")["by"] == ""
+
+
 def test_two_references_of_one_name_are_two() -> None:
     choice = ReferenceChoice(
         reference="r", target="blue", gesture="gaze", phrase="it", reliability=0.9, cost=1.0, pairs=()

@@ -34,6 +34,10 @@ class HealthBoard:
             case Status(participant=name):
                 self._status[name] = message
 
+    def has(self, name: str) -> bool:
+        """Tell whether a participant is on the bus."""
+        return self._here.get(name, False)
+
     def silence(self, names: frozenset[str]) -> bool:
         """Take the names of those who did not answer. Returns whether they are others than before."""
         before, self._silent = self._silent, names

@@ -132,6 +132,7 @@ class Picture:
                 self._health.feed(message)
                 self._changed("health")
                 if not isinstance(message, Status):
+                    self._changed("switched")
                     self._changed(*(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
@@ -277,8 +278,11 @@ class Picture:
         kinds = dict.fromkeys(each.kind for each in self._scene.faults)
         told = self._scene.condition
         is_set = told is not None and (told.by or told.speech_only)
+        by = self._scene.faults_by if kinds else ""
+        if by and not self._health.has(by):
+            by += ", which has left the bus"
         return Switched(
-            held, tuple(map(words, self._scene.faults)), tuple(kinds),
+            held, tuple(map(words, self._scene.faults)), tuple(kinds), by,
             condition=wording.condition(told) if told is not None and is_set else "",
         )  # fmt: skip
 

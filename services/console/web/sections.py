@@ -262,9 +262,13 @@ class Note(Struct, frozen=True):
 
 
 class Switched(Struct, frozen=True):
-    """Holds, faults of the body that are on, and the condition of a study, in words. kinds: of these faults."""
+    """Holds, faults of the body that are on, and the condition of a study, in words.
+
+    kinds: of these faults. by: who switched them on.
+    """
 
     held: tuple[str, ...]
     faults: tuple[str, ...]
     kinds: tuple[str, ...]
+    by: str = ""
     condition: str = ""

@@ -163,11 +163,11 @@ export function switched(place) {
   return {
     take(state, changed) {
       if (!changed.has("switched")) return;
-      const { held, faults, condition } = state.switched;
+      const { held, faults, by, condition } = state.switched;
       const told = [
         condition ? `${condition[0].toUpperCase()}${condition.slice(1)}.` : "",
         held.length ? `Held: ${held.join(", ")}.` : "",
-        faults.length ? `Faults of the body that are on: ${faults.join(", ")}.` : "",
+        faults.length ? `Faults of the body that are on: ${faults.join(", ")}${by ? ` (switched by ${by})` : ""}.` : "",
       ].filter(Boolean).join(" ");
       place.hidden = !told;
       place.textContent = told;
