@@ -213,7 +213,9 @@ class PerceivedPerson:
     def tell(self, utterance: Utterance) -> None:
         """Tell words as a recognizer has them, at any time; speech itself is begun and ended as an action.
 
-        utterance: with an id of your own; `actor` is this person's. Raises InputRefused for what nobody would read.
+        utterance: with an id of your own; `actor` is this person's.
+
+        Raises InputRefused: a text or an id that no reader takes.
         """
         self._check()
         self._check_length(utterance.text)
