@@ -13,7 +13,8 @@ from engage_hri.schemas.units import Probability, Stamp, Vector
 LONGEST_TEXT = 4000
 """Letters of one utterance. A minute of speech has some 900."""
 MOST_ADDRESSEES = 64
-UtteranceId = Annotated[str, Meta(min_length=1, max_length=200)]
+LONGEST_ID = 200
+UtteranceId = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
 
 
 class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults=True):

@@ -11,9 +11,10 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
+from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, Utterance
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Seconds, Stamp, Vector
+from engage_hri.schemas.utf8 import is_utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.perceived_actions import PerceivedActions
@@ -221,8 +222,14 @@ class PerceivedPerson:
         """Tell words as a recognizer has them, at any time; speech itself is begun and ended as an action.
 
         utterance: with an id of your own; `actor` is this person's.
+
+        Raises InputRefused: a text or an id that no reader takes.
         """
         self._check()
+        self._check_length(utterance.text)
+        if not 0 < len(utterance.id) <= LONGEST_ID:
+            reason = f"the id of an utterance has 1 to {LONGEST_ID} letters, not {len(utterance.id)}"
+            raise InputRefused(Fault(reason=reason, where=self.id))
         self._bus.publish(keys.UTTERANCE, replace(utterance, actor=self.id))
 
     async def _do(self, action: Action, target: str, seconds: Seconds) -> None:
@@ -322,6 +329,12 @@ class PerceivedPerson:
         self._check()
         if not text.strip():
             raise InputRefused(Fault(reason="no words", where=self.id, advice="give it what the person says"))
+        self._check_length(text)
+
+    def _check_length(self, text: str) -> None:
+        if not is_utf8(text):
+            advice = "half a character is in it: decode its bytes with errors='replace'"
+            raise InputRefused(Fault(reason="the words are not UTF-8", where=self.id, advice=advice))
         if len(text) > LONGEST_TEXT:
             reason = f"{len(text)} letters; an utterance has {LONGEST_TEXT} at most"
             raise InputRefused(Fault(reason=reason, where=self.id, advice="split it into several"))

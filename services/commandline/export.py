@@ -106,7 +106,7 @@ def _make(name: str, path: Path, recording: "Recording", options: Options) -> Pa
             path.write_text(lines_of(recording), encoding="utf-8")
         case "settings":
             found = settings.settings_of(recording)
-            path.write_text(settings.configuration(found, recording.name), encoding="utf-8")
+            path.write_text(settings.configuration(found, options.file.name), encoding="utf-8")
         case _:
             _draw(name, path, recording, options)
     return path

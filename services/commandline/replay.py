@@ -1,6 +1,7 @@
 """Command `engage replay`: a recording on a bus again, as fast as one likes, to and fro."""
 
 import asyncio
+import re
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -28,6 +29,7 @@ JUMP: Seconds = 5.0
 """Time by which an arrow key goes to and fro."""
 SHOW: Seconds = 0.25
 """Time between two looks at the place, on a terminal."""
+_KEY = re.compile(rb"\x1b[\[O][0-9;]*[@-~]|.", re.DOTALL)
 HELP = "space: pause, ←/→: 5 s back or on, ↑/↓: faster or slower, 0: from the beginning, q: end"
 
 
@@ -97,9 +99,18 @@ async def typing(controls: "asyncio.Queue[Control]") -> AsyncIterator[None]:
 
 
 async def _take_keys(controls: "asyncio.Queue[Control]") -> None:
-    while pressed := await typed():
-        if (control := control_of(pressed)) is not None:
-            controls.put_nowait(control)
+    while came := await typed():
+        for pressed in keys_in(came):
+            if (control := control_of(pressed)) is not None:
+                controls.put_nowait(control)
+
+
+def keys_in(came: bytes) -> list[bytes]:
+    """Take apart what a terminal gave at once: several keys come together when one is held down.
+
+    Arrows are `ESC [ A` and on, or `ESC O A` in a terminal whose last program has left it so.
+    """
+    return [key.replace(b"\x1bO", b"\x1b[") for key in _KEY.findall(came)]
 
 
 def control_of(pressed: bytes) -> "Control | None":

@@ -193,9 +193,10 @@ def test_settings_are_exported_and_those_that_changed_are_printed(run: Engage, t
 
     assert exported.code == 0
     assert load(tmp_path / "a.settings.toml").recognition == RecognitionConfig(window=40.0)
-    assert (
-        "# recognition, life 1, from 1.000 s: recognition.window = 20.0" in (tmp_path / "a.settings.toml").read_text()
-    )
+    assert (tmp_path / "a.settings.toml").read_text().splitlines()[:2] == [
+        "# Settings of a.mcap, of Engage 0.0.1.",
+        "# recognition, life 1, from 1.000 s: recognition.window = 20.0",
+    ]
     printed = [line.split() for line in analysed.out.splitlines() if "recognition.window" in line]
     assert printed == [
         ["a.mcap", "recognition", "recognition.window", "=", "20.0"],

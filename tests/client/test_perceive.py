@@ -15,6 +15,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.faults import InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
+from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
@@ -242,6 +243,27 @@ async def test_no_words_and_too_many_are_refused(hub: MemoryHub, way: Callable[.
             await way(ann, "  ")
         with pytest.raises(InputRefused, match=f"at most.*split|{LONGEST_TEXT} at most"):
             await way(ann, "a" * (LONGEST_TEXT + 1))
+
+
+@pytest.mark.parametrize("way", [PerceivedPerson.say, PerceivedPerson.type])
+async def test_half_a_character_is_refused_in_words(hub: MemoryHub, way: Callable[..., Any]) -> None:
+    async with scene(hub), perceive("ann", hub=hub) as ann:
+        with pytest.raises(InputRefused, match="ann: the words are not UTF-8"):
+            await way(ann, "caf\ud83d")
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [({"text": "a" * 100_000}, "100000 letters"), ({"text": "\ud83d"}, "not UTF-8"), ({"id": ""}, "not 0"),
+     ({"id": "i" * 201}, "not 201")],
+)  # fmt: skip
+async def test_words_that_nobody_would_read_are_refused_as_they_are_told(
+    hub: MemoryHub, change: dict[str, Any], reason: str
+) -> None:
+    async with scene(hub), perceive("ann", hub=hub) as ann:
+        at = Stamp("loop", 0.0)
+        with pytest.raises(InputRefused, match=reason):
+            ann.tell(Utterance(**{"actor": "ann", "id": "1", "text": "yes", "began": at, "at": at, **change}))
 
 
 async def test_without_a_robot_it_says_so_after_three_seconds(hub: MemoryHub) -> None:

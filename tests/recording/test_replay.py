@@ -13,7 +13,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.replay import control_of
+from engage_hri.services.commandline.replay import control_of, keys_in
 from engage_hri.services.console.follow import following
 from engage_hri.services.recording.player import Player
 from engage_hri.services.recording.reading import Recording
@@ -109,6 +109,20 @@ def _control(pressed: bytes) -> Control:
     control = control_of(pressed)
     assert control is not None
     return control
+
+
+@pytest.mark.parametrize(
+    ("came", "expected"),
+    [
+        (b"\x1b[C\x1b[C\x1b[D", [b"\x1b[C", b"\x1b[C", b"\x1b[D"]),
+        (b" \x1b[A0q", [b" ", b"\x1b[A", b"0", b"q"]),
+        (b"\x1bOA", [b"\x1b[A"]),
+        (b"\x1b[1;5C\x1b[3~ ", [b"\x1b[1;5C", b"\x1b[3~", b" "]),
+        (b"\xff\n\x1b", [b"\xff", b"\n", b"\x1b"]),
+    ],
+)  # fmt: skip
+def test_keys_that_come_at_once_as_when_one_is_held_down_are_all_taken(came: bytes, expected: list[bytes]) -> None:
+    assert keys_in(came) == expected
 
 
 async def test_a_jump_is_a_restart_for_listeners_who_get_what_stood_then() -> None:
