@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from engage_hri.schemas.body import Ray
 from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.kinematics import HOME, Side, Unreachable
-from tests.random_cases import share_of
 
 PIECES = [(x / 100, y / 100, 0.73) for x in range(35, 80, 5) for y in range(-40, 45, 10)]
 SIDES: tuple[Side, ...] = ("left", "right")
@@ -43,7 +42,7 @@ def test_every_piece_can_be_looked_at_and_pointed_at_by_one_arm_at_least(target:
             assert not kinematics.touches_table(pose)
 
 
-@settings(max_examples=share_of(100))
+@settings(max_examples=100)
 @given(
     x=st.floats(0.3, 2.0), y=st.floats(-1.0, 1.0), z=st.floats(0.4, 1.8),
     lean=st.floats(-0.2, 0.3), turn=st.floats(-0.4, 0.4),

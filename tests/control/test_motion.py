@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from engage_hri.services.control.torso import tracks
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
-from tests.random_cases import share_of
 
 LIMITS = tracks.LIMITS["right_arm"]
 HOME = tracks.HOME["right_arm"]
@@ -123,7 +122,7 @@ def poses(draw: st.DrawFn) -> tuple[float, float, float]:
 EXTENSIONS = st.lists(st.tuples(st.floats(0.0, 0.7), st.floats(0.0, 1.3)), max_size=4)
 
 
-@settings(max_examples=share_of(60), deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(one=poses(), other=poses(), first=st.floats(0.01, 1.0), extensions=EXTENSIONS, cruise=st.floats(0.2, 1.0))
 def test_no_authority_makes_it_pass_its_limit_turn_back_or_break_a_joints_limits(
     one: tuple[float, float, float],

@@ -11,7 +11,6 @@ from engage_hri.services.realizer.plan.instants import Classes, instants
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.steps import finished
-from tests.random_cases import share_of
 
 POINTS = [Point("b", f"p{number}") for number in range(7)]
 Graph = dict[Point, dict[Point, tuple[float, int]]]
@@ -70,7 +69,7 @@ TIES = st.lists(
 )
 
 
-@settings(max_examples=share_of(300), deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(TIES, st.booleans())
 def test_what_is_tied_is_so_far_apart_and_a_contradiction_tells_how_far_and_why(
     said: list[Said], is_tried: bool

@@ -25,7 +25,6 @@ from engage_hri.services.realizer.net.petri_net import (
 )
 from engage_hri.services.realizer.net.pnml import read_pnml
 from engage_hri.services.realizer.points import Point
-from tests.random_cases import share_of
 from tests.realizer.planning import at, plan, timed
 from tests.realizer.stage import after, before, block, together
 
@@ -134,7 +133,7 @@ def any_nets(draw: st.DrawFn) -> PetriNet:
     )
 
 
-@settings(max_examples=share_of(100), deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(any_nets(), NAMES)
 def test_any_net_comes_back_from_pnml_equal(net: PetriNet, name: str) -> None:
     document = pnml.as_pnml(net, name)

@@ -35,7 +35,6 @@ from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.random_cases import share_of
 from tests.realizer.fake_body import HOLDS, FakeBody, Script, natural_durations, type_of
 from tests.realizer.stage import stage
 
@@ -133,7 +132,7 @@ def planned(block: Block) -> Plan | None:
         return None
 
 
-@settings(max_examples=share_of(50), deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(blocks())
 def test_an_exact_body_keeps_every_constraint_of_any_block(block: Block) -> None:
     plan = planned(block)
@@ -191,7 +190,7 @@ SCRIPTS = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=share_of(60), deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(blocks(), SCRIPTS)
 def test_every_block_ends_exactly_once_whatever_the_body_does(block: Block, scripts: dict[str, Script]) -> None:
     seen = perform(block, FakeBody(scripts))
@@ -201,7 +200,7 @@ def test_every_block_ends_exactly_once_whatever_the_body_does(block: Block, scri
     assert seen.left == 0
 
 
-@settings(max_examples=share_of(100), deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(blocks(), st.randoms(use_true_random=False))
 def test_the_order_of_elements_does_not_change_the_net(block: Block, chance: object) -> None:
     others = list(block.behaviors)

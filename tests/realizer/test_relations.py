@@ -36,7 +36,6 @@ from engage_hri.services.realizer.plan.relations import (
 )
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.steps import finished
-from tests.random_cases import share_of
 
 
 class Ref(NamedTuple):
@@ -189,7 +188,7 @@ def said(draw: st.DrawFn) -> Said:
     return Said(block, Relations(tuple(equals), tuple(orders), frozenset(required), told, frozenset(unusable)))
 
 
-@settings(max_examples=share_of(200), deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(said())
 def test_what_a_block_says_is_read_as_it_was_meant(case: Said) -> None:
     found = finished(relation_steps(case.block, OTHERS))

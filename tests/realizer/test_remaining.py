@@ -14,7 +14,6 @@ from engage_hri.services.realizer.plan.relations import Equal, Order, Relations,
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.steps import finished
-from tests.random_cases import share_of
 from tests.realizer.oracle import estimate
 
 IDS = "abcd"
@@ -47,7 +46,7 @@ def ties(draw: st.DrawFn, at: dict[Point, float]) -> list[Equal]:
     return found
 
 
-@settings(max_examples=share_of(120), deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(st.data())
 def test_what_was_tied_through_a_dropped_behavior_stays_tied(data: st.DataObject) -> None:
     at = {each: data.draw(st.sampled_from((0.0, 0.25, 1.0, 3.0))) for each in POINTS} | {ORIGIN: 0.0}

@@ -16,7 +16,6 @@ from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
-from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 from tests.recognition.test_random_streams import Chance, Stream
 
@@ -256,7 +255,7 @@ further = words.map(lambda drawn: _one_after_the_other(drawn, odd=0.0191))
 rounds = st.builds(Round, st.booleans(), st.integers(5, 40).map(lambda tenths: 0.1 * tenths), acts, further)
 
 
-@settings(max_examples=share_of(150), deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(rounds, min_size=1, max_size=4))
 def test_the_delay_of_an_answer_is_from_the_end_of_the_turn(rounds):
     stream = [seen for number, one in enumerate(rounds) for seen in one.stream(f"turn-{number}", 30.0 * number + 1.0)]

@@ -12,7 +12,6 @@ from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, Signal
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
-from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import Chance, Stream, streams
 
@@ -38,7 +37,7 @@ def by_content(effects: list[Effect]) -> Counter[ConnectionEvent]:
     return Counter(replace(effect, id="") for effect in effects if isinstance(effect, ConnectionEvent))
 
 
-@settings(max_examples=share_of(60), deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(streams, st.integers(0, 99))
 def test_what_comes_twice_changes_nothing(stream, seed):
     """Actions and presence also after others have come; what travels by itself on its key, at once."""

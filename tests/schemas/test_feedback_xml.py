@@ -18,7 +18,6 @@ from engage_hri.schemas.feedback import (
     WarningKind,
 )
 from engage_hri.schemas.units import Stamp
-from tests.random_cases import share_of
 from tests.schemas.strategies import ids
 
 BML = 'xmlns="http://www.bml-initiative.org/bml/bml-1.0"'
@@ -99,7 +98,7 @@ messages = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=share_of(200), deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(messages)
 def test_feedback_survives_xml(message: Feedback) -> None:
     assert decode_feedback(encode_feedback(message)) == (message,)

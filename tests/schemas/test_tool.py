@@ -15,7 +15,6 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.tool import FILE, PARTS, Format, ToolInput, input_schema, tool_definition
 from engage_hri.schemas.world import Entity, World
-from tests.random_cases import share_of
 
 SCENE = World(
     entities=(
@@ -93,7 +92,7 @@ FORMATS: tuple[Format, ...] = ("anthropic", "openai", "openai-chat")
 EVERY = [schema(format, world) for format, world in product(FORMATS, (None, SCENE))]
 
 
-@settings(max_examples=share_of(150))
+@settings(max_examples=150)
 @given(st.sampled_from(EVERY).flatmap(instances))
 def test_whatever_the_schema_allows_decodes(call: Any) -> None:
     fragment = decoded(call)

@@ -14,7 +14,6 @@ from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_notes import MOST
 from engage_hri.schemas.faults import InputRefused
-from tests.random_cases import share_of
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
 
 LAUGHS = (
@@ -105,7 +104,7 @@ def test_hostile_input_is_refused_at_once(hostile: bytes | str) -> None:
     assert time.process_time() - began < 2.0
 
 
-@settings(max_examples=share_of(300), deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(
     st.binary(max_size=200) | st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass")),
     st.booleans(),
