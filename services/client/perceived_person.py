@@ -223,7 +223,8 @@ class PerceivedPerson:
 
         utterance: with an id of your own; `actor` is this person's.
 
-        Raises InputRefused: a text or an id that no reader takes.
+        Raises:
+            InputRefused: a text or an id that no reader takes.
         """
         self._check()
         self._check_length(utterance.text)
