@@ -9,7 +9,6 @@ from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.body import BodyPose, Capabilities, JointAngle, Ray, RobotState
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.fragments import FragmentOutcome, PairConsidered, ReferenceChoice
 from engage_hri.schemas.messages import Message
@@ -346,18 +345,6 @@ def test_faults_that_are_on_are_told_in_words_and_by_kind() -> None:
     shown = section(made, "switched")
 
     assert (shown["faults"], shown["kinds"]) == (["slow right_arm 3"], ["slow"])
-
-
-def test_a_condition_is_told_once_somebody_has_set_it() -> None:
-    unset, told = StudyCondition(at=at(10.0)), StudyCondition(at=at(11.0), name="b", speech_only=True, by="Anna")
-    over = StudyCondition(at=at(12.0), by="Anna")
-
-    found = [section(picture(*((each, 13.0) for each in seen)), "switched")["condition"]
-             for seen in ((), (unset,), (unset, told), (unset, told, over))]  # fmt: skip
-
-    assert found == [
-        "", "", "condition of the study: b, speech only, set by Anna", "condition of the study: none, set by Anna",
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("order", [range(len(SCENE)), range(len(SCENE) - 1, -1, -1)])
