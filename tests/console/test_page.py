@@ -115,3 +115,15 @@ async def test_a_key_that_is_held_sends_its_fragment_once(place: Place) -> None:
             await page.value(f"document.dispatchEvent({key})")
 
         assert await page.value("window.sent.filter((each) => each === 'prepared').length") == 1
+
+
+async def test_a_long_name_of_a_participant_makes_a_phone_no_wider(place: Place) -> None:
+    async with opened(place) as page:
+        await page.look(400, 1000)
+        await page.until("document.documentElement.clientWidth === 400")
+        name = "seat_" + 9 * "perception"
+        there = {"name": name, "service": False, "here": True, "serves": True, "warnings": [], "facts": []}
+        await take(page, sections={"health": [there]})
+        await page.until("document.querySelector('.health').textContent.includes('perception')")
+
+        await page.until("document.documentElement.scrollWidth <= 400")  # what is drawn takes its size a frame later

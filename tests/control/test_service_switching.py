@@ -42,6 +42,10 @@ async def test_an_operator_switches_a_fault_on_in_the_middle_of_a_behavior_and_o
 async def test_who_comes_late_is_told_what_is_on(hub: MemoryHub) -> None:
     async with robot(hub, variability=Variability(lost=0.5)), Robot.on(hub.join("guard", "operator")) as guard:
         assert await guard.faults_on(1.0) == (BodyFault(kind="lost", amount=0.5),)
+        with guard.body_faults() as told:
+            configured = await told.next(1.0)
+        assert configured is not None
+        assert configured.by == ""  # nobody but the configuration
         await guard.switch_faults([SLOW, MUTE])
         await asyncio.sleep(60.0)
         async with Robot.on(hub.join("late")) as late:
@@ -51,7 +55,7 @@ async def test_who_comes_late_is_told_what_is_on(hub: MemoryHub) -> None:
                 then = await told.next(1.0)
 
     assert isinstance(first, BodyFaults)
-    assert first.faults == (SLOW, MUTE)
+    assert (first.faults, first.by) == ((SLOW, MUTE), "guard")
     assert then is not None
     assert then.faults == (MUTE,)
 
