@@ -31,6 +31,8 @@ BLOCKS = share_of(300)
 MOST = {False: 0.02, True: 0.02}
 """Share of blocks that may be off, without shifts and with: 0.29 and 0.45 without a rehearsal. docs/realizer.md
 says what is left."""
+FEW = 3
+"""Number of blocks that may be off in any case: of a hundred it is by chance that two or three are."""
 
 
 @pytest.mark.parametrize("shifts", [False, True])
@@ -39,7 +41,7 @@ def test_few_random_blocks_are_off_their_plan(shifts: bool) -> None:
     off = [each.block.id for each in seen if each.worst > OFF]
 
     assert sum(len(each.at) for each in seen) > 15 * BLOCKS
-    assert len(off) <= MOST[shifts] * BLOCKS, off
+    assert len(off) <= max(FEW, MOST[shifts] * BLOCKS), off
 
 
 def performed_block(*behaviors: BlockBehavior, ties: tuple[tuple[str, str], ...] = ()) -> Performed:
