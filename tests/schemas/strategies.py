@@ -14,6 +14,8 @@ from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 # Letters that XML must escape, white space that it would collapse, and some beyond ASCII.
 LETTERS = "ab cXYZ09<>&\"'\t\n-:é€😀"
 words = st.text(LETTERS, max_size=12)
+some = st.text(LETTERS, min_size=1, max_size=12)
+"""Words that are there: in a draft an empty one is missing, and the behavior is none."""
 ids = st.from_regex(r"[a-z][a-z0-9]{0,3}(-[0-9]{1,2})?", fullmatch=True).filter(lambda id: id != "bml")
 amounts = st.floats(0, 1)
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -44,9 +46,9 @@ def speeches(draw: st.DrawFn) -> of.Speech:
 KINDS = [
     st.builds(of.Gaze, id=st.just(""), target=words, influence=words, offset_angle=numbers),
     st.builds(of.GazeShift, id=st.just(""), target=words, offset_direction=words),
-    st.builds(of.Pointing, id=st.just(""), target=words, mode=hands),
-    st.builds(of.Gesture, id=st.just(""), lexeme=words, mode=hands),
-    st.builds(of.Head, id=st.just(""), lexeme=words, repetition=st.integers(1, 9), amount=amounts),
+    st.builds(of.Pointing, id=st.just(""), target=some, mode=hands),
+    st.builds(of.Gesture, id=st.just(""), lexeme=some, mode=hands),
+    st.builds(of.Head, id=st.just(""), lexeme=some, repetition=st.integers(1, 9), amount=amounts),
     st.builds(of.HeadDirectionShift, id=st.just(""), target=words),
     st.builds(of.Face, id=st.just(""), amount=amounts, overshoot=numbers, expressions=expressions),
     st.builds(of.FaceLexeme, id=st.just(""), lexeme=words, amount=amounts),
@@ -57,7 +59,7 @@ KINDS = [
     st.builds(of.PostureShift, id=st.just(""), stance=words),
     st.builds(of.Posture, id=st.just(""), stance=words, poses=poses),
     st.builds(of.Pose, id=st.just(""), lexeme=words, part=words),
-    st.builds(of.Locomotion, id=st.just(""), target=words, manner=words),
+    st.builds(of.Locomotion, id=st.just(""), target=some, manner=words),
     st.builds(of.Wait, id=st.just(""), duration=st.none() | st.floats(0, 1e6)),
     st.builds(of.Emit, id=st.just(""), event=words),
     speeches(),
