@@ -1,10 +1,10 @@
 """Recorded sessions in numbers: each recording as a record of the study, and recognition once more over it."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from msgspec import Struct, structs
@@ -18,6 +18,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowSt
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.console.follow import FOLLOWED
+from engage_hri.services.console.heard import Heard
 from engage_hri.services.recognition.again import Again, Lack, events_in
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import Tally
@@ -32,8 +33,16 @@ WINDOW: Seconds = 30.0
 """Window of a tally whose recent numbers nobody reads."""
 
 
-Told = tuple[Received, Seconds]
-"""A message, and the time in the recording that it tells of."""
+COUNTED = (*FOLLOWED, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING)
+"""Expressions for all messages that the numbers come from."""
+
+
+class Told(NamedTuple):
+    """A message, and the time in the recording that it tells of. past: it is from before the recording."""
+
+    message: Message
+    at: Seconds
+    past: bool = False
 
 
 class Session(Struct, frozen=True, kw_only=True):
@@ -58,9 +67,12 @@ def sessions(recording: Recording) -> list[Session]:
 
     Of several, those under no condition, and those with nobody there, are left out; a doubt says so.
     """
-    times, told = Times(recording), [one for one in messages(recording) if _counts_for(one[0])]
+    times = Times(recording)
+    told = [*_told(recording, times)]
     doubts = tuple(_doubts(recording, told, times))
-    parts = stretches(told, recording.facts.get("condition", ""), recording.duration)
+    parts = stretches(
+        ((one.message, one.at) for one in told), recording.facts.get("condition", ""), recording.duration
+    )
     made = [_session(recording, told, times, part, doubts) for part in parts if part.name]
     if len(parts) == 1:
         return made
@@ -72,8 +84,16 @@ def sessions(recording: Recording) -> list[Session]:
     return kept
 
 
-def _counts_for(received: Received) -> bool:
-    return keys.first(FOLLOWED, received.key) is not None
+def _told(recording: Recording, times: Times) -> Iterator[Told]:
+    """The messages that count, as people are to hear them: what a killed program told is over with it."""
+    heard = Heard(recording.robot, recording.clock, times.at, times.told)
+    for received, _ in messages(recording):
+        if keys.first(COUNTED, received.key) is not None:
+            came = max(0.0, received.at - recording.began)
+            yield from (Told(*one) for one in heard.advance(came))
+            taken = heard.take(structs.replace(received, at=came), came)
+            yield from (Told(message, at, received.past) for message, at in taken)
+    yield from (Told(*one) for one in heard.advance(recording.duration))
 
 
 def _session(
@@ -88,13 +108,12 @@ def _session(
     published: WindowStatistics | None = None
     until = part.end if part.end < recording.duration else inf
     within: dict[str, bool] = {}
-    for received, at in told:
-        message = received.message
+    for message, at, past in told:
         if isinstance(message, Statistics):
             published = message.session if message.actor == "" else published
             continue
         if isinstance(message, ConnectionEvent):
-            if not within.setdefault(message.id, _began(received, message, times, recording, part.begin, until)):
+            if not within.setdefault(message.id, not past and _began(message, times, recording, part.begin, until)):
                 continue
             tally.feed(message)
         elif at >= until or (at < part.begin and not _lasts(message)):
@@ -111,12 +130,10 @@ def _session(
     )  # fmt: skip
 
 
-def _began(
-    received: Received, event: ConnectionEvent, times: Times, recording: Recording, begin: Seconds, until: Seconds
-) -> bool:
-    """Tell whether an event began between these times. One that is known only from before the recording did not."""
+def _began(event: ConnectionEvent, times: Times, recording: Recording, begin: Seconds, until: Seconds) -> bool:
+    """Tell whether an event began between these times."""
     began = times.at(event.started, recording.duration)
-    return not received.past and began is not None and begin <= began < until
+    return began is not None and begin <= began < until
 
 
 def _lasts(message: Message) -> bool:
@@ -139,11 +156,10 @@ def _in_time(message: Message, times: Times, at: Seconds, begin: Seconds) -> Mes
 def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterable[str]:
     """List what is doubtful in all numbers of a recording."""
     lives, known = set[str](), dict[str, bool]()
-    for received, _ in told:
-        if not isinstance(event := received.message, ConnectionEvent):
-            continue
-        if known.setdefault(event.id, _began(received, event, times, recording, 0.0, inf)):
-            lives.add(event.session)
+    for event, _, past in told:
+        if isinstance(event, ConnectionEvent):
+            is_here = known.setdefault(event.id, not past and _began(event, times, recording, 0.0, inf))
+            lives |= {event.session} if is_here else set()
     before = sum(not counts for counts in known.values())
     if not recording.is_whole:
         yield f"the recorder did not end in order: the numbers are of the first {recording.duration:.0f} s"

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 from engage_hri.schemas.conditions import StudyCondition
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.samples import Received
 
 UNNAMED = "recorded"
 """Condition of recordings that name none."""
@@ -24,16 +24,16 @@ class Stretch(Struct, frozen=True):
         return self.end - self.begin
 
 
-def stretches(told: Iterable[tuple[Received, Seconds]], named: str, duration: Seconds) -> list[Stretch]:
+def stretches(told: Iterable[tuple[Message, Seconds]], named: str, duration: Seconds) -> list[Stretch]:
     """Divide a recording where a condition was set. All of it is one stretch if none was.
 
-    told: messages with their times, as `times.messages` gives them. named: the condition that the recording was made
+    told: messages with their times in the recording. named: the condition that the recording was made
     under, as the recorder was told; it holds until one is set, and from a restart of generation on.
     """
     names = [(0.0, named)]
-    for received, at in told:
-        if isinstance(received.message, StudyCondition):
-            names.append((max(0.0, at), received.message.name if received.message.by else named))
+    for message, at in told:
+        if isinstance(message, StudyCondition):
+            names.append((max(0.0, at), message.name if message.by else named))
     begun = dict(sorted(names, key=lambda one: one[0]))  # of two at one instant the later one holds
     found: list[Stretch] = []
     for begin, name in begun.items():

@@ -5,10 +5,12 @@ import random
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.conditions import StudyCondition
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus, Sample
@@ -66,7 +68,7 @@ def made(*samples: Sample) -> Recording:
 
 
 def parts(of: Recording, named: str = "") -> list[Stretch]:
-    return stretches(messages(of), named, of.duration)
+    return stretches(((one.message, at) for one, at in messages(of)), named, of.duration)
 
 
 def test_a_recording_without_conditions_is_one_stretch() -> None:
@@ -196,3 +198,32 @@ async def test_a_real_run_is_divided_as_it_was_told(tmp_path: Path) -> None:
     assert [(one.value, round(one.end - one.begin)) for one in tier.annotations[:2]] == [
         ("operational", 40), ("words alone, speech only", 40),
     ]  # fmt: skip
+
+
+# -- what a killed program told, and what a recorder that comes late hears of --------------------------------------
+
+
+def by_camera(*samples: Sample) -> list[Sample]:
+    return [structs.replace(one, source="camera", life="7") for one in samples]
+
+
+def test_a_person_is_gone_with_the_program_that_told_of_them() -> None:
+    here = sample(keys.alive("camera"), PeerAlive(participant="camera", run="7"), 1.0)
+    killed = sample(keys.alive("camera"), PeerGone(participant="camera"), 51.0)
+    seen = by_camera(person("ann", 1.0, END)[0], looks("ann", 1.0, END)[0])
+
+    (one,) = sessions(made(here, killed, *seen, begins(0.0, "a"), begins(60.0, "b")))
+
+    assert (one.condition, one.doubts[-1]) == ("a", "left out: 40 s of b with nobody there")
+
+
+def test_who_was_there_before_the_recording_is_known_by_what_goes_on() -> None:
+    look = ActionBegan(actor="ann", action="look", targets=("robot",), at=at(-20.0))
+    state = OngoingActions(actor="ann", at=at(-20.0), actions=(look,), seen=True)
+    (late,) = by_camera(sample(keys.perceived_ongoing("camera", "ann"), state, 0.0))
+    here = sample(keys.alive("camera"), PeerAlive(participant="camera", run="7"), 0.0)
+
+    (one,) = sessions(made(here, late))
+
+    assert one.record.eye_contact is not None
+    assert one.record.eye_contact.first == pytest.approx(1.0)
