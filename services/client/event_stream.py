@@ -57,7 +57,9 @@ class EventStream:
         return []
 
     def expire(self, now: Seconds) -> list[ConnectionEvent]:
-        """Tell all open events as lost: `deadline` has passed, recognition stays away."""
+        """Tell all open events as lost, if `deadline` has passed: recognition stays away."""
+        if self.deadline is None or now < self.deadline:
+            return []
         self.deadline = None
         self._lost = tuple(self.open.values())
         return self._lose(self._lost, now)

@@ -291,6 +291,17 @@ def test_a_cut_longer_than_the_grace_ends_events_that_come_back_with_it():
     assert reader.feed(succeeded, 4.0, 5.0) == [succeeded]
 
 
+def test_who_asks_before_the_deadline_is_told_nothing():
+    reader = stream()
+    reader.feed(change(1, "ann", "started", 0.0), 0, 0)
+    assert reader.expire(0.5) == []
+    reader.feed(PeerGone(participant="recognition"), 1.0, 1.0)
+
+    assert reader.expire(2.9) == []  # others have deadlines of their own, as `following`
+    assert reader.deadline == 3.0
+    assert [event.state for event in reader.expire(3.0)] == ["lost"]
+
+
 def test_a_short_cut_changes_nothing():
     reader = stream()
     reader.feed(change(1, "ann", "started", 0.0), 0, 0)
