@@ -174,6 +174,9 @@ def configured(sessions: Sequence[Session]) -> Table:
         before: dict[str, Mapping[str, str]] = {}
         for life in one.settings:
             told = life.told
+            if life.unread:
+                notes.append(f"{one.path.name}: {told.participant}, life {life.number}: not read: {life.unread}.")
+                continue
             others = before.get(told.participant, by_default)
             since = "" if life.number == 1 else f"life {life.number}, from {life.since:.1f} s"
             found += [(one.path.name, told.participant, since, line) for line in changed(life, others)]
@@ -237,7 +240,10 @@ def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
     lines = []
     lack = life.lack
     if lack.settings:
-        lines.append("  the settings that recognition had are not in the recording: again it has those by default")
+        lines.append(
+            "  the settings that recognition had are not in the recording, or cannot be read: "
+            "again it has those by default"
+        )
     if lack.before:
         lines.append(f"  {lack.before} steps are from before the recording: what had begun by then is not known")
     if lack.gaps or lack.messages:

@@ -265,10 +265,10 @@ def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
     """Configuration of each life of recognition, by the session of its events. Raises InputRefused."""
     found = {}
     for life in settings_of(recording):
-        if life.told.participant != "recognition":
+        if life.told.participant != "recognition" or life.unread:
             continue
         try:
-            config = msgspec.convert(life.told.settings.get("recognition"), RecognitionConfig)
+            config = msgspec.convert(life.sections.get("recognition"), RecognitionConfig)
         except msgspec.ValidationError as error:
             reason = f"recognition of Engage {life.told.version} had settings that this one does not know: {error}"
             fault = Fault(reason=reason, where=recording.name, advice=f"use Engage {life.told.version}")

@@ -65,13 +65,6 @@ assert isinstance(_UNION, shapes.UnionType)
 KINDS = {kind.cls.__name__: kind for kind in _UNION.types if isinstance(kind, shapes.StructType)}
 """Types of all messages that may travel on the bus, by the name of their class."""
 
-_INSIDE = shapes.DictType(key_type=shapes.StrType(), value_type=shapes.AnyType())
-ANYTHING = (
-    shapes.StrType(), shapes.FloatType(), shapes.IntType(), shapes.BoolType(), shapes.NoneType(), _INSIDE,
-    shapes.VarTupleType(item_type=shapes.AnyType()),
-)  # fmt: skip
-"""Shapes of a value of which nothing is said."""
-
 
 class RandomMessages:
     """Makes random messages. Each has its own share of nasty fields, which hold what only their type allows."""
@@ -106,12 +99,6 @@ class RandomMessages:
                 return tuple(self._value(item, field, depth + 1) for _ in range(self._chance.randrange(0, most + 1)))
             case shapes.TupleType(item_types=items):
                 return tuple(self._value(item, field, depth + 1) for item in items)
-            case shapes.DictType(key_type=name, value_type=item):
-                most = 0 if depth >= DEEPEST else 12 if nasty else 3
-                pairs = range(self._chance.randrange(0, most + 1))
-                return {self._value(name, field, depth + 1): self._value(item, "", depth + 1) for _ in pairs}
-            case shapes.AnyType():
-                return self._value(self._chance.choice(ANYTHING), field, depth + 1)
             case shapes.StrType():
                 return self._chance.choice(NASTY_TEXTS) if nasty else self._word(field)
             case shapes.FloatType(ge=least, le=most):

@@ -28,7 +28,7 @@ class Lack(Struct, frozen=True, kw_only=True):
 
     before: steps before the first that was told: recognition ran before the recording began. gaps: steps that were
     not told in between. messages: those that steps took, and that are not in the recording. settings: those of
-    recognition are not in it.
+    recognition are not in it, or cannot be read.
     """
 
     settings: bool = False

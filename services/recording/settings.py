@@ -9,7 +9,8 @@ from typing import Any
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.settings import ServiceSettings
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.settings import ServiceSettings, sections
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recording.reading import Recording
 
@@ -20,17 +21,20 @@ COLUMNS = ("participant", "life", "from", "key", "value")
 class Life(Struct, frozen=True, kw_only=True):
     """Settings of one life of a service. since: time at which the recording has them; 0.0: it ran before.
 
-    number: 1 for the first life of this service in the recording.
+    number: 1 for the first life of this service in the recording. sections: what `told` has as text.
+    unread: why nobody can read that, and there are no sections; empty: they were read.
     """
 
     told: ServiceSettings
     since: Seconds
     number: int
+    sections: dict[str, Any]
+    unread: str = ""
 
     @property
     def values(self) -> dict[str, str]:
         """Each value by the name of its setting, as `section.key=value` has both."""
-        return dict(flat(self.told.settings))
+        return dict(flat(self.sections))
 
 
 def settings_of(recording: Recording) -> list[Life]:
@@ -47,8 +51,15 @@ def settings_of(recording: Recording) -> list[Life]:
             continue
         numbers[told.participant] = numbers.get(told.participant, 0) + 1
         since = 0.0 if received.past else recording.time(number)
-        found[told.participant, told.run] = Life(told=told, since=since, number=numbers[told.participant])
+        found[told.participant, told.run] = _life(told, since, numbers[told.participant])
     return list(found.values())
+
+
+def _life(told: ServiceSettings, since: Seconds, number: int) -> Life:
+    try:
+        return Life(told=told, since=since, number=number, sections=sections(told.settings))
+    except InputRefused as refused:  # of another program, or damaged: the rest of the recording is read
+        return Life(told=told, since=since, number=number, sections={}, unread=refused.fault.reason)
 
 
 def flat(settings: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:
@@ -82,19 +93,21 @@ def configuration(all_lives: Sequence[Life], name: str) -> str:
     versions = sorted({life.told.version for life in all_lives})
     lines = [*_comment(f"Settings of {name}, of Engage {', '.join(versions)}.")]
     for life in all_lives:
+        if life.unread:
+            lines += _comment(f"{life.told.participant}, life {life.number}: not read: {life.unread}")
         now = last[life.told.participant]
         for line in changed(life, now.values) if life is not now else ():
             lines += _comment(f"{life.told.participant}, life {life.number}, from {life.since:.3f} s: {line}")
     values: dict[str, Any] = {}
     for life in last.values():
-        values |= life.told.settings
+        values |= life.sections
     lines += ["", *_table(values, ())]
     for life in all_lives:
-        for file, text in life.told.files.items():
+        for file in life.told.files:
             lines += [
                 "",
-                *_comment(f"{life.told.participant}, life {life.number}: the file {file} was"),
-                *_comment(text),
+                *_comment(f"{life.told.participant}, life {life.number}: the file {file.name} was"),
+                *_comment(file.text),
             ]
     return "\n".join(lines) + "\n"
 

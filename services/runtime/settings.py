@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.settings import ServiceSettings
+from engage_hri.schemas.settings import ServiceSettings, SettingsFile, text_of
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.runtime.service import installed_version
 
@@ -33,9 +33,11 @@ def tell_settings(bus: Bus, name: str, config: Struct, files: Iterable[str] = ()
     """
     with bus.containing("telling the settings"):
         settings = {**more, name: config}
+        texts = {file: text for file in files if (text := _text(file)) is not None}
         told = ServiceSettings(
             participant=bus.name, run=bus.run, version=installed_version(), at=bus.stamp(),
-            settings=shown(settings), files={file: text for file in files if (text := _text(file)) is not None},
+            settings=text_of(shown(settings)),
+            files=tuple(SettingsFile(name=file, text=text) for file, text in texts.items()),
         )  # fmt: skip
         bus.publish(keys.settings(bus.name), told)
 

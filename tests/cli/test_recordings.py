@@ -10,7 +10,8 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.settings import ServiceSettings
+from engage_hri.schemas.ledger import Taken
+from engage_hri.schemas.settings import ServiceSettings, text_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.bus.zenoh.hub import open_hub
@@ -178,11 +179,33 @@ def test_again_without_a_ledger_is_refused_and_settings_are_for_it_alone(run: En
     assert "is for --again" in settings.err
 
 
+def test_settings_that_nobody_can_read_are_told_in_words_and_all_else_is_read(run: Engage, tmp_path: Path) -> None:
+    message = ServiceSettings(
+        participant="recognition", run="1", version="0.0.1", at=Stamp("loop", 0.0), settings='{"recognition"'
+    )
+    taken = Taken(session="1", at=Stamp("loop", 1.0), first=1, steps=())
+    path = saved(
+        tmp_path / "a.mcap",
+        [sample(keys.settings("recognition"), message, 0.5), sample(keys.TAKEN, taken, 1.0, number=2)],
+    )
+
+    exported = run("export", path, "--settings")
+    analysed = run("analyse", path, "--out", tmp_path / "out")
+    again = run("analyse", path, "--again")
+
+    reason = "recognition, life 1: not read: settings are not JSON: "
+    assert (exported.code, analysed.code, again.code) == (0, 0, 0)
+    assert reason in (tmp_path / "a.settings.toml").read_text()
+    assert f"a.mcap: {reason}" in " ".join(analysed.out.split())
+    assert len((tmp_path / "out" / "settings.csv").read_text().splitlines()) == 1
+    assert "or cannot be read: again it has those by default" in again.out
+
+
 def test_settings_are_exported_and_those_that_changed_are_printed(run: Engage, tmp_path: Path) -> None:
     def settings(life: str, window: float) -> Sample:
         message = ServiceSettings(
             participant="recognition", run=life, version="0.0.1", at=Stamp("loop", 0.0),
-            settings={"recognition": msgspec.to_builtins(RecognitionConfig(window=window))},
+            settings=text_of({"recognition": msgspec.to_builtins(RecognitionConfig(window=window))}),
         )  # fmt: skip
         return sample(keys.settings("recognition"), message, float(life), source="recognition", life=life)
 

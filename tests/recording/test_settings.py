@@ -1,6 +1,7 @@
 """Settings in recordings: of all services and lives, without what is secret, and as a file that is read again."""
 
 import asyncio
+import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,8 +14,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.messages import decode, encode
-from engage_hri.schemas.settings import ServiceSettings
+from engage_hri.schemas.settings import DEEPEST, ServiceSettings, SettingsFile, sections, text_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
@@ -49,7 +49,7 @@ async def test_the_settings_of_every_service_are_in_a_recording(tmp_path: Path) 
     async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub), running(hub, services):
         await asyncio.sleep(1.0)
 
-    found = {life.told.participant: life.told.settings for life in settings_of(read(tmp_path / "a.mcap"))}
+    found = {life.told.participant: json.loads(life.told.settings) for life in settings_of(read(tmp_path / "a.mcap"))}
 
     assert {name: settings[name] for name, settings in found.items()} == {
         name: as_plain(getattr(OTHER, name)) for name in roster.NAMES
@@ -110,9 +110,9 @@ async def test_a_driver_tells_all_its_settings_and_files_are_told_whole(tmp_path
 
     [life] = settings_of(read(tmp_path / "a.mcap"))
 
-    driver = life.told.settings["control"]["drivers"]["Head"]
+    driver = json.loads(life.told.settings)["control"]["drivers"]["Head"]
     assert driver == {"speed": 2.5, "api_key": HIDDEN, "url": f"https://{HIDDEN}@voice.example/v1"}
-    assert life.told.files == {control.calibration: "[offsets]\nneck_yaw = 1.5\n"}
+    assert life.told.files == (SettingsFile(name=control.calibration, text="[offsets]\nneck_yaw = 1.5\n"),)
     data = (tmp_path / "a.mcap").read_bytes()
     assert all(secret.encode() not in data for secret in ("0a1b2c", "hunter2"))
 
@@ -136,11 +136,10 @@ def test_nothing_of_our_own_settings_is_hidden_and_what_is_secret_is_hidden_whol
     }  # fmt: skip
 
 
-def kept(settings: Mapping[str, Any], files: Mapping[str, str] | None = None) -> Recording:
-    """A recording of one service with these settings."""
-    told = ServiceSettings(
-        participant="x", run="1", version="0", at=Stamp("loop", 0.0), settings=dict(settings), files=dict(files or {})
-    )
+def kept(settings: Mapping[str, Any] | str, files: tuple[SettingsFile, ...] = ()) -> Recording:
+    """A recording of one service with these settings. settings: or the text of them."""
+    text = settings if isinstance(settings, str) else json.dumps(settings)
+    told = ServiceSettings(participant="x", run="1", version="0", at=Stamp("loop", 0.0), settings=text, files=files)
     return recording([sample(keys.settings("x"), told, 0.5)])
 
 
@@ -151,7 +150,7 @@ VALUES = st.recursive(PLAIN, lambda inner: st.lists(inner, max_size=3) | st.dict
 
 @given(settings=st.dictionaries(NAMES, VALUES, max_size=5), text=st.text(max_size=20))
 def test_what_is_exported_is_toml_that_says_the_same(settings: dict[str, Any], text: str) -> None:
-    exported = configuration(settings_of(kept(settings, {"f": text})), "a\n.mcap")
+    exported = configuration(settings_of(kept(settings, (SettingsFile(name="f", text=text),))), "a\n.mcap")
 
     assert tomllib.loads(exported) == settings
 
@@ -166,14 +165,49 @@ def test_an_exported_file_configures_the_same_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "inner", [b"\xd4\x05a", b"\xc4\x01a", b"\xd6\xff\xff\xff\xff\xff", b"\x81\x90\x01", b"\x91\xc4\x01a"]
-)
-def test_what_json_does_not_have_is_refused(inner: bytes) -> None:
-    [life] = settings_of(kept({"x": True}))
-    packed = encode(life.told)
+    ("text", "reason"),
+    [
+        ("", "not JSON"), ('{"a": ', "not JSON"), ("{'a': 1}", "not JSON"), ("9" * 5000, "not JSON"),
+        ("[" * 50_000, "not JSON"), ("null", "a JSON object"), ('["a"]', "a JSON object"), ('"{}"', "a JSON object"),
+        ('{"a": "\\ud800"}', "half a character"), ('{"\\udfff": 1}', "half a character"),
+        ('{"a": ' * (DEEPEST + 1) + "1" + "}" * (DEEPEST + 1), f"more than {DEEPEST}"),
+        ('{"a": ' + "[" * 400 + "]" * 400 + "}", f"more than {DEEPEST}"),
+    ],
+)  # fmt: skip
+def test_settings_that_nobody_can_read_are_refused_and_told_in_words(text: str, reason: str) -> None:
+    with pytest.raises(InputRefused, match=reason):
+        sections(text)
+    [life] = settings_of(kept(text))
 
-    with pytest.raises(InputRefused, match="settings are tables"):
-        decode(packed.replace(b"\xa1x\xc3", b"\xa1x" + inner))
+    assert reason in life.unread
+    assert (life.sections, life.values) == ({}, {})
+    assert f"x, life 1: not read: {life.unread}" in configuration([life], "a.mcap")
+    assert tomllib.loads(configuration([life], "a.mcap")) == {}
+
+
+@given(settings=st.dictionaries(NAMES, VALUES | st.none() | st.just(float("inf")), max_size=5))
+def test_what_is_told_is_read_as_it_was(settings: dict[str, Any]) -> None:
+    assert sections(text_of(settings)) == json.loads(text_of(settings)) == settings
+
+
+def test_as_deep_as_settings_may_be_they_are_read_and_exported() -> None:
+    text = '{"a": ' * DEEPEST + "1" + "}" * DEEPEST
+    found = settings_of(kept(text))
+
+    assert tomllib.loads(configuration(found, "a.mcap")) == json.loads(text)
+
+
+def test_a_later_life_is_read_though_nobody_can_read_the_one_before() -> None:
+    told = [
+        ServiceSettings(participant="x", run=run, version="0", at=Stamp("loop", 0.0), settings=text)
+        for run, text in (("1", "?"), ("2", '{"x": {"a": 1}}'))
+    ]
+    found = settings_of(recording([sample(keys.settings("x"), one, float(one.run), life=one.run) for one in told]))
+
+    assert [(life.number, bool(life.unread), life.values) for life in found] == [
+        (1, True, {}),
+        (2, False, {"x.a": "1"}),
+    ]
 
 
 def test_of_any_other_value_its_text_is_told() -> None:
