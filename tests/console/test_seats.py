@@ -122,3 +122,15 @@ async def test_a_name_of_a_thing_or_of_the_robot_is_refused_with_the_reason(hub:
 
         assert visitor.you.person == ""
         assert "can't be a person's id" in told(visitor)
+
+
+def test_who_gives_way_takes_no_place_and_none_is_kept_for_them() -> None:
+    """Else who chooses before and who chooses after that count differently, and choose one place."""
+    seats = Seats()
+    for name in ("seat-00000001-ann", "seat-00000002-ann", "seat-00000005-kim", "seat-00000007-uma"):
+        seats.feed(PeerAlive(participant=name, run="1"))
+    before = [seats.before(name, ()) for name in ("seat-00000005-kim", "seat-00000007-uma")]
+    seats.feed(PeerGone(participant="seat-00000002-ann"))
+
+    assert before == [1, 2]
+    assert [seats.before(name, ()) for name in ("seat-00000005-kim", "seat-00000007-uma")] == before

@@ -116,11 +116,11 @@ async def test_a_fragment_from_the_form_is_said_to_the_visitor_and_the_tokens_of
         await press(page, "Ask it", "#wizard")
 
         await page.until("document.querySelector('.words').textContent.includes('Please take')")
+        await page.value("window.engage.send({ do: 'look', target: 'blue-square' })")
         await page.until("window.seen.fired > 3")
         await page.until("window.seen.tokens.size > 1")
         await page.until("window.seen.gazes.size > 1")
 
-        await page.value("window.engage.send({ do: 'look', target: 'blue-square' })")
         await page.until(
             "window.engage.state.events.some((each) => each.kind === 'directed_gaze' && each.state === 'succeeded')"
         )

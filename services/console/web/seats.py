@@ -46,9 +46,13 @@ class Seats:
         names = ("visitor", *(f"visitor-{number}" for number in range(2, len(taken) + 3)))
         return wanted or next(name for name in names if name not in taken)
 
-    def claim(self, person: str) -> str:
-        """Claim a person. Returns the name of the participant that is to show it."""
-        number = uuid4().hex[:8]
+    def claim(self, person: str, tries: int = 0) -> str:
+        """Claim a person. Returns the name of the participant that is to show it.
+
+        tries: claims that this visitor has given up before: a later one comes behind those that are older, so that
+        nobody who chooses a place meanwhile has to count it.
+        """
+        number = f"{min(tries, 255):02x}{uuid4().hex[:6]}"
         name = f"seat-{number}-{person}"
         self._claims[name] = (number, person)
         return name
@@ -64,5 +68,8 @@ class Seats:
 
     def before(self, claim: str, people: Collection[str]) -> int:
         """Number of those who are about to sit down, and choose their place before this one."""
-        own = self._claims[claim]
-        return sum(number < own[0] and person not in people for number, person in self._claims.values())
+        first = dict[str, str]()
+        for number, person in self._claims.values():
+            first[person] = min(number, first.get(person, number))  # the others give way, and choose anew
+        own, _ = self._claims[claim]
+        return sum(number < own and person not in people for person, number in first.items())

@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
+from itertools import count
 from typing import Any
 
 from msgspec.structs import replace
@@ -129,12 +130,12 @@ class Visitor:
     async def _seat(self, wanted: str) -> AsyncIterator[tuple[str, Vector]]:
         """Take a name, and a place before the robot, that nobody has, in no window either. Raises InputRefused."""
         seats, window = self._window.seats, self._window
-        while True:
+        for tries in count():
             name = seats.name(wanted, {each.id for each in window.picture.world.people})
             for other in ("all", window.bus.robot):
                 check_id(name, other)
             not_a_thing(name, window.picture.world)
-            claim = seats.claim(name)
+            claim = seats.claim(name, tries)
             bus = window.hub.join(claim, role="perception")
             try:
                 bus.declare_alive()
