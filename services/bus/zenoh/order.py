@@ -260,14 +260,14 @@ class Follower:
             if past is not None and nth > max(seen, past.count(one)) + 1:
                 unknown.append(one)
                 continue
-            if not (first and key not in self._seen) and not _may_skip(key):
+            if not (first and key not in self._seen) and not may_skip(key):
                 self.lost += nth - max(seen, one.envelope.base) - 1
             self._deliver(one)
             deliver.append((one, first and (key, nth) not in live))
         if past is not None:
             for key, nth in past.counts.items():
                 seen = self._seen.get(key, 0)
-                self.lost += 0 if first or _may_skip(key) else max(0, nth - seen)
+                self.lost += 0 if first or may_skip(key) else max(0, nth - seen)
                 self._seen[key] = max(nth, seen)
             self._is_new = False
         self._held = unknown
@@ -282,7 +282,7 @@ class Follower:
                 self._forget(key, past.dropped)
             elif seen > count:
                 # The last true state comes again: it was overwritten.
-                self._seen[key] = max(0, count - 1) if _may_skip(key) else count
+                self._seen[key] = max(0, count - 1) if may_skip(key) else count
                 self.forged += 1
         before, since = self._held[: self._held_before], self._held[self._held_before :]
         published = [one for one in before if one.envelope.nth <= past.count(one)]
@@ -307,12 +307,11 @@ class NewestStates:
         self._newest: dict[str, tuple[str, Seconds]] = {}
 
     def delivered(self, written: Written, run: str, sent: Seconds) -> None:
-        """Note a value that is delivered. sent: local time at which it was."""
-        if _may_skip(written.key):
-            self._newest.pop(written.key, None)
-            self._newest[written.key] = (run, sent)
-            if len(self._newest) > STATES_KEPT:
-                del self._newest[next(iter(self._newest))]
+        """Note a state's value that is delivered. sent: local time at which it was."""
+        self._newest.pop(written.key, None)
+        self._newest[written.key] = (run, sent)
+        if len(self._newest) > STATES_KEPT:
+            del self._newest[next(iter(self._newest))]
 
     def has_overtaken(self, written: Written, run: str, sent: Seconds) -> bool:
         """Tell whether a value is a state of which another process' newer value has been delivered."""
@@ -320,7 +319,7 @@ class NewestStates:
         return by != run and sent < newest
 
 
-def _may_skip(key: str) -> bool:
+def may_skip(key: str) -> bool:
     """True for a state: only its last value counts, so older ones may be missing."""
     return keys.key_class(key) == "state"
 

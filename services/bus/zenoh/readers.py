@@ -27,6 +27,7 @@ from engage_hri.services.bus.zenoh.order import (
     Past,
     SentLog,
     Written,
+    may_skip,
 )
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.session import Arrived, LoopBridge
@@ -120,7 +121,8 @@ class Readers:
             if isinstance(reader.subscription, Tap):
                 reader.subscription.offer(_sample(written, self._sent.run, now))
             else:
-                reader.newest.delivered(written, self._sent.run, now)
+                if may_skip(written.key):
+                    reader.newest.delivered(written, self._sent.run, now)
                 reader.subscription.offer(received)
 
     def want(self, key: str) -> bool:
@@ -224,7 +226,8 @@ class Readers:
             return
         if message is not None:
             envelope, now = written.envelope, self._loop.time()
-            reader.newest.delivered(written, run, min(now, self._sent_at(written)))
+            if may_skip(written.key):  # others are many
+                reader.newest.delivered(written, run, min(now, self._sent_at(written)))
             reader.subscription.offer(
                 Received(written.key, message, envelope.source, now, past, run, envelope.number)
             )
