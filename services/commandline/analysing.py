@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 from msgspec import Struct, structs
@@ -24,7 +24,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import Tally
 from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.settings import Life, settings_of
+from engage_hri.services.recording.settings import Life, flat, settings_of
 from engage_hri.services.recording.times import Times, messages, moved
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.records import Recording as Record
@@ -58,7 +58,7 @@ class Session(Struct, frozen=True, kw_only=True):
     record: SessionRecord
     events: tuple[EventRecord, ...]
     published: WindowStatistics | None
-    doubts: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
     settings: tuple[Life, ...] = ()
 
 
@@ -69,11 +69,12 @@ def sessions(recording: Recording) -> list[Session]:
     """
     times = Times(recording)
     told = [*_told(recording, times)]
-    doubts = tuple(_doubts(recording, told, times))
+    doubts, settings = tuple(_doubts(recording, told, times)), tuple(settings_of(recording))
     parts = stretches(
         ((one.message, one.at) for one in told), recording.facts.get("condition", ""), recording.duration
     )
-    made = [_session(recording, told, times, part, doubts) for part in parts if part.name]
+    found = (_session(recording, told, times, part) for part in parts if part.name)
+    made = [structs.replace(one, doubts=doubts, settings=settings) for one in found]
     if len(parts) == 1:
         return made
     kept = [one for one in made if one.events or one.record.eye_contact is not None] or made
@@ -96,13 +97,7 @@ def _told(recording: Recording, times: Times) -> Iterator[Told]:
     yield from (Told(*one) for one in heard.advance(recording.duration))
 
 
-def _session(
-    recording: Recording,
-    told: Sequence[Told],
-    times: Times,
-    part: Stretch,
-    doubts: tuple[str, ...],
-) -> Session:
+def _session(recording: Recording, told: Sequence[Told], times: Times, part: Stretch) -> Session:
     """Take the numbers of a part: of all connection events that began in it, as recognition decided them."""
     tally, record = Tally(WINDOW), Record(recording.robot)
     published: WindowStatistics | None = None
@@ -125,8 +120,7 @@ def _session(
     return Session(
         path=Path(recording.name), condition=part.name, participant=recording.facts.get("participant", ""),
         record=record.session(session=0, condition=part.name, seed=0),
-        events=record.events(session=0, condition=part.name), published=published if is_all else None, doubts=doubts,
-        settings=tuple(settings_of(recording)),
+        events=record.events(session=0, condition=part.name), published=published if is_all else None,
     )  # fmt: skip
 
 
@@ -293,14 +287,5 @@ def with_settings(config: RecognitionConfig, settings: Sequence[str]) -> Recogni
     """The same with other settings, `recognition.KEY=VALUE`. Raises InputRefused."""
     from engage_hri.services.commandline.config import load
 
-    return load(settings=settings, defaults=_flat(msgspec.to_builtins(config), "recognition")).recognition
-
-
-def _flat(values: dict[str, Any], name: str) -> list[str]:
-    found: list[str] = []
-    for key, value in values.items():
-        if isinstance(value, dict):
-            found += _flat(value, f"{name}.{key}")
-        elif value is not None:
-            found.append(f"{name}.{key}={msgspec.json.encode(value).decode()}")
-    return found
+    had = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), "recognition.") if value]
+    return load(settings=settings, defaults=had).recognition

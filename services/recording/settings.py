@@ -147,7 +147,7 @@ def _value(value: Any) -> str:
             return str(value)
         case int() | float():
             return repr(value)
-        case list():
+        case list() | tuple():
             return f"[{', '.join(_value(one) for one in value if one is not None)}]"
         case dict():
             inner = (f"{_key(name)} = {_value(one)}" for name, one in value.items() if one is not None)
