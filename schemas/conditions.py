@@ -47,6 +47,17 @@ class StudyCondition(Struct, frozen=True, kw_only=True, tag="study_condition", o
     speech_only: bool = False
     by: str = ""
 
+    @property
+    def is_told(self) -> bool:
+        """True if people are to hear of it: somebody set it, or the configuration leaves the robot words alone."""
+        return bool(self.by) or self.speech_only
+
+    @property
+    def sentence(self) -> str:
+        """Words for people: which it is, and who set it."""
+        by = f", set by {self.by}" if self.by else ""
+        return f"condition of the study: {words(self.name, self.speech_only)}{by}"
+
 
 def words(name: str, speech_only: bool) -> str:
     """A condition in words, for people."""

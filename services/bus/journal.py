@@ -14,7 +14,6 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.conditions import StudyCondition
-from engage_hri.schemas.conditions import words as condition_words
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
@@ -118,9 +117,7 @@ def _body_faults(message: BodyFaults) -> Entry:
 
 
 def _condition(message: StudyCondition) -> Entry:
-    by = f", set by {message.by}" if message.by else ""
-    told = condition_words(message.name, message.speech_only)
-    return INFO if message.by else DEBUG, f"condition of the study: {told}{by}"
+    return INFO if message.by else DEBUG, message.sentence
 
 
 def _names(holds: Iterable[Hold]) -> str:

@@ -74,8 +74,8 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return f"! faults of the body that are switched on: {', '.join(map(words, faults))}"
         case BodyFaults() if before.faults:
             return "no fault of the body is switched on any more"
-        case StudyCondition(by=by) if by or message.speech_only or before.condition:
-            return wording.condition(message)
+        case StudyCondition() if message.is_told or before.condition:
+            return message.sentence
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:

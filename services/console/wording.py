@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.behaviors import Action, EventKind
-from engage_hri.schemas.conditions import StudyCondition, words
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.holds import Hold
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
@@ -20,11 +19,6 @@ KINDS: dict[EventKind, str] = {
 
 SEEN: Seconds = 0.005
 """Error of a delay from which on it changes the two digits that are shown."""
-
-
-def condition(told: StudyCondition) -> str:
-    """A condition of the study that has begun, with who set it."""
-    return f"condition of the study: {words(told.name, told.speech_only)}{f', set by {told.by}' if told.by else ''}"
 
 
 def seconds(value: Seconds | None, sign: bool = False) -> str:

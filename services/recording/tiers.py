@@ -155,9 +155,9 @@ class _Collected:
                 for event in events:
                     told = self._times.at(event.at, at)
                     self._event(event, at if told is None else told, life)
-            case StudyCondition(name=name, speech_only=speech_only, by=by):
+            case StudyCondition(name=name, speech_only=speech_only):
                 self._end((STUDY, "condition"), at)
-                if by or speech_only:
+                if message.is_told:
                     self._open[STUDY, "condition"] = _Open(at, condition(name, speech_only), life)
             case HeadOwner(owner=owner):
                 self._owner("" if owner.kind == "none" else f"{owner.kind} {owner.target}".strip(), at, life)

@@ -277,13 +277,12 @@ class Picture:
         held = tuple(wording.held(each.hold) for each in self._scene.held)
         kinds = dict.fromkeys(each.kind for each in self._scene.faults)
         told = self._scene.condition
-        is_set = told is not None and (told.by or told.speech_only)
         by = self._scene.faults_by if kinds else ""
         if by and not self._health.has(by):
             by += ", which has left the bus"
         return Switched(
             held, tuple(map(words, self._scene.faults)), tuple(kinds), by,
-            condition=wording.condition(told) if told is not None and is_set else "",
+            condition=told.sentence if told is not None and told.is_told else "",
         )  # fmt: skip
 
     def _changed(self, *names: str) -> None:
