@@ -27,6 +27,8 @@ PATIENCE = 20.0
 PAUSE = 0.4
 """Seconds between two meetings of eyes."""
 TIMES = 5
+MOST = 40
+"""Meetings of eyes: at least, and at most until one was measured as well as the paths allow."""
 SLACK = 0.006
 """Seconds: by what the clocks drift until they are measured again, and what processes need to answer."""
 
@@ -90,7 +92,9 @@ async def test_delays_are_right_and_no_further_off_than_is_told(tmp_path: Path, 
                 await lab.order(order="path", since=since, to=to, delay=delay, jitter=case.jitter)
         watch, body, person = await start(lab)
         wrong, told = [], []
-        while len(told) < TIMES:
+        # A busy machine answers late, and then more is told: the best has to be as good as the paths allow.
+        allowed = 0.010 if case.trip < 0.005 else case.trip + SLACK
+        while len(told) < TIMES or (min(told) > allowed and len(told) < MOST):
             began = await person.look(PAUSE, "robot")
             answered = await body.look(0.2 + 0.3 * chance.random(), "human")
             event = await decided(watch)
@@ -102,8 +106,7 @@ async def test_delays_are_right_and_no_further_off_than_is_told(tmp_path: Path, 
             await person.look(0.0)
             await body.look(0.0)
         assert [off for off, error in zip(wrong, told, strict=True) if off > error] == [], (wrong, told)
-        # A busy machine answers late, and then more is told: the best has to be as good as the paths allow.
-        assert min(told) <= (0.010 if case.trip < 0.005 else case.trip + SLACK)
+        assert min(told) <= allowed
         if name == "lopsided":
             assert max(wrong) > 0.03, "the paths do not deceive: this case shows nothing"
 
