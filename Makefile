@@ -52,12 +52,14 @@ bench: $(READY)
 	@for file in $$(grep -l __main__ benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file" $(ARGS) || exit 1; done
 
 # The daemon of a Reachy Mini with its mock-up, in an environment of its own: 350 MB, a minute and a half. Without it its
-# tests skip. PyGObject has to be built: tests/control/reachy_mini/daemon.txt says with what.
+# tests skip. It wants libraries of the system: tests/control/reachy_mini/daemon.txt says which.
 reachy-mini: build/reachy-mini/.ready
 
 build/reachy-mini/.ready: tests/control/reachy_mini/daemon.txt $(READY)
 	@$(BIN)/python -m venv --clear build/reachy-mini
 	@PIP_DISABLE_PIP_VERSION_CHECK=1 build/reachy-mini/bin/python -m pip install -qq -r tests/control/reachy_mini/daemon.txt
+	@build/reachy-mini/bin/reachy-mini-daemon --help >/dev/null \
+		|| { echo "the daemon does not start: tests/control/reachy_mini/daemon.txt says what it needs" >&2; exit 1; }
 	@touch $@
 
 clean:

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3]
-BUILT = ROOT / "build" / "reachy-mini" / "bin" / "reachy-mini-daemon"
+BUILT = ROOT / "build" / "reachy-mini"
 OPTIONS = (
     "--mockup-sim", "--headless", "--no-media", "--no-wake-up-on-start", "--no-goto-sleep-on-stop",
     "--dataset-update-interval", "0",
@@ -30,7 +30,9 @@ PATIENCE = 180.0
 
 def program() -> str:
     """The daemon's program. Skips the test where there is none."""
-    found = os.environ.get("REACHY_MINI_DAEMON") or (str(BUILT) if BUILT.exists() else "")
+    # `make reachy-mini` leaves .ready when it has started the daemon.
+    built = str(BUILT / "bin" / "reachy-mini-daemon") if (BUILT / ".ready").exists() else ""
+    found = os.environ.get("REACHY_MINI_DAEMON") or built
     if not found or shutil.which(found) is None:
         pytest.skip("no daemon of a Reachy Mini: `make reachy-mini`, or set REACHY_MINI_DAEMON to its program")
     return found
