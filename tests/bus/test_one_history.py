@@ -1,12 +1,12 @@
 """Random stories of processes that come, go and crash, of losses and of lies, against what each reader must see.
 
 The oracle knows only what was published when, by whom, and when each reader came. Both buses play the same stories;
-losses and lies about the order are Zenoh's alone, for memory has no wire.
+losses, slow wires and lies about the order are Zenoh's alone, for memory has no wire.
 """
 
 import asyncio
 import random
-from collections import defaultdict
+from collections import defaultdict, deque
 from typing import Any, NamedTuple
 
 import pytest
@@ -20,7 +20,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.history import pack
 from engage_hri.services.bus.zenoh.hub import ZenohHub
 from engage_hri.services.bus.zenoh.order import Envelope
-from engage_hri.services.bus.zenoh.session import open_session
+from engage_hri.services.bus.zenoh.session import Arrived, open_session
 from tests.bus.places import PATIENCE, MemoryPlace, Place, ZenohPlace, state, take
 
 pytestmark = pytest.mark.each_bus
@@ -75,15 +75,26 @@ class Story:
         bus.declare_alive()
         self.speakers.append(Speaker(hub, bus))
         if isinstance(hub, ZenohHub):
-            self._make_lossy(hub)
+            self._make_wire_bad(hub)
 
-    def _make_lossy(self, hub: ZenohHub) -> None:
-        """What is published is lost at times before any reader of this process gets it."""
-        came = hub.readers._sample_came
+    def _make_wire_bad(self, hub: ZenohHub) -> None:
+        """What is published is lost at times before any reader of this process gets it, or is slow from one sender."""
+        came, loop = hub.readers._sample_came, asyncio.get_running_loop()
+        wires: dict[str, deque[tuple[str, Arrived]]] = defaultdict(deque)
 
-        def sample_came(pattern: str, sample: zenoh.Sample) -> None:
-            if self.drops.random() >= self.loss:
+        def arrive(sender: str) -> None:
+            came(*wires[sender].popleft())
+
+        def sample_came(pattern: str, sample: Arrived) -> None:
+            if self.drops.random() < self.loss:
+                return
+            wire = wires[sample.sender]
+            late = self.drops.choice((0.0, 0.0, 0.0, 0.01))
+            if not wire and not late:
                 came(pattern, sample)
+                return
+            wire.append((pattern, sample))
+            loop.call_later(late, arrive, sample.sender)
 
         hub.readers._sample_came = sample_came  # type: ignore[method-assign]
 

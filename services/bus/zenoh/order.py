@@ -299,8 +299,8 @@ class Follower:
 class NewestStates:
     """The newest value of each state that a subscription has got, of whichever process, and when it was sent.
 
-    Several processes may publish one state, as the world. Each hands out its own last value, at its own pace, and the
-    oldest of these may come last.
+    Several processes may publish one state, as the world. Each has a wire of its own, and hands out its own last value at
+    its own pace: the oldest of these may come last.
     """
 
     def __init__(self) -> None:

@@ -227,7 +227,11 @@ class Readers:
         if message is not None:
             envelope, now = written.envelope, self._loop.time()
             if may_skip(written.key):  # others are many
-                reader.newest.delivered(written, run, min(now, self._sent_at(written)))
+                sent = min(now, self._sent_at(written))
+                # What comes late is not to be the last word: another process may have said a newer one.
+                if reader.newest.has_overtaken(written, run, sent):
+                    return
+                reader.newest.delivered(written, run, sent)
             reader.subscription.offer(
                 Received(written.key, message, envelope.source, now, past, run, envelope.number)
             )
@@ -282,10 +286,7 @@ class Readers:
             trusted = tuple(one for one in past.written if self._is_trusted(one, run))
             past = msgspec.structs.replace(past, written=trusted)
         for written, is_past in follower.catch_up(past):
-            # What was answered late is not to be the last word: another process may have said a newer one.
-            is_tap = isinstance(reader.subscription, Tap)
-            if is_tap or not reader.newest.has_overtaken(written, run, self._sent_at(written)):
-                self._deliver(reader, written, run, past=is_past)
+            self._deliver(reader, written, run, past=is_past)
         if follower.forged > known:
             LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
         if follower.again:
