@@ -127,3 +127,26 @@ async def test_a_long_name_of_a_participant_makes_a_phone_no_wider(place: Place)
         await page.until("document.querySelector('.health').textContent.includes('perception')")
 
         await page.until("document.documentElement.scrollWidth <= 400")  # what is drawn takes its size a frame later
+
+
+def services(*missing: str) -> list[dict[str, Any]]:
+    names = ("generation", "realizer", "recognition", "control")
+    return [{"name": name, "service": True, "here": name not in missing, "serves": True, "warnings": [], "facts": []}
+            for name in names]  # fmt: skip
+
+
+async def test_a_panel_whose_service_is_gone_says_in_its_heading_that_it_stands_still(place: Place) -> None:
+    stale = "[...document.querySelectorAll('section.stale')].map((each) => each.id).join()"
+    heading = "document.querySelector('#measures h2').textContent"
+    async with opened(place) as page:
+        await take(page, sections={"health": services("recognition", "control")})
+        assert await page.value(stale) == "scene,above,events,measures"
+        assert await page.value(heading) == "Engagement as it was last: recognition is not on the bus"
+        away = "document.querySelector('.away').textContent"
+        assert await page.value(away) == (
+            "Not on the bus: recognition (it notices no connection events), "
+            "control (its body is shown as it was last)."
+        )
+
+        await take(page, sections={"health": services("control")})
+        assert await page.value(f"{stale} + {heading}") == "scene,aboveEngagement"
