@@ -151,10 +151,14 @@ class SteerOrder(Order, frozen=True, kw_only=True, tag="steer"):
 
 
 class SwitchOrder(Order, frozen=True, kw_only=True, tag="faults"):
-    """Switch on exactly these faults of the body."""
+    """Switch a fault of the body on, or off; all others stay as they are, whoever has switched them.
+
+    off: all of its kind go off that have the fields which it has.
+    """
 
     needs: ClassVar[Right] = "faults"
-    faults: Annotated[tuple[BodyFault, ...], Meta(max_length=50)] = ()
+    fault: BodyFault
+    off: bool = False
     by: Name = ""
 
 
@@ -229,6 +233,6 @@ def written(order: Order) -> str:
             return f"condition: {words(name, speech_only)}"
         case SteerOrder(to=to):
             return to
-        case SwitchOrder(faults=faults):
-            return f"faults: {', '.join(each.kind for each in faults) or 'none'}"
+        case SwitchOrder(fault=fault, off=off):
+            return f"fault {'off' if off else 'on'}: {fault.kind}"
     return ""

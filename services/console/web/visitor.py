@@ -193,8 +193,9 @@ class Visitor:
                 self._drives(_done(robot.resume(timeout=PATIENCE)))
             case orders.SteerOrder(to="stop"):
                 self._drives(_done(robot.stop(timeout=PATIENCE)))
-            case orders.SwitchOrder(faults=faults):
-                self._drives(_done(robot.switch_faults(faults, timeout=PATIENCE)))
+            case orders.SwitchOrder(fault=fault, off=off):
+                switch = robot.switch_off if off else robot.switch_on
+                self._drives(_done(switch(fault, timeout=PATIENCE)))
             case orders.Condition(name=name, speech_only=speech_only, by=who):
                 named = name.strip()
                 self._drives(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))
