@@ -196,10 +196,13 @@ function stale(panel, service) {
 // What is wrong with the window itself: no link to it, or none of it to the robot.
 export function away(place) {
   let linked = true;
+  let refusal = ""; // why the window has closed the link itself
   let missing = null;
   function show() {
     let text = "";
-    if (!linked) {
+    if (!linked && refusal) {
+      text = `The window answers, but not here: ${refusal}. It is called again every second.`;
+    } else if (!linked) {
       text = "The window does not answer: `engage console` has ended, or this page cannot reach it. The picture below is the last one. It is called again every second.";
     } else if (missing?.length) {
       text = missing.length === 4
@@ -213,8 +216,9 @@ export function away(place) {
     place.hidden = !text;
   }
   return {
-    link(there) {
+    link(there, reason = "") {
       linked = there;
+      refusal = reason;
       show();
     },
     take(state, changed) {
