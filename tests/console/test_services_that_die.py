@@ -1,15 +1,20 @@
 """What a service told stands no longer once it has been killed, and goes on if it was only cut off."""
 
+import asyncio
 from typing import Any
+
+import pytest
 
 from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console import view
 from tests.console.scenes import Timed, at, fed
 from tests.console.test_picture import net, picture, section
+from tests.console.test_seats import visitors
 
 FACE = Claim(kind="face", priority=1, target="ann", reason="spoken to last")
 
@@ -102,3 +107,34 @@ def test_a_claim_of_a_start_or_of_a_seat_is_neither_a_service_nor_news() -> None
     others = [each["name"] for each in section(made, "health") if not each["service"]]
     assert others == ["seat-ann", "up-0123abcd"]
     assert [note["text"].split()[0] for note in section(made, "notes")] == ["up-0123abcd", "seat-ann"]
+
+
+@pytest.mark.parametrize(
+    ("order", "server"),
+    [
+        ('{"do": "tell", "text": "Hello"}', "generation"),
+        ('{"do": "condition", "name": "a"}', "generation"),
+        ('{"do": "inhibit", "on": true}', "generation"),
+        ('{"do": "steer", "to": "hold"}', "realizer"),
+        ('{"do": "faults", "fault": {"kind": "slow"}}', "control"),
+    ],
+)
+async def test_an_order_whose_service_is_gone_says_at_once_that_it_waits_and_then_that_nobody_came(
+    hub: MemoryHub, order: str, server: str
+) -> None:
+    async with visitors(hub, windows=1, each=1) as (visitor,):
+        visitor.take(order)
+        assert [each.text for each in visitor.told()] == [
+            f"{server} is not on the bus: this waits for it, 5 s at most"
+        ]
+        await asyncio.sleep(5.1)
+
+        (told,) = visitor.told()
+        assert f"no answer within 5.0 s (is {server} running?)" in told.text
+
+
+async def test_letting_the_gaze_go_waits_for_nobody(hub: MemoryHub) -> None:
+    async with visitors(hub, windows=1, each=1) as (visitor,):
+        visitor.take('{"do": "inhibit", "on": false}')
+
+        assert visitor.told() == ()

@@ -199,6 +199,20 @@ def decoded_in_recording(text: str | bytes) -> Drawn | Play:
         raise InputRefused(Fault(reason="it can only be played", where="this is a recording")) from error
 
 
+def server(order: Order) -> str:
+    """The service that carries an order out; empty: none has to."""
+    match order:
+        case SteerOrder():
+            return "realizer"
+        case SwitchOrder():
+            return "control"
+        case InhibitGaze(on=False):
+            return ""
+        case WizardOrder():
+            return "generation"
+    return ""
+
+
 def missing(order: Order, role: str, trusted: bool) -> str:
     """Say why this order is not carried out; empty: it may be. trusted: the page was called with the token."""
     return denied(role, trusted).get(order.needs, "") if order.needs else ""

@@ -93,6 +93,10 @@ class Picture:
         """The body as it described itself; None: not yet."""
         return self._body
 
+    def has(self, name: str) -> bool:
+        """Tell whether a participant is on the bus."""
+        return self._health.has(name)
+
     def zero(self, at: Seconds) -> Seconds:
         """Seconds of the picture at a local instant."""
         return round(at - self.began, 3)

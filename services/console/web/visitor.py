@@ -169,6 +169,8 @@ class Visitor:
     def _drive(self, order: orders.Order) -> None:
         by = getattr(order, "by", "") or "somebody"
         self._window.log(f"{by}: {orders.written(order)}")
+        if (server := orders.server(order)) and not self._window.picture.has(server):
+            self._tell(f"{server} is not on the bus: this waits for it, {PATIENCE:g} s at most", is_by_hand=True)
         robot = self._window.robot
         match order:
             case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
