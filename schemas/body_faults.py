@@ -1,10 +1,11 @@
 """Faults of a simulated body: what can be switched on while it runs, and what is on. Thesis 4.2.2, 4.5.3, 5.4.3."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from msgspec import Struct
 
 from engage_hri.schemas.body import Capabilities, FaultKind
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Stamp
@@ -27,12 +28,19 @@ class BodyFault(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class SwitchFaults(Request, frozen=True, kw_only=True, tag="switch_faults", omit_defaults=True):
-    """cmd: operator or wizard -> control: from now on the body has exactly these faults. Ends in `FaultsSwitched`.
+    """cmd: operator or wizard -> control: switch faults of the body on and off. Ends in `FaultsSwitched`.
 
-    It is refused, and nothing changes, if there is one among them that the body cannot play.
+    A fault that is on and is not named stays on, so that two who switch at once do not undo one another.
+
+    all_off: all faults go off first. off: then, of each of these, all that have the fields which it has. on: at last
+        these come on; each replaces one that differs from it in its amount alone.
+
+    It is refused, and nothing changes, if the body cannot play one of `on`, or if one of `off` is not on.
     """
 
-    faults: tuple[BodyFault, ...] = ()
+    on: tuple[BodyFault, ...] = ()
+    off: tuple[BodyFault, ...] = ()
+    all_off: bool = False
 
 
 class FaultsSwitched(Outcome, frozen=True, kw_only=True, tag="faults_switched", omit_defaults=True):
@@ -161,3 +169,32 @@ def words(fault: BodyFault) -> str:
         f"before {fault.before}" if fault.before else "", f"in {fault.behavior}" if fault.behavior else "",
     )  # fmt: skip
     return " ".join(filter(None, said))
+
+
+def switched(before: tuple[BodyFault, ...], request: SwitchFaults) -> tuple[BodyFault, ...]:
+    """Faults that are to be on after a request. before: those that are on.
+
+    Raises InputRefused: one that is to go off is not on.
+    """
+    left = () if request.all_off else before
+    for like in request.off:
+        if not any(_is_meant(each, like) for each in left):
+            raise InputRefused(Fault(reason="is not on", where=words(like), advice=f"on: {told(left)}"))
+        left = tuple(each for each in left if not _is_meant(each, like))
+    for fault in request.on:
+        left = (*(each for each in left if _where(each) != _where(fault)), fault)
+    return left
+
+
+def told(faults: Iterable[BodyFault]) -> str:
+    """Faults that are on, in words."""
+    return ", ".join(map(words, faults)) or "nothing"
+
+
+def _where(fault: BodyFault) -> tuple[str, ...]:
+    return (fault.kind, fault.part, fault.before, fault.behavior)
+
+
+def _is_meant(fault: BodyFault, like: BodyFault) -> bool:
+    given = zip(_where(fault), _where(like), strict=True)
+    return all(has == wanted or not wanted for has, wanted in given) and like.amount in (None, fault.amount)

@@ -58,6 +58,12 @@ class StudyCondition(Struct, frozen=True, kw_only=True, tag="study_condition", o
         by = f", set by {self.by}" if self.by else ""
         return f"condition of the study: {words(self.name, self.speech_only)}{by}"
 
+    @property
+    def lost_sentence(self) -> str:
+        """Words for people when it went with its generation, and is in force no more."""
+        was = f"{words(self.name, self.speech_only)!r}, set by {self.by}"
+        return f"condition of the study: none, for generation has gone, and with it {was}: begin it again"
+
 
 def words(name: str, speech_only: bool) -> str:
     """A condition in words, for people."""

@@ -34,7 +34,7 @@ PURE_MACHINERY = {
     "services/requests/transitions.py",
     "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
     "services/runtime/action_reports.py", "services/runtime/reporters.py", "services/runtime/reports.py",
-    "services/runtime/world_report.py",
+    "services/runtime/world_report.py", "services/runtime/in_force.py",
     "services/client/chunking.py",
     "services/client/event_stream.py", "services/client/person_actions.py", "services/client/shared_world.py",
     "services/client/utterances.py",

@@ -29,6 +29,8 @@ class Faulting(Steering):
     ) -> tuple[BodyFault, ...]:
         """Switch on exactly these faults of the body, in what is under way, too; returns what is on.
 
+        Where others switch faults as well, `switch_on` and `switch_off` leave theirs as they are.
+
         faults: none: it is healthy again. `schemas/body_faults.py` says what each does. Rules for access keep this to
             operators and wizards.
         timeout: seconds to wait for the request to be accepted; None: for ever.
@@ -37,7 +39,32 @@ class Faulting(Steering):
             InputRefused: the body cannot play one of them. Nothing has changed.
             RunFailed: control is gone, or has not come within `timeout`.
         """
-        request = SwitchFaults(id=self._request_id("faults"), faults=tuple(faults))
+        return await self._switch(on=tuple(faults), all_off=True, timeout=timeout)
+
+    async def switch_on(self, *faults: BodyFault, timeout: Seconds | None = None) -> tuple[BodyFault, ...]:
+        """Switch on these faults of the body besides those that are on; returns what is on.
+
+        faults: each replaces one that differs from it in its amount alone. timeout, errors: as of `switch_faults`.
+        """
+        return await self._switch(on=faults, timeout=timeout)
+
+    async def switch_off(self, *faults: BodyFault, timeout: Seconds | None = None) -> tuple[BodyFault, ...]:
+        """Switch off these faults of the body, and no others; returns what is on.
+
+        faults: of each, all go off that have the fields which it has; one with a kind alone means all of its kind.
+        timeout, errors: as of `switch_faults`; InputRefused also if one of them is not on.
+        """
+        return await self._switch(off=faults, timeout=timeout)
+
+    async def _switch(
+        self,
+        *,
+        on: tuple[BodyFault, ...] = (),
+        off: tuple[BodyFault, ...] = (),
+        all_off: bool = False,
+        timeout: Seconds | None,
+    ) -> tuple[BodyFault, ...]:
+        request = SwitchFaults(id=self._request_id("faults"), on=on, off=off, all_off=all_off)
         outcome = await self._ask(keys.FAULTS, request, timeout)
         assert isinstance(outcome, FaultsSwitched)
         return outcome.faults

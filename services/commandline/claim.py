@@ -55,9 +55,10 @@ class StartClaim:
 class Claiming:
     """A claim with the tokens that show it and the subscription to those of others."""
 
-    def __init__(self, claim: StartClaim, presence: Subscription, up: Bus) -> None:
+    def __init__(self, claim: StartClaim, presence: Subscription, starting: Bus, up: Bus) -> None:
         self._claim = claim
         self._presence = presence
+        self._starting = starting
         self.bus = up
         """Bus for the use of the winner."""
 
@@ -81,6 +82,8 @@ class Claiming:
                 watching.result()
             self._claim.is_up = True
             self.bus.declare_alive()
+            watching.cancel()
+            await self._starting.leave()  # after the other token, so that one of the two is always seen
         finally:
             watching.cancel()
             waiting.cancel()
@@ -102,7 +105,7 @@ async def claiming(hub: Hub, id: str = "") -> AsyncIterator[Claiming]:
         with starting.subscribe(keys.ANY_ALIVE) as presence:
             starting.declare_alive()
             await hub.wait_until_free()  # until all participants are known
-            yield Claiming(StartClaim(hub.robot, id), presence, up)
+            yield Claiming(StartClaim(hub.robot, id), presence, starting, up)
     finally:
         await starting.leave()
         await up.leave()

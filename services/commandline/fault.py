@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.body import Capabilities, FaultKind
-from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, words
+from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, told
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
@@ -52,28 +52,17 @@ async def _switch(options: Options, config: Config) -> None:
         await options.open(config.bus, "operator") as hub,
         Robot.on(hub.join(unique_name("fault"), "operator")) as robot,
     ):
-        on = await robot.faults_on(PATIENCE)
         if options.kind == LIST:
+            on = await robot.faults_on(PATIENCE)
             print(listed(await robot.capabilities(PATIENCE), on))
             return
-        on = await robot.switch_faults(switched(on, options.fault, off=options.off), timeout=PATIENCE)
-    print(f"on: {', '.join(map(words, on)) or 'nothing; the body is healthy'}")
-
-
-def switched(on: tuple[BodyFault, ...], fault: BodyFault, *, off: bool = False) -> tuple[BodyFault, ...]:
-    """Faults that are to be on: those that are, with this one, or without it and its like.
-
-    fault: replaces one that differs in its amount alone. off: those of its kind that have the fields which it has.
-    Raises InputRefused if none of them is on.
-    """
-    if fault.kind == NONE:
-        return ()
-    if not off:
-        return (*(each for each in on if _where(each) != _where(fault)), fault)
-    left = tuple(each for each in on if not _is_meant(each, fault))
-    if left == on:
-        raise InputRefused(Fault(reason="is not on", where=words(fault), advice=f"on: {', '.join(map(words, on))}"))
-    return left
+        if options.kind == NONE:
+            on = await robot.switch_faults(timeout=PATIENCE)
+        elif options.off:
+            on = await robot.switch_off(options.fault, timeout=PATIENCE)
+        else:
+            on = await robot.switch_on(options.fault, timeout=PATIENCE)
+    print(f"on: {told(on) if on else 'nothing; the body is healthy'}")
 
 
 def listed(body: Capabilities, on: tuple[BodyFault, ...]) -> str:
@@ -83,7 +72,7 @@ def listed(body: Capabilities, on: tuple[BodyFault, ...]) -> str:
         kind = kind_of(name, body)
         lines.append(f"{name}: {kind.does if kind else 'a fault of this body, which does not say what it does'}")
         lines += [f"    --{option}: {what}" for option, what in (_options(kind, body) if kind else {}).items()]
-    lines.append(f"on: {', '.join(map(words, on)) or 'nothing'}" if body.faults else "this body can play no faults")
+    lines.append(f"on: {told(on)}" if body.faults else "this body can play no faults")
     return "\n".join(lines)
 
 
@@ -93,12 +82,3 @@ def _options(kind: FaultKind, body: Capabilities) -> dict[str, str]:
     options = {"part": parts and f"{parts}{'' if kind.on == 'joint' else '; without it all'}"}
     options |= {"amount": amount and f"{amount}{usual}", "before": "a sync point" if kind.before else ""}
     return {option: what for option, what in options.items() if what}
-
-
-def _where(fault: BodyFault) -> tuple[str, ...]:
-    return (fault.kind, fault.part, fault.before, fault.behavior)
-
-
-def _is_meant(fault: BodyFault, like: BodyFault) -> bool:
-    given = zip(_where(fault), _where(like), strict=True)
-    return all(has == wanted or not wanted for has, wanted in given) and like.amount in (None, fault.amount)

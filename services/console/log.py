@@ -13,6 +13,7 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, Warnin
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
@@ -76,6 +77,10 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return "no fault of the body is switched on any more"
         case StudyCondition() if message.is_told or before.condition:
             return message.sentence
+        case PeerGone(participant="generation") if (
+            lost := after.study.missed
+        ) is not None and before.condition is lost:
+            return f"! {lost.lost_sentence}"
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetTransition, NetWaiting
+from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.wording import seconds
 
@@ -73,7 +74,10 @@ def _times(fired: tuple[Fired, ...], size: int) -> dict[int, Seconds]:
 
 
 def feed(nets: Nets, message: Message, at: Seconds, now: Seconds) -> Nets:
-    """Change the nets by a message. at: its local instant. What is told of an unknown block changes nothing."""
+    """Change the nets by a message. at: its local instant. What is told of an unknown block changes nothing.
+
+    Without its realizer no net goes on. One that was only cut off tells its nets again when it is back.
+    """
     match message:
         case NetPlanned(block=block) if (net := in_view(message, at, now)) is not None:
             return {**nets, block: net}
@@ -89,6 +93,10 @@ def feed(nets: Nets, message: Message, at: Seconds, now: Seconds) -> Nets:
                 is_over=known.is_over or message.is_over,
             )
             return {**nets, block: net}
+        case PeerGone(participant="realizer"):
+            return {
+                block: net if net.is_over else replace(net, heard=now, is_over=True) for block, net in nets.items()
+            }
     return nets
 
 

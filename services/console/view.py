@@ -24,6 +24,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowSt
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.shelf import Shelf
+from engage_hri.services.runtime.in_force import InForce
 
 UTTERANCES_KEPT = 40
 EVENTS_KEPT = 100
@@ -121,16 +122,23 @@ class Scene(Struct, frozen=True, kw_only=True):
     events: tuple[EventInView, ...] = ()
     owner: Claim | None = None
     waiting: tuple[Claim, ...] = ()
+    left: tuple[Claim, tuple[Claim, ...]] | None = None
+    """Owner and claims of the head that generation told last, while it is not there: nobody rules the head then."""
     session: WindowStatistics | None = None
     notes: tuple[str, ...] = ()
     held: tuple[HoldInView, ...] = ()
     faults: tuple[BodyFault, ...] = ()
-    condition: StudyCondition | None = None
-    """Condition of the study; None: generation has not told of one."""
+    study: InForce = InForce()
+    """Condition of the study."""
     faults_by: str = ""
     """Participant that switched them; empty: the configuration."""
     realizer: str = ""
     """Life of the realizer; empty: unknown."""
+
+    @property
+    def condition(self) -> StudyCondition | None:
+        """Condition that is in force; None: generation has not told of one, or has gone."""
+        return self.study.told
 
     def actor(self, id: str) -> Actor:
         return self.actors.get(id) or Actor(id=id)
@@ -148,7 +156,8 @@ def empty(robot: str, at: Seconds) -> Scene:
 
 def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
     """Change the scene by a message. at: its local instant."""
-    scene = replace(scene, now=max(scene.now, at))
+    life = scene.study.life
+    scene = replace(scene, now=max(scene.now, at), study=scene.study.after(message))
     match message:
         case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
             return _act(scene, message, at)
@@ -166,6 +175,11 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
         case PredictionFeedback(block=block) if not block.startswith(OWN_BLOCKS):
             points = tuple(PointInView(behavior=p.behavior, sync=p.sync, planned=p.time) for p in message.points)
             return _points(scene, block, points)
+        case PeerGone(participant="generation") if scene.owner is not None:
+            return replace(scene, owner=None, waiting=(), left=(scene.owner, scene.waiting))
+        case PeerAlive(participant="generation", run=run) if scene.left is not None:
+            owner, waiting = scene.left if run == life else (None, ())
+            return replace(scene, owner=owner, waiting=waiting, left=None)
         case PeerAlive(participant="realizer", run=run):
             return replace(_changed(scene, LOST, "") if run == scene.realizer else scene, realizer=run)
         case PeerGone(participant="realizer"):
@@ -173,7 +187,7 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
         case ConnectionEvent():
             return _event(scene, message, at)
         case HeadOwner(owner=owner, waiting=waiting):
-            return replace(scene, owner=owner, waiting=waiting)
+            return replace(scene, owner=owner, waiting=waiting, left=None)
         case Held(holds=holds, at=told):
             since = [at + (each.since.seconds - told.seconds) for each in holds]
             lasts = [each.until.seconds - each.since.seconds for each in holds]
@@ -181,8 +195,6 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return replace(scene, held=tuple(HoldInView(hold, began, began + last) for hold, began, last in held))
         case BodyFaults(faults=faults, by=by):
             return replace(scene, faults=faults, faults_by=by)
-        case StudyCondition():
-            return replace(scene, condition=message)
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
         case WarningFeedback(kind=kind, message=text):

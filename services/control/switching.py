@@ -1,7 +1,7 @@
 """Faults of the body that are switched on and off on request, and told to whoever comes."""
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched, SwitchFaults, flaw
+from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched, SwitchFaults, flaw, switched
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.body import Body
@@ -20,7 +20,7 @@ class FaultSwitch:
 
     def serve(self, request: SwitchFaults) -> None:
         """Carry out a request, and answer it."""
-        for fault in request.faults:
+        for fault in request.on:
             if reason := flaw(fault, self._body.capabilities):
                 advice = "`engage fault list` tells of all that it can play"
                 self._desk.refuse(
@@ -28,7 +28,7 @@ class FaultSwitch:
                 )
                 return
         try:
-            self._body.switch_faults(request.faults)
+            self._body.switch_faults(switched(self._body.faults, request))
         except InputRefused as error:
             self._desk.refuse(request.id, error.fault)
             return

@@ -9,7 +9,7 @@ deadlines, and follows the table.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
 
@@ -76,7 +76,7 @@ class Asking:
         self._runs: dict[str, str] = {}
         """Participants that are there: the life of each."""
         self._gone: set[str] = set()
-        """Servers of live requests that have been there, and are not."""
+        """Servers that have been there and are not: those of live requests, and all services of a robot."""
         self._deadlines: Deadlines[tuple[Event | None, str]] = Deadlines()
         """Deadlines of requests, by event and id; of the next `KeepAlive`, by None and server."""
         self._effects: list[Effect] = []
@@ -149,7 +149,7 @@ class Asking:
         if asked is None or asked.cancel is not None:
             return
         asked.cancel = self._cancellation(asked, reason)
-        if self._windows[asked.server].has_waiting(id):
+        if not asked.is_sent:
             fault = Fault(reason="cancelled before it was sent", where=id, service=asked.server)
             self._step(asked, Event.REFUSED, now, Refused(id=id, fault=fault))
         else:
@@ -169,9 +169,11 @@ class Asking:
 
     def server_gone(self, server: str, now: Seconds) -> list[Effect]:
         """Take the news that the presence token of a server has gone."""
-        self._runs.pop(server, None)
-        for asked in self._asked_of(server):
+        was_there = self._runs.pop(server, None) is not None
+        live = self._asked_of(server)
+        if live or (was_there and server in keys.SERVICES):
             self._gone.add(server)
+        for asked in live:
             self._step(asked, Event.GONE, now)
         return self._new_effects()
 
@@ -199,7 +201,7 @@ class Asking:
 
     # -- one request ----------------------------------------------------------------------------------------------
 
-    def _asked_of(self, server: str) -> Iterable[Asked]:
+    def _asked_of(self, server: str) -> list[Asked]:
         return [asked for asked in self._asked.values() if asked.server == server]
 
     def _new_effects(self) -> list[Effect]:
@@ -247,6 +249,7 @@ class Asking:
         self._deadlines.set((_RESEND, asked.request.id), now + wait)
 
     def _send(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+        asked.is_sent = True
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
         self._effects.append(Publish(expression, asked.cancel or asked.request))
 

@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.memory import MemoryHub
@@ -58,6 +59,20 @@ async def test_one_that_is_up_gives_way_to_none(hub: MemoryHub) -> None:
         assert not first.done()
 
 
+async def test_one_that_is_up_is_not_shown_as_starting_any_more(hub: MemoryHub) -> None:
+    bus = hub.join("looker")
+    with bus.subscribe(keys.ANY_ALIVE) as presence:
+        async with starting(hub, LATE) as (ready, _):
+            await asyncio.sleep(1.0)
+            ready.set()
+            await asyncio.sleep(1.0)
+            told = [received.message for _ in range(len(presence)) if (received := await presence.next())]
+
+    assert [(type(one), getattr(one, "participant", "")) for one in told] == [
+        (PeerAlive, f"up-starting-{LATE}"), (PeerAlive, f"up-{LATE}"), (PeerGone, f"up-starting-{LATE}"),
+    ]  # fmt: skip
+
+
 async def test_one_that_was_killed_is_waited_out(hub: MemoryHub) -> None:
     async with starting(hub, EARLY) as (ready, _):
         ready.set()
@@ -65,7 +80,6 @@ async def test_one_that_was_killed_is_waited_out(hub: MemoryHub) -> None:
         async with starting(hub, LATE) as (more, (second,)):
             await asyncio.sleep(PATIENCE - 0.1)
             hub.kill(f"up-{EARLY}")
-            hub.kill(f"up-starting-{EARLY}")
             more.set()
             await asyncio.sleep(1.0)
 

@@ -2,14 +2,15 @@
 
 import asyncio
 from asyncio.subprocess import Process
+from typing import Any
 
 import msgspec
 import pytest
 
 from engage_hri.schemas.body import Capabilities, FaultKind
-from engage_hri.schemas.body_faults import BodyFault, flaw
+from engage_hri.schemas.body_faults import BodyFault, SwitchFaults, flaw, switched
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.fault import listed, switched
+from engage_hri.services.commandline.fault import listed
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
@@ -49,19 +50,30 @@ async def test_faults_are_switched_from_the_command_line() -> None:
         await stopped(control)
 
 
+def after(*before: BodyFault, **request: Any) -> tuple[BodyFault, ...]:
+    return switched(before, SwitchFaults(id="1", **request))
+
+
 def test_a_fault_is_added_and_replaces_one_of_another_amount() -> None:
-    assert switched((SLOW,), STALL) == (SLOW, STALL)
+    assert after(SLOW, on=(STALL,)) == (SLOW, STALL)
     faster = BodyFault(kind="slow", part="head", amount=2.0)
-    assert switched((SLOW, STALL), faster) == (STALL, faster)
-    assert switched((SLOW, STALL), BodyFault(kind="slow")) == (SLOW, STALL, BodyFault(kind="slow"))
-    assert switched((SLOW, STALL), BodyFault(kind="none")) == ()
+    assert after(SLOW, STALL, on=(faster,)) == (STALL, faster)
+    assert after(SLOW, STALL, on=(BodyFault(kind="slow"),)) == (SLOW, STALL, BodyFault(kind="slow"))
 
 
 def test_what_is_named_is_switched_off_and_what_is_not_on_is_an_error() -> None:
-    assert switched((SLOW, STALL), BodyFault(kind="slow"), off=True) == (STALL,)
-    assert switched((SLOW, STALL), BodyFault(kind="stall", part="head"), off=True) == (SLOW,)
+    assert after(SLOW, STALL, off=(BodyFault(kind="slow"),)) == (STALL,)
+    assert after(SLOW, STALL, off=(BodyFault(kind="stall", part="head"),)) == (SLOW,)
     with pytest.raises(InputRefused, match=r"slow left_arm 2: is not on \(on: slow head 3\)"):
-        switched((SLOW,), BodyFault(kind="slow", part="left_arm"), off=True)
+        after(SLOW, off=(BodyFault(kind="slow", part="left_arm"),))
+
+
+def test_all_go_off_before_others_come_on() -> None:
+    assert after(SLOW, STALL, all_off=True) == ()
+    assert after(SLOW, STALL, all_off=True, on=(STALL, SLOW)) == (STALL, SLOW)
+    assert after(SLOW, STALL, off=(SLOW,), on=(SLOW,)) == (STALL, SLOW)
+    with pytest.raises(InputRefused, match=r"is not on \(on: nothing\)"):
+        after(SLOW, all_off=True, off=(SLOW,))
 
 
 async def test_the_list_tells_what_each_kind_does_and_takes() -> None:

@@ -40,7 +40,7 @@ from engage_hri.services.tangram.table import edges, overlap, tangram_table, tou
         ('{"do": "look"}', LookAt()),
         ('{"do": "look", "target": "cup"}', LookAt(target="cup")),
         ('{"do": "steer", "to": "stop", "by": "ann"}', SteerOrder(to="stop", by="ann")),
-        ('{"do": "faults", "faults": [{"kind": "slow"}]}', SwitchOrder(faults=(BodyFault(kind="slow"),))),
+        ('{"do": "faults", "fault": {"kind": "slow"}}', SwitchOrder(fault=BodyFault(kind="slow"))),
         ('{"do": "condition", "name": "b", "speech_only": true}', Condition(name="b", speech_only=True)),
     ],
 )
@@ -87,7 +87,8 @@ def test_an_address_without_the_token_lets_nobody_take_part() -> None:
 
 def test_the_log_has_what_was_ordered_but_not_the_words() -> None:
     assert written(Tell(text="a secret", target="cup", asks=True)) == "asks 8 characters about cup"
-    assert written(SwitchOrder(faults=(BodyFault(kind="slow"),))) == "faults: slow"
+    assert written(SwitchOrder(fault=BodyFault(kind="slow"))) == "fault on: slow"
+    assert written(SwitchOrder(fault=BodyFault(kind="slow"), off=True)) == "fault off: slow"
     assert written(SteerOrder(to="hold")) == "hold"
     assert written(Condition(name="b", speech_only=True)) == "condition: b, speech only"
     assert written(Condition()) == "condition: none"

@@ -2,10 +2,13 @@
 
 import importlib.util
 import json
+import os
+import signal
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, NamedTuple
 
+import aiohttp
 import pytest
 
 from tests.bus.places import free_endpoint
@@ -18,6 +21,7 @@ pytestmark = [
     pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="the extra `console` is not installed"),
     pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium on this machine"),
 ]
+MOST_VIEWERS = 100
 SCRIPT = [{"turn_status": "full", "parts": [{"say": "Good morning."}]}]
 SENT = """
 window.sent = [];
@@ -27,10 +31,16 @@ WebSocket.prototype.send = function (text) { window.sent.push(JSON.parse(text).d
 
 
 class Place(NamedTuple):
-    """Address of a window, and the port of a browser."""
+    """Address of a window, the port of a browser, and the process of the window."""
 
     url: str
     port: int
+    process: int
+
+    @property
+    def frames(self) -> str:
+        """Address of the WebSocket with frames."""
+        return self.url.replace("http", "ws").replace("/?", "/frames?")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +50,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     (folder / "browser").mkdir()
     here = ("--connect", free_endpoint(), "--port", "0", "--role", "wizard", "--script", str(folder / "script.json"))
     with engage(folder / "console", "console", *here) as window, browser.running(folder / "browser") as port:
-        yield Place(waited(window, folder / "console", URL), port)
+        yield Place(waited(window, folder / "console", URL), port, window.pid)
 
 
 @asynccontextmanager
@@ -127,3 +137,68 @@ async def test_a_long_name_of_a_participant_makes_a_phone_no_wider(place: Place)
         await page.until("document.querySelector('.health').textContent.includes('perception')")
 
         await page.until("document.documentElement.scrollWidth <= 400")  # what is drawn takes its size a frame later
+
+
+def services(*missing: str) -> list[dict[str, Any]]:
+    names = ("generation", "realizer", "recognition", "control")
+    return [{"name": name, "service": True, "here": name not in missing, "serves": True, "warnings": [], "facts": []}
+            for name in names]  # fmt: skip
+
+
+async def test_a_panel_whose_service_is_gone_says_in_its_heading_that_it_stands_still(place: Place) -> None:
+    stale = "[...document.querySelectorAll('section.stale')].map((each) => each.id).join()"
+    heading = "document.querySelector('#measures h2').textContent"
+    async with opened(place) as page:
+        await take(page, sections={"health": services("recognition", "control")})
+        assert await page.value(stale) == "scene,above,events,measures"
+        assert await page.value(heading) == "Engagement as it was last: recognition is not on the bus"
+        away = "document.querySelector('.away').textContent"
+        assert await page.value(away) == (
+            "Not on the bus: recognition (it notices no connection events), "
+            "control (its body is shown as it was last)."
+        )
+
+        await take(page, sections={"health": services("control")})
+        assert await page.value(f"{stale} + {heading}") == "scene,aboveEngagement"
+
+
+async def test_who_finds_no_room_is_told_so_in_words_and_gets_in_when_there_is_room(place: Place) -> None:
+    origin = {"Origin": place.url.rpartition("/")[0]}
+    away = "document.querySelector('.away').textContent"
+    async with aiohttp.ClientSession() as session, AsyncExitStack() as others:
+        for _ in range(MOST_VIEWERS):
+            await others.enter_async_context(session.ws_connect(place.frames, headers=origin))
+        async with browser.at_port(place.port) as running, running.page() as page:
+            await page.go(place.url)
+            await page.until(
+                f"{away}.startsWith('The window answers, but not here: 100 browsers look on already')", 60
+            )
+            await others.aclose()
+
+            await page.until(
+                "window.engage.state.nets && !document.querySelector('.away').textContent.includes('100')"
+            )
+
+
+COUNTED = """
+window.links = [];
+const Link = WebSocket;
+WebSocket = class extends Link { constructor(...given) { super(...given); window.links.push(this); } };
+"""
+LATER = "const now = performance.now.bind(performance); performance.now = () => now() + 20000;"
+
+
+async def test_a_link_that_has_died_without_a_word_is_given_up_for_another(place: Place) -> None:
+    """As of a computer that has slept: nothing comes any more, and nobody closes anything."""
+    async with opened(place) as page:
+        await page.value(COUNTED)
+        os.kill(place.process, signal.SIGSTOP)
+        try:
+            await page.value(f"void (() => {{ {LATER} }})()")
+            await page.until("window.links.length === 1")
+            assert "does not answer" in await page.value("document.querySelector('.away').textContent")
+        finally:
+            os.kill(place.process, signal.SIGCONT)
+
+        await page.until("!document.querySelector('.away').textContent.includes('does not answer')")
+        assert await page.value("window.links.map((each) => each.readyState).join()") == "1"

@@ -1,5 +1,6 @@
 """What the page lets people reach who have a narrow screen, a keyboard or a screen reader, in a real browser."""
 
+import asyncio
 import importlib.util
 
 import pytest
@@ -76,6 +77,25 @@ async def test_faults_that_are_switched_quickly_are_all_switched(place: Place) -
         await page.value(";".join(click % kind for kind in ("mute", "noise")))
 
         await page.until(f"{kinds} === ''")
+
+
+@needs_browser
+async def test_two_windows_that_switch_faults_at_once_do_not_undo_one_another(place: Place) -> None:
+    button = "document.querySelector('#wizard [data-kind=\"%s\"]')"
+    kinds = "[...window.engage.state.switched.kinds].sort().join()"
+    async with opened(place) as one, opened(place) as other:
+        for page in (one, other):
+            await page.until(button % "noise")
+        await asyncio.gather(
+            one.value(f"{button % 'noise'}.click()"), other.value(f"{button % 'mute'}.click()")
+        )  # neither has seen what the other does
+        for page in (one, other):
+            await page.until(f"{kinds} === 'mute,noise'")
+
+        await one.value(f"{button % 'mute'}.click()")
+        await other.until(f"{kinds} === 'noise'")
+        await other.value(f"{button % 'noise'}.click()")
+        await one.until(f"{kinds} === ''")
 
 
 @needs_browser

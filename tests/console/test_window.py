@@ -140,8 +140,8 @@ async def test_a_fault_is_switched_on_and_off_and_everybody_sees_it(place: Place
 
         await press(page, "slow", ".faults")
         await page.until("document.querySelector('.switched').hidden")
-        assert "wizard: somebody: faults: slow" in place.log.read_text()
-        assert "faults: slow" in await page.value("document.querySelector('.notes').textContent")
+        assert "wizard: somebody: fault on: slow" in place.log.read_text()
+        assert "fault off: slow" in await page.value("document.querySelector('.notes').textContent")
 
 
 @needs_browser

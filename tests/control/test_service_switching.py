@@ -60,6 +60,18 @@ async def test_who_comes_late_is_told_what_is_on(hub: MemoryHub) -> None:
     assert then.faults == (MUTE,)
 
 
+async def test_two_who_switch_within_one_round_trip_do_not_undo_one_another(hub: MemoryHub) -> None:
+    async with robot(hub), Robot.on(hub.join("one", "operator")) as one, Robot.on(hub.join("two", "operator")) as two:
+        await asyncio.gather(one.switch_on(SLOW), two.switch_on(MUTE))
+        assert await one.faults_on(1.0) == (SLOW, MUTE)
+
+        noise = BodyFault(kind="noise")
+        await asyncio.gather(one.switch_off(BodyFault(kind="slow")), two.switch_on(noise))
+        assert await two.faults_on(1.0) == (MUTE, noise)
+        with pytest.raises(InputRefused, match=r"slow.*is not on \(on: mute, noise 0.1\)"):
+            await two.switch_off(SLOW)
+
+
 async def test_one_that_cannot_be_played_is_refused_and_nothing_changes(hub: MemoryHub) -> None:
     async with robot(hub), Robot.on(hub.join("guard", "operator")) as guard:
         await guard.switch_faults([MUTE])

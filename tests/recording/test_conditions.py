@@ -94,10 +94,56 @@ def test_one_from_before_the_recording_holds_from_its_beginning() -> None:
     assert parts(made(late)) == [Stretch("a", 0.0, END)]
 
 
-def test_a_restart_of_generation_ends_a_condition() -> None:
-    found = parts(made(begins(10.0, "a"), begins(50.0, "", by="")), "all")
+def generation(seconds: float, run: str = "") -> Sample:
+    """Generation comes, or goes. run: the life that comes; empty: it goes."""
+    told = PeerAlive(participant="generation", run=run) if run else PeerGone(participant="generation")
+    return sample(keys.alive("generation"), told, seconds)
 
-    assert found == [Stretch("all", 0.0, 10.0), Stretch("a", 10.0, 50.0), Stretch("all", 50.0, END)]
+
+def test_a_restart_of_generation_ends_a_condition_and_none_is_in_force_until_one_is_set() -> None:
+    found = parts(made(begins(10.0, "a"), begins(50.0, "", by=""), begins(70.0, "b")), "all")
+
+    assert found == [
+        Stretch("all", 0.0, 10.0), Stretch("a", 10.0, 50.0), Stretch("", 50.0, 70.0), Stretch("b", 70.0, END),
+    ]  # fmt: skip
+
+
+def test_a_condition_ends_when_its_generation_dies_whether_or_not_another_comes() -> None:
+    killed = [generation(0.0, "1"), begins(10.0, "a"), generation(40.0)]
+
+    dead = [Stretch("", 0.0, 10.0), Stretch("a", 10.0, 40.0), Stretch("", 40.0, END)]
+    assert parts(made(*killed)) == dead
+    assert parts(made(*killed, generation(42.0, "2"), begins(42.0, "", by=""))) == dead
+
+
+def test_a_generation_that_was_only_cut_off_goes_on_under_its_condition() -> None:
+    found = parts(made(generation(0.0, "1"), begins(10.0, "a"), generation(40.0), generation(45.0, "1")))
+
+    assert found[1:] == [Stretch("a", 10.0, 40.0), Stretch("", 40.0, 45.0), Stretch("a", 45.0, END)]
+
+
+def test_no_condition_that_somebody_set_is_no_condition_after_a_restart_either() -> None:
+    found = parts(made(begins(10.0, ""), begins(50.0, "", by="")), "all")
+
+    assert found == [Stretch("all", 0.0, 10.0), Stretch("", 10.0, END)]
+
+
+def test_what_the_recorder_was_told_holds_through_restarts_where_nobody_sets_a_condition() -> None:
+    given = made(generation(0.0, "1"), begins(0.0, "", by=""), generation(40.0), generation(42.0, "2"))
+
+    assert parts(given, "all") == [Stretch("all", 0.0, END)]
+
+
+def test_events_after_the_death_of_generation_count_under_no_condition_and_that_is_told() -> None:
+    given = made(
+        *person("ann", 0.0, END), generation(0.0, "1"), begins(0.0, "a"), *event("one", 20.0, 21.0), generation(40.0),
+        generation(42.0, "2"), begins(42.0, "", by=""), *event("two", 60.0, 61.0),
+    )  # fmt: skip
+
+    (one,) = sessions(given)
+
+    assert [each.start for each in one.events] == [20.0]
+    assert one.doubts[-1] == "left out: 60 s under no condition"
 
 
 def test_what_is_under_no_condition_or_with_nobody_is_left_out_and_told() -> None:

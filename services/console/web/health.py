@@ -1,7 +1,7 @@
 """Health of each participant of the bus: whether it is there, what it says of itself, what is wrong. Pure."""
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.presence import PeerAlive, PeerGone, is_claim
 from engage_hri.schemas.status import Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.sections import Health
@@ -13,7 +13,7 @@ NOTABLE: tuple[str, ...] = (*keys.SERVICES, "simulation", "collaboration")
 
 
 class HealthBoard:
-    """The four services of a robot, there or not, and everybody else who is there."""
+    """The four services of a robot, there or not, and everybody else who is there. Mere claims are left out."""
 
     def __init__(self) -> None:
         self._here: dict[str, bool] = dict.fromkeys(keys.SERVICES, False)
@@ -24,7 +24,8 @@ class HealthBoard:
         """Take what is told of a participant."""
         match message:
             case PeerAlive(participant=name):
-                self._here[name] = True
+                if not is_claim(name):
+                    self._here[name] = True
             case PeerGone(participant=name):
                 self._status.pop(name, None)
                 if name in keys.SERVICES:

@@ -1,7 +1,9 @@
 """Courses of what is measured: engagement and MTBCE of each person, delays of connection events. Pure."""
 
 from collections import deque
+from collections.abc import Mapping
 
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.lanes import Zero
@@ -11,6 +13,8 @@ KEPT = 600
 """Values of a course that are kept."""
 APART: Seconds = 0.5
 """Time of which a course keeps two values at most; the newest is always there."""
+UNKNOWN: tuple[Level, tuple[str, ...]] = ("unknown", ("recognition has left the bus",))
+"""Level of everybody, with the reason, while there is no recognition."""
 Course = deque[tuple[Seconds, float]]
 
 
@@ -20,6 +24,10 @@ class Measures:
     def __init__(self) -> None:
         self._people: dict[str, _Person] = {}
         self._delays: deque[tuple[Seconds, float, str]] = deque(maxlen=KEPT)
+        self._life = ""
+        """Life of recognition; empty: unknown."""
+        self._left: dict[str, tuple[Level, tuple[str, ...]]] = {}
+        """Levels and reasons that recognition told last, while it is not there."""
 
     def feed(self, message: Statistics | ConnectionEvent, at: Seconds) -> bool:
         """Take a message; at: its local instant. Returns whether anything has changed."""
@@ -34,6 +42,27 @@ class Measures:
                 self._delays.append((at, delay, kind))
                 return True
         return False
+
+    def presence(self, message: PeerAlive | PeerGone) -> bool:
+        """Take news of who is on the bus: without recognition nobody's engagement is known. Another life of it tells
+        everything anew; the same one goes on with what it had told. Returns whether anything has changed.
+        """
+        match message:
+            case PeerGone(participant="recognition"):
+                before = {actor: (each.level, each.reasons) for actor, each in self._people.items()}
+                self._left = before or self._left
+                self._set(dict.fromkeys(self._people, UNKNOWN))
+            case PeerAlive(participant="recognition", run=run):
+                if run == self._life:
+                    self._set(self._left)
+                self._life, self._left = run, {}
+            case _:
+                return False
+        return True
+
+    def _set(self, told: Mapping[str, tuple[Level, tuple[str, ...]]]) -> None:
+        for actor, (level, reasons) in told.items():
+            self._people[actor].level, self._people[actor].reasons = level, reasons
 
     def shown(self, zero: Zero) -> MeasuresSection:
         """All courses, with their instants in seconds of the picture."""

@@ -151,10 +151,14 @@ class SteerOrder(Order, frozen=True, kw_only=True, tag="steer"):
 
 
 class SwitchOrder(Order, frozen=True, kw_only=True, tag="faults"):
-    """Switch on exactly these faults of the body."""
+    """Switch a fault of the body on, or off; all others stay as they are, whoever has switched them.
+
+    off: all of its kind go off that have the fields which it has.
+    """
 
     needs: ClassVar[Right] = "faults"
-    faults: Annotated[tuple[BodyFault, ...], Meta(max_length=50)] = ()
+    fault: BodyFault
+    off: bool = False
     by: Name = ""
 
 
@@ -195,6 +199,20 @@ def decoded_in_recording(text: str | bytes) -> Drawn | Play:
         raise InputRefused(Fault(reason="it can only be played", where="this is a recording")) from error
 
 
+def server(order: Order) -> str:
+    """The service that carries an order out; empty: none has to."""
+    match order:
+        case SteerOrder():
+            return "realizer"
+        case SwitchOrder():
+            return "control"
+        case InhibitGaze(on=False):
+            return ""
+        case WizardOrder():
+            return "generation"
+    return ""
+
+
 def missing(order: Order, role: str, trusted: bool) -> str:
     """Say why this order is not carried out; empty: it may be. trusted: the page was called with the token."""
     return denied(role, trusted).get(order.needs, "") if order.needs else ""
@@ -229,6 +247,6 @@ def written(order: Order) -> str:
             return f"condition: {words(name, speech_only)}"
         case SteerOrder(to=to):
             return to
-        case SwitchOrder(faults=faults):
-            return f"faults: {', '.join(each.kind for each in faults) or 'none'}"
+        case SwitchOrder(fault=fault, off=off):
+            return f"fault {'off' if off else 'on'}: {fault.kind}"
     return ""

@@ -22,7 +22,7 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.holds import Held
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.presence import PeerAlive, PeerGone, is_claim
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.status import Status
 from engage_hri.schemas.units import Seconds
@@ -93,6 +93,10 @@ class Picture:
         """The body as it described itself; None: not yet."""
         return self._body
 
+    def has(self, name: str) -> bool:
+        """Tell whether a participant is on the bus."""
+        return self._health.has(name)
+
     def zero(self, at: Seconds) -> Seconds:
         """Seconds of the picture at a local instant."""
         return round(at - self.began, 3)
@@ -132,8 +136,7 @@ class Picture:
                 self._health.feed(message)
                 self._changed("health")
                 if not isinstance(message, Status):
-                    self._changed("switched")
-                    self._changed(*(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
+                    self._take_presence(message, at)
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
         self._note(message, at)
@@ -141,9 +144,24 @@ class Picture:
     def _see(self, message: Message, at: Seconds) -> None:
         before = self._scene
         self._scene = view.feed(before, message, at)
+        if self._scene.owner != before.owner:
+            self._head_since = at
+            self._changed("head")
         if isinstance(message, WordSpoken) or self._scene.said != before.said:
             self._changed("words")
         if self._scene.actors != before.actors:
+            self._changed("scene")
+
+    def _take_presence(self, message: PeerAlive | PeerGone, at: Seconds) -> None:
+        """Take news of who is on the bus: what a participant tells is over without it."""
+        self._changed("switched", *(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
+        if self._measures.presence(message):
+            self._changed("measures")
+        if (left := nets.feed(self._nets, message, at, self.now)) is not self._nets:
+            self._nets = left
+            self._changed("tokens")
+        if isinstance(message, PeerGone) and message.participant == "control" and self._state is not None:
+            self._state = replace(self._state, speaking="", looking_at="")
             self._changed("scene")
 
     def _take_net(self, message: NetPlanned | NetMarked | NetWaiting, at: Seconds) -> None:
@@ -188,8 +206,12 @@ class Picture:
                 text = wording.warning(message).removeprefix("! ")
             case Fault():
                 text, level = f"{message.service or 'fault'}: {message}", "fault"
+            case PeerGone(participant=name) | PeerAlive(participant=name) if is_claim(name):
+                return
             case PeerGone(participant=name):
                 text, level = f"{name} has left the bus", "news"
+                if name == "generation" and (lost := self._scene.study.missed) is not None:
+                    self.note(lost.lost_sentence, at, "warning")
             case PeerAlive(participant=name):
                 text, level = f"{name} has come onto the bus", "news"
         if text:
@@ -276,14 +298,20 @@ class Picture:
     def _switched(self) -> Switched:
         held = tuple(wording.held(each.hold) for each in self._scene.held)
         kinds = dict.fromkeys(each.kind for each in self._scene.faults)
-        told = self._scene.condition
         by = self._scene.faults_by if kinds else ""
         if by and not self._health.has(by):
             by += ", which has left the bus"
         return Switched(
             held, tuple(map(words, self._scene.faults)), tuple(kinds), by,
-            condition=told.sentence if told is not None and told.is_told else "",
+            condition=self._condition(),
         )  # fmt: skip
+
+    def _condition(self) -> str:
+        """The condition of a study in words, or that it is lost; empty: nobody has set one."""
+        told, lost = self._scene.study.told, self._scene.study.missed
+        if lost is not None:
+            return lost.lost_sentence
+        return told.sentence if told is not None and told.is_told else ""
 
     def _changed(self, *names: str) -> None:
         for name in names:

@@ -30,6 +30,9 @@ TICK: Seconds = 1 / 15
 LARGEST_ORDER = 2**16
 """Bytes of one order of a page."""
 MOST_VIEWERS = 100
+FULL = 4429
+"""Code with which a WebSocket is closed for which there is no room: 4000 and the status that HTTP has for it."""
+WORDS_FULL = f"{MOST_VIEWERS} browsers look on already, and it shows itself to no more"
 FRAMES = "/frames"
 """Path of the WebSocket of our own page."""
 MESSAGES = "/messages"
@@ -51,10 +54,10 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
 
     @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
+        await browser.accept()  # who is refused before learns no reason
         if window.viewers >= MOST_VIEWERS:
-            await browser.close(4429, f"{MOST_VIEWERS} browsers look on already")
+            await browser.close(FULL, WORDS_FULL)
             return
-        await browser.accept()
         with contextlib.suppress(WebSocketDisconnect):
             given = browser.query_params.get("token", "")
             visitor = Visitor(window, secrets.compare_digest(given.encode(), token.encode()))
@@ -67,7 +70,7 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
         if unknown := sorted(only - types()):
             await program.close(4400, f"there is no message of type {unknown[0]!r}"[:120])
         elif len(window.listeners) >= MOST_PROGRAMS:
-            await program.close(4429, f"{MOST_PROGRAMS} programs listen already")
+            await program.close(FULL, f"{MOST_PROGRAMS} programs listen already")
         else:
             with contextlib.suppress(WebSocketDisconnect):
                 await _tell(window, program, Outbox(only))
@@ -85,12 +88,12 @@ def recorded(recording: Recording, hosts: Hosts) -> App:
 
     @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
+        await browser.accept()  # who is refused before learns no reason
         if len(viewers) >= MOST_VIEWERS:
-            await browser.close(4429, f"{MOST_VIEWERS} browsers look on already")
+            await browser.close(FULL, WORDS_FULL)
             return
         viewers.add(browser)
         try:
-            await browser.accept()
             await _show_recording(recording, browser)
         except WebSocketDisconnect:
             pass

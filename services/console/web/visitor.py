@@ -169,6 +169,8 @@ class Visitor:
     def _drive(self, order: orders.Order) -> None:
         by = getattr(order, "by", "") or "somebody"
         self._window.log(f"{by}: {orders.written(order)}")
+        if (server := orders.server(order)) and not self._window.picture.has(server):
+            self._tell(f"{server} is not on the bus: this waits for it, {PATIENCE:g} s at most", is_by_hand=True)
         robot = self._window.robot
         match order:
             case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
@@ -193,8 +195,9 @@ class Visitor:
                 self._drives(_done(robot.resume(timeout=PATIENCE)))
             case orders.SteerOrder(to="stop"):
                 self._drives(_done(robot.stop(timeout=PATIENCE)))
-            case orders.SwitchOrder(faults=faults):
-                self._drives(_done(robot.switch_faults(faults, timeout=PATIENCE)))
+            case orders.SwitchOrder(fault=fault, off=off):
+                switch = robot.switch_off if off else robot.switch_on
+                self._drives(_done(switch(fault, timeout=PATIENCE)))
             case orders.Condition(name=name, speech_only=speech_only, by=who):
                 named = name.strip()
                 self._drives(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))

@@ -175,25 +175,50 @@ export function switched(place) {
   };
 }
 
+// What each service is for, and the panels that it alone tells of: without it they stand still.
+const WITHOUT = {
+  generation: ["nobody rules the head, and what it is to say waits", ["head"]],
+  realizer: ["it performs nothing", ["behaviors", "net"]],
+  recognition: ["it notices no connection events", ["events", "measures"]],
+  control: ["its body is shown as it was last", ["scene", "above"]],
+};
+
+// Say in the heading of a panel that nobody tells it anything any more. service: who did; empty: it is there.
+function stale(panel, service) {
+  if (panel.classList.toggle("stale", Boolean(service))) {
+    const said = panel.querySelector("h2 .stays") ?? panel.querySelector("h2").appendChild(element("span", { class: "stays" }));
+    said.textContent = ` as it was last: ${service} is not on the bus`;
+  } else {
+    panel.querySelector("h2 .stays")?.remove();
+  }
+}
+
 // What is wrong with the window itself: no link to it, or none of it to the robot.
 export function away(place) {
   let linked = true;
+  let refusal = ""; // why the window has closed the link itself
   let missing = null;
   function show() {
     let text = "";
-    if (!linked) {
+    if (!linked && refusal) {
+      text = `The window answers, but not here: ${refusal}. It is called again every second.`;
+    } else if (!linked) {
       text = "The window does not answer: `engage console` has ended, or this page cannot reach it. The picture below is the last one. It is called again every second.";
     } else if (missing?.length) {
       text = missing.length === 4
         ? "No robot is on the bus. The picture below is the last one. `engage up` starts a robot; a robot elsewhere takes `engage console --connect`."
-        : `Not on the bus: ${missing.join(", ")}. The robot does without.`;
+        : `Not on the bus: ${missing.map((each) => `${each} (${WITHOUT[each][0]})`).join(", ")}.`;
+    }
+    for (const [service, [, panels]] of Object.entries(WITHOUT)) {
+      for (const id of panels) stale(document.getElementById(id), missing?.includes(service) ? service : "");
     }
     if (place.textContent !== text) place.textContent = text;
     place.hidden = !text;
   }
   return {
-    link(there) {
+    link(there, reason = "") {
       linked = there;
+      refusal = reason;
       show();
     },
     take(state, changed) {

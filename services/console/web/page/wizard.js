@@ -58,7 +58,7 @@ export function wizard(panel, order) {
   });
 
   let on = []; // kinds of faults that the body has
-  let ordered = null; // kinds that were ordered and are not there yet: the next order goes on from these
+  const ordered = new Map(); // kinds that were ordered here and are not so yet, and whether they are to be on: the next click goes on from these
   return {
     take(state, changed) {
       if (changed.has("you")) {
@@ -77,11 +77,11 @@ export function wizard(panel, order) {
       }
       if (changed.has("switched")) {
         on = state.switched.kinds;
-        if (ordered && ordered.length === on.length && ordered.every((each) => on.includes(each))) ordered = null;
+        for (const [kind, isOn] of ordered) if (on.includes(kind) === isOn) ordered.delete(kind);
         for (const each of faults.querySelectorAll("button")) each.setAttribute("aria-pressed", String(on.includes(each.dataset.kind)));
       }
       if (changed.has("told")) {
-        ordered = null; // it may have been refused
+        ordered.clear(); // it may have been refused
         told(state.told);
       }
       if (changed.has("scene")) {
@@ -97,9 +97,9 @@ export function wizard(panel, order) {
     if (faults.dataset.kinds === kinds.join()) return;
     faults.dataset.kinds = kinds.join();
     faults.replaceChildren(element("span", { class: "label" }, "Faults of the body"), ...kinds.map((kind) => button(kind, () => {
-      const before = ordered ?? on;
-      ordered = before.includes(kind) ? before.filter((each) => each !== kind) : [...before, kind];
-      send({ do: "faults", faults: ordered.map((each) => ({ kind: each, ...PARTS[each] })) });
+      const off = ordered.get(kind) ?? on.includes(kind);
+      ordered.set(kind, !off);
+      send({ do: "faults", off, fault: off ? { kind } : { kind, ...PARTS[kind] } });
     }, { "aria-pressed": String(on.includes(kind)), "data-kind": kind })));
   }
 }
