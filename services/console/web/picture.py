@@ -13,7 +13,7 @@ import msgspec
 from msgspec.structs import replace
 
 from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.body import Capabilities, RobotState, WordSpoken
+from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
@@ -33,6 +33,7 @@ from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
 from engage_hri.services.console.web.measures import Measures
 from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
+from engage_hri.services.console.web.turns import Turns
 
 CHOICES_KEPT = 40
 NOTES_KEPT = 40
@@ -69,6 +70,7 @@ class Picture:
         self._head_since = began
         self._events = EventLanes()
         self._blocks = BlockLanes()
+        self._turns = Turns()
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
@@ -141,7 +143,8 @@ class Picture:
     def _see(self, message: Message, at: Seconds) -> None:
         before = self._scene
         self._scene = view.feed(before, message, at)
-        if isinstance(message, WordSpoken) or self._scene.said != before.said:
+        is_news = self._turns.feed(message, at)
+        if is_news or self._scene.said != before.said or self._scene.held != before.held:
             self._changed("words")
         if self._scene.actors != before.actors:
             self._changed("scene")
@@ -262,8 +265,8 @@ class Picture:
         return made[name]()
 
     def _words(self) -> list[Utterance]:
-        said = sorted(self._scene.said, key=lambda each: each.began)
-        return [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in said]
+        holds = [each.hold for each in self._scene.held]
+        return self._turns.shown(self._scene.said, holds, self.zero)
 
     def _head(self) -> HeadSection:
         def shown(claim: Claim) -> ClaimShown:

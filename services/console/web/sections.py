@@ -80,13 +80,27 @@ class SceneSection(Struct, frozen=True):
     people: tuple[Person, ...]
 
 
+class Left(Struct, frozen=True):
+    """Words of a turn that were not said. before: characters of the words that were said before them."""
+
+    before: int
+    words: str
+
+
 class Utterance(Struct, frozen=True):
-    """Words of an actor, as far as they are said. words: empty: they are not known."""
+    """A turn of an actor, as far as it is said. words: empty: they are not known. open: it goes on.
+
+    settled: characters of the words that will not change any more. left: words that were not said, or not yet.
+    state: why words are left: `held`, `stopped`, `failed`, `lost` with the realizer; `left`: it went on without them.
+    """
 
     actor: str
     since: Seconds
     words: str
     open: bool
+    settled: int
+    left: tuple[Left, ...] = ()
+    state: str = ""
 
 
 class ClaimShown(Struct, frozen=True):

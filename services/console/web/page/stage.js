@@ -14,7 +14,7 @@ const MAIN = [
 const SIDE = [
   ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
   ["wizard", "The robot by hand", `<div class="wizard"></div><p class="told" role="status"></p>`],
-  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><p class="unseen" role="status"></p>`],
+  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><div class="unseen" role="log" aria-label="What was said just now"></div>`],
   ["head", "Who owns the head", `<div class="head"></div>`],
   ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p><p class="reasons"></p>`],
   ["health", "Services", `<ul class="health"></ul>`],
