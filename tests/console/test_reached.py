@@ -4,6 +4,7 @@ import importlib.util
 
 import pytest
 
+from engage_hri.services.recording.above import seen
 from tests.console.browser import Page
 from tests.console.test_window import Place, needs_browser, opened, press, sit
 from tests.console.test_window import place as place  # a fixture
@@ -164,8 +165,20 @@ async def test_a_turn_is_one_bubble_with_what_was_stopped_apart_and_each_word_is
 
         shown = await page.value(f"{last}.querySelector('.text').textContent")
         read = await page.value("window.read.join(' ')")
-        assert shown.split() == "Now look carefully at stopped, not said: the square".split()
+        assert shown.split() == ["Now", "look", "carefully", "at", "stopped,", "not", "said:", "the", "square"]
         assert read.replace(".", "").split() == ["robot:", *shown.split()]
+
+
+@needs_browser
+async def test_the_map_shows_things_where_the_pictures_of_a_recording_do(place: Place) -> None:
+    drawn = "document.querySelector('.map .object[data-id=blue-square]').getAttribute('points')"
+    corners = "window.engage.state.scene.things.find((each) => each.id === 'blue-square').outline"
+    async with opened(place) as page:
+        await page.until(f"{drawn}.length")
+        points, outline = await page.value(f"[{drawn}, {corners}]")
+
+        shown = [tuple(float(number) / 1000 for number in each.split(",")) for each in points.split()]
+        assert shown == [pytest.approx(seen(x, y), abs=1e-3) for x, y in outline]
 
 
 @needs_browser

@@ -71,13 +71,25 @@ class Body(Struct, frozen=True):
     joints: dict[str, float]
 
 
+class Above(Struct, frozen=True):
+    """The view from above. right, down: parts of x and y in what is to the right and down in it.
+
+    frame: its left, upper, right and lower edge, in metres.
+    """
+
+    right: Point
+    down: Point
+    frame: tuple[Meters, Meters, Meters, Meters]
+
+
 class SceneSection(Struct, frozen=True):
-    """Scene in space. robot: its actor id. body: None: nothing is known of it yet."""
+    """Scene in space. robot: its actor id. body: None: nothing is known of it yet. above: its view from above."""
 
     robot: str
     body: Body | None
     things: tuple[Thing, ...]
     people: tuple[Person, ...]
+    above: Above
 
 
 class Left(Struct, frozen=True):
