@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.conditions import StudyCondition
@@ -31,8 +31,9 @@ from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import net_layout, scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
+from engage_hri.services.console.web.looking import plainly
 from engage_hri.services.console.web.measures import Measures
-from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
+from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, Utterance
 from engage_hri.services.console.web.turns import Turns
 
 CHOICES_KEPT = 40
@@ -269,12 +270,11 @@ class Picture:
         return self._turns.shown(self._scene.said, holds, self.zero)
 
     def _head(self) -> HeadSection:
-        def shown(claim: Claim) -> ClaimShown:
-            return ClaimShown(claim.kind, claim.priority, claim.target, claim.reason)
-
         owner = self._scene.owner
-        waiting = tuple(map(shown, self._scene.waiting))
-        return HeadSection(None if owner is None else shown(owner), self.zero(self._head_since), waiting)
+        waiting = tuple(plainly(claim, self.world) for claim in self._scene.waiting)
+        return HeadSection(
+            None if owner is None else plainly(owner, self.world), self.zero(self._head_since), waiting
+        )
 
     def _switched(self) -> Switched:
         held = tuple(wording.held(each.hold) for each in self._scene.held)

@@ -27,12 +27,16 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
     )
 
 
+def label(entity: Entity) -> str:
+    """What people call a thing: its name, else its color and what it is, else its id."""
+    return entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
+
+
 def _thing(entity: Entity) -> Thing:
     outline = [(_short(x), _short(y)) for x, y in above.outline(entity)]
-    label = entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
     return Thing(
         entity.id, entity.kind, _place(entity.position), _short(entity.yaw), tuple(outline), _short(entity.radius),
-        entity.color, label, entity.owner,
+        entity.color, label(entity), entity.owner,
     )  # fmt: skip
 
 

@@ -116,12 +116,17 @@ class Utterance(Struct, frozen=True):
 
 
 class ClaimShown(Struct, frozen=True):
-    """A claim on the head, with the reason."""
+    """A claim on the head, with the reason.
+
+    does, why: the same in plain words: `look at ann`, and `it spoke to this person last`.
+    """
 
     kind: str
     priority: int
     target: str
     reason: str
+    does: str
+    why: str
 
 
 class HeadSection(Struct, frozen=True):

@@ -43,7 +43,7 @@ export function words(panel) {
         );
       });
       if (follows) list.scrollTop = list.scrollHeight;
-      announce(state.words);
+      announce(state.words, state.place?.visit);
     },
   };
 }
@@ -53,8 +53,11 @@ const HEARD = 10000; // ms after which words that a screen reader has read are n
 // A screen reader hears words once: of a turn that grows the speeches that have ended since, and at its end what was not said.
 function announcing(log) {
   const told = new Map(); // characters that were read of each turn, and what was said to be left
-  let isFirst = true; // who opens the page hears no past
-  return (turns) => {
+  let last; // visit of a recording
+  let isFirst = true; // who opens the page, or jumps in a recording, hears no past
+  return (turns, visit) => {
+    if (visit !== last) isFirst = true;
+    last = visit;
     const keys = new Set();
     for (const said of turns) {
       const key = `${said.actor}|${said.since}`;
@@ -75,29 +78,35 @@ function announcing(log) {
   };
 }
 
-const claim = (each) => [each.kind, each.target].filter(Boolean).join(" → ");
+// The claim as the arbiter has it, for researchers.
+const claim = (each) => `claim ${each.kind}${each.priority ? `, priority ${each.priority} (1 is the strongest)` : ""}${each.target ? `, target ${each.target}` : ""}${each.reason ? `: ${each.reason}` : ""}`;
 
 export function head(panel) {
   const place = panel.querySelector(".head");
   const told = element("p", { class: "owner" });
   const since = element("span", { class: "since" });
   const waiting = element("ol", { class: "waiting" });
-  place.replaceChildren(told, waiting);
+  const terms = element("ol");
+  place.replaceChildren(told, waiting, element("details", { class: "terms" },
+    element("summary", {}, "For researchers: who owns the head"), terms));
   let from = 0;
   return {
     take(state, changed) {
       if (!changed.has("head")) return;
       const { owner } = state.head;
       from = state.head.since;
+      const does = owner ? `${owner.does.replace(/^(look|keep)/, (verb) => `${verb}s`)}` : "";
+      told.title = owner ? claim(owner) : "";
       told.replaceChildren(
-        element("strong", {}, owner && owner.kind !== "none" ? claim(owner) : "nobody"), " ", since,
-        element("span", { class: "why" }, owner?.reason ? `because: ${owner.reason}` : ""),
+        element("strong", {}, owner ? `It ${does}` : "Nobody says where it looks"), " ", since,
+        element("span", { class: "why" }, owner ? `because ${owner.why}` : ""),
       );
-      waiting.replaceChildren(
-        ...state.head.waiting.map((each) => element("li", {}, element("strong", {}, claim(each)), " waits",
-          element("span", { class: "why" }, each.reason ? `because: ${each.reason}` : ""))),
-      );
-      if (!state.head.waiting.length) waiting.replaceChildren(element("li", { class: "none" }, "nobody waits for it"));
+      waiting.replaceChildren(...state.head.waiting.map((each, index) => element("li", { title: claim(each) },
+        index ? "after that " : "otherwise it would ", element("strong", {}, each.does),
+        element("span", { class: "why" }, `because ${each.why}`))));
+      if (!state.head.waiting.length) waiting.replaceChildren(element("li", { class: "none" }, "nothing else calls for a look"));
+      terms.replaceChildren(...[owner, ...state.head.waiting].filter(Boolean).map((each, index) =>
+        element("li", {}, `${index ? "waits" : "owns it"}: ${claim(each)}`)));
     },
     tick(state) {
       const text = state.head?.owner ? `for ${Math.max(0, state.now() - from).toFixed(1)} s` : "";
