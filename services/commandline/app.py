@@ -37,6 +37,8 @@ COMMANDS = {
     "Exit 2 if it is not being performed.",
     "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. "
     "Exit 2 if it cannot play them.",
+    "condition": "Begin a condition of a study on a running robot, or tell which one is in force. "
+    "Exit 2 if the name is too long.",
     "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate body). "
     "Exit 2 if nobody sees where it points.",
     "hostile": "Attack the whole robot, in memory and virtual time only. "

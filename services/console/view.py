@@ -26,7 +26,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.shelf import Shelf
 from engage_hri.services.runtime.in_force import InForce
 
-UTTERANCES_KEPT = 40
+UTTERANCES_KEPT = 160
 EVENTS_KEPT = 100
 NOTES_KEPT = 3
 ENDED_BLOCKS_KEPT = 2

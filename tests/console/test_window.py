@@ -155,7 +155,7 @@ async def test_a_condition_of_a_study_is_begun_and_everybody_sees_it(place: Plac
         await press(page, "Begin it", ".study")
         for each in (page, other):
             await each.until(f"{told} === 'Condition of the study: words alone, speech only, set by Anna.'")
-        await page.until("document.querySelector('.head .owner').textContent.includes('speech only')")
+        await page.until("document.querySelector('.head .owner').textContent.includes('leaves it words alone')")
 
         await page.value("document.querySelector('#wizard-condition').value = ''")
         await page.value("document.querySelector('#wizard-alone').click()")

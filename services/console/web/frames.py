@@ -14,9 +14,12 @@ HEARTBEAT: Seconds = 1.0
 
 
 class Told(Struct, frozen=True):
-    """News of an order for who gave it. panel: where it was given: the seat (`part`), or the robot by hand."""
+    """News of an order for who gave it.
 
-    panel: Literal["part", "wizard"]
+    panel: where it was given: the seat (`part`), the robot by hand (`wizard`), or the bar of a recording (`player`).
+    """
+
+    panel: Literal["part", "wizard", "player"]
     text: str
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.body import Capabilities, RobotState, WordSpoken
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
@@ -31,8 +31,10 @@ from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import net_layout, scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
+from engage_hri.services.console.web.looking import plainly
 from engage_hri.services.console.web.measures import Measures
-from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
+from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, Utterance
+from engage_hri.services.console.web.turns import Turns
 
 CHOICES_KEPT = 40
 NOTES_KEPT = 40
@@ -69,6 +71,7 @@ class Picture:
         self._head_since = began
         self._events = EventLanes()
         self._blocks = BlockLanes()
+        self._turns = Turns()
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
@@ -147,7 +150,8 @@ class Picture:
         if self._scene.owner != before.owner:
             self._head_since = at
             self._changed("head")
-        if isinstance(message, WordSpoken) or self._scene.said != before.said:
+        is_news = self._turns.feed(message, at)
+        if is_news or self._scene.said != before.said or self._scene.held != before.held:
             self._changed("words")
         if self._scene.actors != before.actors:
             self._changed("scene")
@@ -284,16 +288,15 @@ class Picture:
         return made[name]()
 
     def _words(self) -> list[Utterance]:
-        said = sorted(self._scene.said, key=lambda each: each.began)
-        return [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in said]
+        holds = [each.hold for each in self._scene.held]
+        return self._turns.shown(self._scene.said, holds, self.zero)
 
     def _head(self) -> HeadSection:
-        def shown(claim: Claim) -> ClaimShown:
-            return ClaimShown(claim.kind, claim.priority, claim.target, claim.reason)
-
         owner = self._scene.owner
-        waiting = tuple(map(shown, self._scene.waiting))
-        return HeadSection(None if owner is None else shown(owner), self.zero(self._head_since), waiting)
+        waiting = tuple(plainly(claim, self.world) for claim in self._scene.waiting)
+        return HeadSection(
+            None if owner is None else plainly(owner, self.world), self.zero(self._head_since), waiting
+        )
 
     def _switched(self) -> Switched:
         held = tuple(wording.held(each.hold) for each in self._scene.held)

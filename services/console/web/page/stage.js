@@ -14,8 +14,8 @@ const MAIN = [
 const SIDE = [
   ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
   ["wizard", "The robot by hand", `<div class="wizard"></div><p class="told" role="status"></p>`],
-  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><p class="unseen" role="status"></p>`],
-  ["head", "Who owns the head", `<div class="head"></div>`],
+  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><div class="unseen" role="log" aria-label="What was said just now"></div>`],
+  ["head", "Where the robot looks, and why", `<div class="head"></div>`],
   ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p><p class="reasons"></p>`],
   ["health", "Services", `<ul class="health"></ul>`],
 ];
@@ -29,7 +29,7 @@ export default {
     <h1 class="unseen">Engage: {{ robot }}</h1>
     <p class="away" role="alert" hidden></p>
     <p class="switched" role="status" hidden></p>
-    <div class="player row" role="group" aria-label="The recording" hidden></div>
+    <div id="player" class="player row" role="group" aria-label="The recording" hidden></div>
     <div class="column main">${panels(MAIN)}</div>
     <div class="column side">${panels(SIDE)}</div>
   </div>`,
