@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,10 @@ from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, FAILED, run_until_signal, unique_name
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.runtime.service import installed_version
+
+if TYPE_CHECKING:
+    from engage_hri.services.recording.disk import RecordingFile
+    from engage_hri.services.recording.service import Recorder
 
 GIVES_WAY = 10
 """Niceness of the recorder: where processors are few the robot goes first, and messages wait in front of it."""
@@ -74,21 +78,32 @@ async def _record(options: Options, config: RobotConfig, path: Path) -> int:
         bus = hub.join(unique_name("record"), "observer")
         patterns = access.rows(bus.role, "subscribes") if config.bus.keys else (keys.EVERYTHING,)
         recorder, file, tap = opened(
-            bus, path, time.time_ns(), patterns, _facts(options), overwrite=options.overwrite
+            bus, path, time.time_ns(), patterns, _facts(options), overwrite=options.overwrite, tell=complain
         )
         complain(f"recording {config.bus.robot} into {path}; Ctrl-C ends it")
         try:
             bus.declare_alive()
             async with asyncio.timeout(options.seconds), hinting(bus, config.bus.connect):
                 await record(bus, tap, recorder, file)
-        except TimeoutError:
-            pass
+        except (TimeoutError, asyncio.CancelledError):
+            pass  # Ctrl-C is how a recording ends: the exit code says what became of it
         finally:
             is_whole = recorder.close()
-            complain(f"{path}: {recorder.messages} messages, {file.written / 1e6:.1f} MB")
-            if recorder.losses.total:
-                complain(f"{path}: {recorder.losses.total} messages are missing; `recording/lost` in it says when")
+            _report(recorder, file, is_whole)
     return DONE if is_whole and not recorder.losses.disk else FAILED
+
+
+def _report(recorder: "Recorder", file: "RecordingFile", is_whole: bool) -> None:
+    """Say what is in the file, and what is not."""
+    lost = recorder.losses
+    if file.is_removed:
+        complain(f"{file.path}: it was removed while it was recorded, and is lost")
+        return
+    complain(f"{file.path}: {recorder.messages - lost.disk} messages, {file.written / 1e6:.1f} MB")
+    if lost.total:
+        complain(f"{file.path}: {lost.total} messages are missing, {lost.disk} of them for want of room on the disk")
+    if not is_whole:
+        complain(f"{file.path}: it has no end; `engage record --repair` gives it one once there is room")
 
 
 def _facts(options: Options) -> dict[str, str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.recording import descriptor
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.writing import Sealed, Writer, end, written
 
@@ -23,7 +24,8 @@ Tell = Callable[[str], None]
 class RecordingFile:
     """A file that a recorder writes. dropped: messages that found no room. slowest: the longest wait for the disk.
 
-    written: bytes in the file. tell: takes a line about trouble with the disk.
+    written: bytes in the file. path: its name, also when it was renamed. is_removed: it has none any more, and could
+    not be written anew. tell: takes a line about trouble with the disk.
     """
 
     def __init__(self, path: Path, facts: Mapping[str, str], tell: Tell, *, overwrite: bool = False) -> None:
@@ -36,9 +38,13 @@ class RecordingFile:
         self._tell = tell
         self._waiting: deque[Sealed] = deque()
         self._trouble = ""
-        flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if overwrite else os.O_EXCL)
+        self.is_removed = False
+        self._is_elsewhere = False
         try:
-            self._file = os.open(path, flags | getattr(os, "O_CLOEXEC", 0), 0o644)
+            self._file = descriptor.opened(path, overwrite=overwrite)
+        except BlockingIOError as error:
+            fault = Fault(reason="another recorder writes it", where=str(path), advice="another name")
+            raise InputRefused(fault) from error
         except FileExistsError as error:
             fault = Fault(reason="there is such a file", where=str(path), advice="another name, or --overwrite")
             raise InputRefused(fault) from error
@@ -53,7 +59,7 @@ class RecordingFile:
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
 
     def write(self) -> bool:
-        """Put everything that waits on the disk. Returns False if some of it still waits."""
+        """Put everything that waits on the disk. Returns False if some of it still waits, or the file has gone."""
         if (sealed := self.writer.seal()) is not None:
             if self._waiting and sum(len(each.data) for each in self._waiting) + len(sealed.data) > WAITING:
                 self.dropped += sealed.messages
@@ -67,14 +73,36 @@ class RecordingFile:
                 self._append(self._waiting[0].data)
                 self.writer.placed(self._waiting.popleft(), offset)
             os.fdatasync(self._file)
+            if not self._stay():
+                return False
         except OSError as error:
-            self._complain(error)
+            self._complain(f"{error.strerror}; what comes waits in memory, at most {WAITING >> 20} MiB of it")
             return False
         finally:
             self.slowest = max(self.slowest, time.monotonic() - began)
         if self._trouble:
-            self._tell(f"{self.path}: there is room again; messages lost: {self.dropped}")
+            self._tell(f"{self.path}: it is written again; messages lost: {self.dropped}")
             self._trouble = ""
+        return True
+
+    def _stay(self) -> bool:
+        """Write a file that somebody has removed anew, and tell of one that was renamed. Returns False: it cannot."""
+        self.is_removed = descriptor.is_removed(self._file)
+        if self.is_removed:
+            try:
+                copy = descriptor.copied(self._file, self.written, self.path)
+            except OSError as error:
+                self._complain(f"removed while it is recorded, and not written anew: {error.strerror}")
+                return False
+            os.close(self._file)
+            self._file, self.is_removed = copy, False
+            _sync_folder(self.path)
+            self._tell(f"{self.path}: removed while it is recorded; written anew, with all that was in it")
+        elif not self._is_elsewhere and not descriptor.is_at(self._file, self.path):
+            self._is_elsewhere = True
+            now = descriptor.name(self._file)
+            self._tell(f"{self.path}: renamed while it is recorded, which goes on{f' in {now}' if now else ''}")
+            self.path = Path(now) if now else self.path
         return True
 
     def close(self, note: Mapping[str, str]) -> bool:
@@ -87,7 +115,7 @@ class RecordingFile:
             self._append(self.writer.finish(self.written))
             os.fdatasync(self._file)
         except OSError as error:
-            self._complain(error)
+            self._complain(f"{error.strerror}; the end of the file is missing")
             return False
         finally:
             os.close(self._file)
@@ -105,10 +133,10 @@ class RecordingFile:
             raise
         self.written += len(data)
 
-    def _complain(self, error: OSError) -> None:
-        if error.strerror != self._trouble:
-            self._trouble = str(error.strerror)
-            self._tell(f"{self.path}: {self._trouble}; what comes waits in memory, at most {WAITING >> 20} MiB of it")
+    def _complain(self, trouble: str) -> None:
+        if trouble != self._trouble:
+            self._trouble = trouble
+            self._tell(f"{self.path}: {trouble}")
 
 
 def read(path: Path) -> Recording:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body import DescribeBody
@@ -13,7 +14,7 @@ from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
-from engage_hri.services.recording.disk import RecordingFile
+from engage_hri.services.recording.disk import RecordingFile, Tell
 from engage_hri.services.recording.form import JSON, MSGPACK, kept
 from engage_hri.services.recording.losses import CLOCK, LOST, MORE, Losses
 from engage_hri.services.recording.reading import BILLION
@@ -100,7 +101,9 @@ class Recorder:
         """End the file. Returns False if something found no room on the disk."""
         self.look()
         note = {"messages": str(self.messages), "lost": str(self.losses.total)}
-        return self._file.close(note)
+        is_whole = self._file.close(note)
+        self.losses = replace(self.losses, disk=self._file.dropped)  # what waited for room to the end, too
+        return is_whole
 
 
 def facts(bus: Bus, wall: int, patterns: Sequence[str], more: Mapping[str, str]) -> dict[str, str]:
@@ -157,9 +160,25 @@ async def _ask(bus: Bus, recorder: Recorder, asked: "asyncio.Queue[str]") -> Non
 
 
 def opened(
-    bus: Bus, path: Path, wall: int, patterns: Sequence[str], more: Mapping[str, str], *, overwrite: bool = False
+    bus: Bus,
+    path: Path,
+    wall: int,
+    patterns: Sequence[str],
+    more: Mapping[str, str],
+    *,
+    overwrite: bool = False,
+    tell: Tell | None = None,
 ) -> tuple[Recorder, RecordingFile, Tap]:
-    """Open a file and listen. Raises InputRefused: it cannot be written."""
+    """Open a file and listen. tell: takes a line about trouble with the disk, which the log has in any case.
+
+    Raises InputRefused: it cannot be written.
+    """
     began = bus.now()
-    file = RecordingFile(path, facts(bus, wall, patterns, more), bus.log.warning, overwrite=overwrite)
+
+    def told(text: str) -> None:
+        bus.log.warning(text)
+        if tell is not None:
+            tell(text)
+
+    file = RecordingFile(path, facts(bus, wall, patterns, more), told, overwrite=overwrite)
     return Recorder(bus, file, began, wall), file, bus.tap(*patterns)

@@ -132,7 +132,7 @@ async def test_a_full_disk_keeps_messages_waiting_and_the_file_readable(
     told = [record.message.removeprefix(str(tmp_path)) for record in caplog.records if "a.mcap" in record.message]
     assert told == [
         "/a.mcap: No space left on device; what comes waits in memory, at most 32 MiB of it",
-        "/a.mcap: there is room again; messages lost: 0",
+        "/a.mcap: it is written again; messages lost: 0",
     ]
 
 
