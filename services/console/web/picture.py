@@ -105,6 +105,7 @@ class Picture:
     def feed(self, message: Message, at: Seconds, now: Seconds) -> None:
         """Take a message. at: local instant that it tells of. now: local time, which never goes back."""
         self.now = max(self.now, now)
+        is_again = isinstance(message, WarningFeedback) and view.is_again(self._scene, message)
         self._see(message, at)
         match message:
             case World():
@@ -139,7 +140,8 @@ class Picture:
                     self._changed(*(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
-        self._note(message, at)
+        if not is_again:
+            self._note(message, at)
 
     def _see(self, message: Message, at: Seconds) -> None:
         before = self._scene
