@@ -1,4 +1,4 @@
-"""Words and actions of people, for a manager: as they are recognized; words also in the outcomes of what it performs."""
+"""Words and actions of people, for a manager: as they are recognized; words in the outcomes of what it performs."""
 
 from collections.abc import Iterable
 from typing import TypeVar

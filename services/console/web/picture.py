@@ -92,6 +92,12 @@ class Picture:
         return self._world or World(entities=())
 
     @property
+    def present(self) -> tuple[str, ...]:
+        """Ids of the people who are there, and have a place."""
+        gone = {each.id for each in self._scene.actors if not each.present}
+        return tuple(each.id for each in self.world.people if each.id not in gone)
+
+    @property
     def body(self) -> Capabilities | None:
         """The body as it described itself; None: not yet."""
         return self._body
