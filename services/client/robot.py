@@ -18,7 +18,6 @@ from typing import Any, Literal, get_args
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner, Inhibit
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
 from engage_hri.schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
@@ -33,7 +32,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, NewFeed
+from engage_hri.services.client.feeds import EventFeed, Feed, NewFeed
 from engage_hri.services.client.hearing import Hearing, NewWords
 from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in
 from engage_hri.services.client.results import in_time, successful
@@ -263,15 +262,6 @@ class Robot(Hearing):
             return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
         self._requests.check()
         return NewFeed(self._bus, Feedback.__args__, (keys.ANY_FEEDBACK,))
-
-    def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
-        """Follow the actions of the robot and of people as they are seen, and the coming and going of people.
-
-        It begins with the people who are there and with what goes on now. What a program told that was killed is over
-        after 4 s: its people go, and their actions end.
-        """
-        self._requests.check()
-        return ActionFeed(self._bus)
 
     def faults(self) -> Feed[Fault]:
         """Follow the faults that services tell of: bad messages, and errors while one was taken."""

@@ -21,7 +21,7 @@ STEP: Meters = 0.05
 
 
 class Frame(NamedTuple):
-    """What is in the picture: its edges, in metres to the right and down from the robot."""
+    """Edges of the picture, in metres to the right and down from the robot."""
 
     left: Meters
     top: Meters

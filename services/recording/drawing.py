@@ -61,7 +61,7 @@ def pictures(scenes: Sequence[Scene], size: tuple[int, int] = (400, 560)) -> lis
 
 
 def _frame(scenes: Sequence[Scene]) -> Frame:
-    """What is in view in all of these scenes, so that it stands still from one to the next."""
+    """Frame of all of these scenes, so that it stands still from one to the next."""
     return together(
         frame(scene.world.entities, [each.position for each in scene.world.people]) for scene in scenes if scene.world
     )

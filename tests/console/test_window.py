@@ -99,7 +99,7 @@ async def press(page: Page, text: str, within: str = "body") -> None:
 
 async def sit(page: Page, name: str) -> None:
     await page.value(f"document.querySelector('#your-name').value = '{name}'")
-    await press(page, "Take a seat")
+    await page.value("document.querySelector('#part button[type=submit]').click()")
     await page.until(f"window.engage.state.you.person === '{name}'")
 
 
@@ -228,7 +228,7 @@ async def test_without_the_token_one_only_looks_and_is_told_why(place: Place) ->
         await page.value("window.engage.send({ do: 'steer', to: 'stop' })")
 
         await page.until("document.querySelector('#wizard .told').textContent.includes('token')")
-        assert await page.value("document.querySelector('#part .row').hidden")
+        assert await page.value("document.querySelector('#part form').hidden")
 
 
 @needs_browser

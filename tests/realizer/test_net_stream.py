@@ -391,16 +391,10 @@ async def test_a_block_that_is_over_holds_the_tokens_that_it_began_with_though_a
 
 async def test_the_net_has_the_words_that_the_block_is_to_say_and_what_it_follows() -> None:
     watcher, _ = await watched(block((GAZE, SPEECH)))
-
     assert [(each.behavior, each.text) for each in watcher.plans[0].speeches] == [("speech-1", "This can?")]
-    assert watcher.plans[0].follows == ()
-
-    follower = Watcher("second")
-    async with stage() as seen, watching(seen, follower):
-        first = asyncio.create_task(seen.perform(block((SPEECH,))))
-        await asyncio.sleep(0.1)
+    async with stage() as seen, watching(seen, follower := Watcher("second")):
+        first = seen.ask(block((SPEECH,)))
         request = PerformBlock(id="r-2", block=replace(block((SPEECH,)), id="second"), follows=("b",))
         await seen.requests.send(keys.BLOCK, request).outcome
-        await first
-
+        await first.outcome
     assert follower.plans[0].follows == ("b",)

@@ -54,12 +54,16 @@ class Place(Struct, frozen=True):
 class You(Struct, frozen=True):
     """The one who looks at a page.
 
-    person: id of the person that they are; empty: none. denied: rights that they do not have, with the reason.
+    person: id of the person that they are; empty: none. there: who sits before the robot already, in words, and what
+    that means for somebody who sits down. sit: what the button for that says. denied: rights that they do not have,
+    with the reason.
     script: titles of the prepared fragments. faults: kinds of faults that the body can play. inhibits: they keep the
     gaze now.
     """
 
     person: str = ""
+    there: str = ""
+    sit: str = ""
     denied: dict[str, str] = {}
     script: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()

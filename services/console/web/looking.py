@@ -1,4 +1,4 @@
-"""Where the robot looks and why, in words that everybody understands. Pure.
+"""Target of the robot's looks and the reason for them, in words that everybody understands. Pure.
 
 The arbiter of the head speaks of claims, of which one owns the head (`schemas/attention.py`). Researchers find that
 beside these words.
@@ -50,7 +50,7 @@ def plainly(claim: Claim, world: World) -> ClaimShown:
 
 
 def _where(claim: Claim, world: World) -> str:
-    """What the robot does for the claim."""
+    """Movement of the head that the claim asks for."""
     if claim.kind == "inhibition" and claim.reason.startswith(SPEECH_ONLY):
         return "look up, past everything"
     if not claim.target:

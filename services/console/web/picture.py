@@ -92,6 +92,12 @@ class Picture:
         return self._world or World(entities=())
 
     @property
+    def present(self) -> tuple[str, ...]:
+        """Ids of the people who are there, and have a place."""
+        gone = {each.id for each in self._scene.actors if not each.present}
+        return tuple(each.id for each in self.world.people if each.id not in gone)
+
+    @property
     def body(self) -> Capabilities | None:
         """The body as it described itself; None: not yet."""
         return self._body
@@ -109,6 +115,7 @@ class Picture:
     def feed(self, message: Message, at: Seconds, now: Seconds) -> None:
         """Take a message. at: local instant that it tells of. now: local time, which never goes back."""
         self.now = max(self.now, now)
+        is_again = isinstance(message, WarningFeedback) and view.is_again(self._scene, message)
         self._see(message, at)
         match message:
             case World():
@@ -142,7 +149,8 @@ class Picture:
                     self._take_presence(message, at)
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
-        self._note(message, at)
+        if not is_again:
+            self._note(message, at)
 
     def _see(self, message: Message, at: Seconds) -> None:
         before = self._scene

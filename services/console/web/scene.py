@@ -28,7 +28,7 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
 
 
 def label(entity: Entity) -> str:
-    """What people call a thing: its name, else its color and what it is, else its id."""
+    """Name of a thing for people: its own, else its color and what it is, else its id."""
     return entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
 
 

@@ -18,6 +18,7 @@ from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.perceive import check_id, perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
+from engage_hri.services.console.web.company import Invitation
 from engage_hri.services.console.web.frames import Told, You
 from engage_hri.services.console.web.laying import laid
 from engage_hri.services.console.web.seats import SETTLED
@@ -49,8 +50,11 @@ class Visitor:
     @property
     def you(self) -> You:
         body = self._window.picture.body
+        invited = Invitation("", "") if self._person else self._window.invitation
         return You(
             person=self._person.id if self._person else "",
+            there=invited.there,
+            sit=invited.button,
             denied=self._denied,
             script=self._window.script.titles,
             faults=body.faults if body else (),

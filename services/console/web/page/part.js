@@ -12,8 +12,10 @@ export function part(panel, order) {
     return made;
   };
   const name = element("input", { type: "text", id: "your-name", maxlength: "40", autocomplete: "off", placeholder: "visitor" });
-  const away = element("form", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name,
-    element("button", { type: "submit", class: "main" }, "Take a seat"));
+  const sit = element("button", { type: "submit", class: "main" }, "Take a seat");
+  const there = element("p", { class: "why there" });
+  const away = element("form", {}, there,
+    element("div", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name, sit));
   away.addEventListener("submit", (event) => {
     event.preventDefault();
     order({ do: "sit", name: name.value.trim() });
@@ -61,10 +63,12 @@ export function part(panel, order) {
     take(state, changed) {
       here.dataset.robot = state.robot;
       if (changed.has("you")) {
-        const { person, denied } = state.you;
+        const { person, denied, there: company, sit: seat } = state.you;
         const reason = denied?.seat ?? "";
         refused.textContent = reason ? `You only look on: ${reason}.` : "";
         away.hidden = Boolean(reason || person);
+        if (seat && sit.textContent !== seat) sit.textContent = seat;
+        if (there.textContent !== (company ?? "")) there.textContent = company ?? "";
         here.hidden = !person;
         who.replaceChildren("You are ", element("strong", {}, person), ".");
         document.body.classList.toggle("seated", Boolean(person));
