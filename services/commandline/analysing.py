@@ -159,6 +159,8 @@ def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterabl
         yield f"the recorder did not end in order: the numbers are of the first {recording.duration:.0f} s"
     if recording.losses.total:
         yield f"{recording.losses.total} messages are missing"
+    if recording.losses.still:
+        yield f"the recorder stood still for {recording.losses.still:.1f} s: motion of that time is missing"
     if recording.damaged:
         yield f"{len(recording.damaged)} damaged chunks are left out"
     if before:

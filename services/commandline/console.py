@@ -90,21 +90,24 @@ async def _play(options: Options, recording: "Recording") -> None:
 async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> None:
     server = _web()
     from engage_hri.services.bus.zenoh.neighbors import hinting
+    from engage_hri.services.console.web.orders import RIGHTS
     from engage_hri.services.console.web.script import Script
     from engage_hri.services.console.web.service import window
 
     token = secrets.token_urlsafe(12)
     async with await options.open(config.bus, HOLDERS[options.role]) as hub:
         bus = hub.join(unique_name("console"), options.role)
-        async with window(hub, bus, Script(things)) as shown:
+        if bus.role != options.role:
+            complain(f"the window has the role {bus.role}, that of its keys, and not --role {options.role}")
+        async with window(hub, bus, Script(things), keyed=bool(config.bus.keys)) as shown:
             bus.declare_alive()
 
             async def stay() -> None:
-                async with hinting(bus, config.bus.connect):
+                async with hinting(bus, config.bus.connect, tell=shown.warn):
                     await (until_closed() if options.attended else forever())
 
             app = server.application(shown, _hosts(options), token, options.pages)
-            await _serve(options, app, token, stay)
+            await _serve(options, app, token if bus.role in RIGHTS else "", stay)
 
 
 def _web() -> ModuleType:
@@ -151,7 +154,7 @@ HOLDERS = {"observer": "viewer", "operator": "operator", "wizard": "wizard"}
 def _address(options: Options, port: int, token: str) -> str:
     host = "127.0.0.1" if options.host in ("0.0.0.0", "::") else options.host
     host = f"[{host}]" if ":" in host else host
-    return f"http://{host}:{port}/" + ("" if options.role == "observer" or not token else f"?token={token}")
+    return f"http://{host}:{port}/" + (f"?token={token}" if token else "")
 
 
 def _open_to_all(options: Options) -> str:

@@ -35,7 +35,7 @@ class RecordingFile:
         self.dropped = 0
         self.written = 0
         self.slowest: Seconds = 0.0
-        self._tell = tell
+        self.tell = tell
         self._waiting: deque[Sealed] = deque()
         self._trouble = ""
         self.is_removed = False
@@ -81,7 +81,7 @@ class RecordingFile:
         finally:
             self.slowest = max(self.slowest, time.monotonic() - began)
         if self._trouble:
-            self._tell(f"{self.path}: it is written again; messages lost: {self.dropped}")
+            self.tell(f"{self.path}: it is written again; messages lost: {self.dropped}")
             self._trouble = ""
         return True
 
@@ -97,11 +97,11 @@ class RecordingFile:
             os.close(self._file)
             self._file, self.is_removed = copy, False
             _sync_folder(self.path)
-            self._tell(f"{self.path}: removed while it is recorded; written anew, with all that was in it")
+            self.tell(f"{self.path}: removed while it is recorded; written anew, with all that was in it")
         elif not self._is_elsewhere and not descriptor.is_at(self._file, self.path):
             self._is_elsewhere = True
             now = descriptor.name(self._file)
-            self._tell(f"{self.path}: renamed while it is recorded, which goes on{f' in {now}' if now else ''}")
+            self.tell(f"{self.path}: renamed while it is recorded, which goes on{f' in {now}' if now else ''}")
             self.path = Path(now) if now else self.path
         return True
 
@@ -136,7 +136,7 @@ class RecordingFile:
     def _complain(self, trouble: str) -> None:
         if trouble != self._trouble:
             self._trouble = trouble
-            self._tell(f"{self.path}: {trouble}")
+            self.tell(f"{self.path}: {trouble}")
 
 
 def read(path: Path) -> Recording:

@@ -26,6 +26,8 @@ LARGEST_CHUNK = 1024 * 1024
 """Bytes, before compression, from which on a chunk goes to the disk at once."""
 LOOK: Seconds = 1.0
 """Time between two looks at clocks of others and at what was lost."""
+STILL: Seconds = 1.0
+"""Lateness from which on the recorder has stood still."""
 ASKED = (*keys.SERVICES, "simulation", "collaboration")
 """Participants that are asked for their status when they come."""
 
@@ -43,6 +45,7 @@ class Recorder:
         self._known_before = bus.health.dropped
         self._lines: dict[tuple[object, ...], Line] = {}
         self._offsets: dict[str, Seconds] = {}
+        self._still: Seconds = 0.0
 
     def take(self, sample: Sample) -> None:
         """Put a message into the file's next chunk."""
@@ -71,6 +74,13 @@ class Recorder:
         """Put an answer into the file that somebody gave to the recorder."""
         self.take(Sample(key, encode(message), encoding_of(message), source, self._bus.now()))
 
+    def stood_still(self, seconds: Seconds) -> None:
+        """Take the news that this process did nothing for so long; others take it for gone meanwhile."""
+        self._still += seconds
+        self._file.tell(
+            f"{self._file.path}: the recorder stood still for {seconds:.1f} s; motion of that time is missing"
+        )
+
     def look(self) -> None:
         """Note what has changed of other machines' clocks and of what was lost, and write to the disk."""
         changed = {
@@ -84,7 +94,7 @@ class Recorder:
         health = self._bus.health
         losses = Losses(
             dropped=health.dropped - self._known_before, overflowed=health.overflowed, lost=health.lost,
-            disk=self._file.dropped,
+            disk=self._file.dropped, still=self._still,
         )  # fmt: skip
         if losses != self.losses:
             self.losses = losses
@@ -138,7 +148,10 @@ async def _write(recorder: Recorder, file: RecordingFile) -> None:
     loop = asyncio.get_running_loop()
     looked = loop.time()
     while True:
+        due = loop.time() + FLUSH
         await asyncio.sleep(FLUSH)
+        if (late := loop.time() - due) > STILL:
+            recorder.stood_still(late)
         if loop.time() >= looked + LOOK:
             looked = loop.time()
             recorder.look()

@@ -9,6 +9,7 @@ from engage_hri.schemas.status import BusHealth, Reachable, Status
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.neighbors import Unseen, robots, tell_who_is_missing, told, unseen
+from engage_hri.services.bus.zenoh.session import open_session
 from tests.bus.places import free_endpoint
 
 pytestmark = pytest.mark.real_time
@@ -39,6 +40,49 @@ async def test_nobody_is_named_where_nobody_is_and_nothing_is_said_where_the_rob
             await tell_who_is_missing(hub.join("me"), [endpoint], after=0.2)
 
     assert caplog.text == ""
+
+
+async def test_who_speaks_another_version_of_the_protocol_is_named_and_whoever_shows_it_is_told(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """A process of a later Engage: all that ours can see of it are its tokens."""
+    endpoint, lines = free_endpoint(), list[str]()
+    async with await open_hub("robot", listen=[endpoint]) as here:
+        later, _ = open_session(None, (endpoint,), (), None)
+        tokens = [
+            later.liveliness().declare_token(f"robot/engage/v2/@bus/1/{each}")
+            for each in ("process/c", "alive/generation")
+        ]
+        try:
+            with caplog.at_level(logging.WARNING, logger="engage"):
+                await tell_who_is_missing(here.join("me"), [endpoint], after=0.5, tell=lines.append)
+            here.join("control").declare_alive()
+            await tell_who_is_missing(here.join("other"), [endpoint], after=0.0, tell=lines.append)
+        finally:
+            for token in tokens:
+                token.undeclare()
+            later.close()  # type: ignore[no-untyped-call]
+
+    nobody, first, unseen_here, second = lines
+    assert nobody == "no robot 'robot' here yet; waiting (`engage up --robot robot` starts one)"
+    assert unseen_here == "nobody here sees generation, realizer, recognition yet; waiting"
+    assert (
+        first
+        == second
+        == (
+            "somebody of robot 'robot' speaks engage/v2, which nobody hears who speaks engage/v1: "
+            "bring all machines to one version of Engage"
+        )
+    )
+    assert first in caplog.text
+
+
+async def test_who_waits_at_an_encrypted_endpoint_is_told_of_keys(caplog: pytest.LogCaptureFixture) -> None:
+    async with await open_hub("robot", listen=[free_endpoint()]) as hub:
+        with caplog.at_level(logging.WARNING, logger="engage"):
+            await tell_who_is_missing(hub.join("me"), ["tls/localhost:1"], after=0.0)
+
+    assert "the router lets in only --keys that it knows, and shows nothing to revoked ones" in caplog.text
 
 
 def status(name: str, *peers: str, **places: str) -> Status:

@@ -27,7 +27,6 @@ from engage_hri.services.console.web.orders import (
     Tell,
     decoded,
     denied,
-    missing,
     written,
 )
 from engage_hri.services.console.web.script import Script, backchannel, told
@@ -80,9 +79,14 @@ def test_what_a_role_may_not_is_denied_with_the_roles_that_may(role: str) -> Non
 
 def test_an_address_without_the_token_lets_nobody_take_part() -> None:
     assert set(denied("wizard", trusted=False)) == {"seat", "speak", "steer", "faults", "condition"}
-    assert "token" in missing(Tell(text="x"), "wizard", trusted=False)
-    assert missing(Tell(text="x"), "wizard", trusted=True) == ""
-    assert "operator or wizard" in missing(SteerOrder(to="stop"), "observer", trusted=True)
+    assert all("token" in reason for reason in denied("wizard", trusted=False).values())
+    assert denied("wizard", trusted=True) == {}
+
+
+def test_with_keys_it_is_these_that_say_what_the_window_may() -> None:
+    assert denied("observer", trusted=True, keyed=True)["steer"] == (
+        "the window has keys of the role observer; start it with those of operator or wizard"
+    )
 
 
 def test_the_log_has_what_was_ordered_but_not_the_words() -> None:

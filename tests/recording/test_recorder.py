@@ -157,6 +157,21 @@ async def test_what_finds_no_room_for_long_is_lost_counted_and_told_in_the_file(
     assert recording.is_whole
 
 
+async def test_a_recorder_that_stood_still_says_so_and_its_file_does(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub):
+        await asyncio.sleep(10.0)
+        asyncio.get_running_loop()._virtual_now += 11.0  # type: ignore[attr-defined]  # no task has run meanwhile
+        await asyncio.sleep(10.0)
+
+    losses = read(tmp_path / "a.mcap").losses
+    assert losses.still == pytest.approx(11.0, abs=0.4)
+    assert losses.total == 0
+    (told,) = [record.message.removeprefix(str(tmp_path)) for record in caplog.records if "a.mcap" in record.message]
+    assert told == f"/a.mcap: the recorder stood still for {losses.still:.1f} s; motion of that time is missing"
+
+
 async def test_presence_is_kept_though_it_is_never_sent(tmp_path: Path) -> None:
     async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub):
         there = hub.join("there")

@@ -1,7 +1,7 @@
 """Hints for a process that waits for others: who is not in sight, and why. They change nothing."""
 
 import asyncio
-from collections.abc import AsyncIterator, Collection, Iterable, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Iterable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
 
@@ -23,6 +23,9 @@ AFTER: Seconds = 3.0
 REMEDY = "let all connect to one router (`engage router`), or give it --listen with an address of its machine"
 
 
+Tell = Callable[[str], None]
+
+
 class Unseen(NamedTuple):
     """A participant that is not in sight. seen_by: who sees it. places: where others may connect to its process."""
 
@@ -32,9 +35,11 @@ class Unseen(NamedTuple):
 
 
 @asynccontextmanager
-async def hinting(bus: Bus, connect: Sequence[str], wanted: Collection[str] = keys.SERVICES) -> AsyncIterator[None]:
+async def hinting(
+    bus: Bus, connect: Sequence[str], wanted: Collection[str] = keys.SERVICES, tell: Tell | None = None
+) -> AsyncIterator[None]:
     """Run the body of `async with`, and beside it `tell_who_is_missing`."""
-    hint = asyncio.create_task(tell_who_is_missing(bus, connect, wanted), name="hint")
+    hint = asyncio.create_task(tell_who_is_missing(bus, connect, wanted, tell=tell), name="hint")
     try:
         yield
     finally:
@@ -43,25 +48,46 @@ async def hinting(bus: Bus, connect: Sequence[str], wanted: Collection[str] = ke
 
 
 async def tell_who_is_missing(
-    bus: Bus, connect: Sequence[str], wanted: Collection[str] = keys.SERVICES, after: Seconds = AFTER
+    bus: Bus,
+    connect: Sequence[str],
+    wanted: Collection[str] = keys.SERVICES,
+    after: Seconds = AFTER,
+    tell: Tell | None = None,
 ) -> None:
     """Log a warning for those of the `wanted` participants that are not in sight after this time, with the reason.
 
-    connect: the endpoints that this process connects to.
+    connect: the endpoints that this process connects to. tell: takes these lines, too.
     """
     await asyncio.sleep(after)
     absent = sorted(set(wanted) - {bus.name} - set(bus.health.peers))
     if not absent:
         return
-    if not set(bus.health.peers) & set(keys.SERVICES) - {bus.name}:
-        others = [name for name in await robots(connect) if name != bus.robot]
+    spoken = await versions(connect)
+    lines = []
+    if set(bus.health.peers) & set(keys.SERVICES) - {bus.name}:
+        lines += told(unseen(absent, await _statuses(bus)))
+    else:
+        others = sorted(name for name, its in spoken.items() if keys.PREFIX in its and name != bus.robot)
         there = f"; there are: {', '.join(map(repr, others))}" if others else ""
-        LOG.warning(
-            "no robot %r here yet%s; waiting (`engage up --robot %s` starts one)", bus.robot, there, bus.robot
+        lines.append(f"no robot {bus.robot!r} here yet{there}; waiting ({_way_in(bus.robot, connect)})")
+    for version in sorted(spoken.get(bus.robot, set()) - {keys.PREFIX}):
+        lines.append(
+            f"somebody of robot {bus.robot!r} speaks {version}, which nobody hears who speaks {keys.PREFIX}: "
+            "bring all machines to one version of Engage"
         )
-        return
-    for line in told(unseen(absent, await _statuses(bus))):
+    for line in lines:
         LOG.warning("%s", line)
+        if tell is not None:
+            tell(line)
+
+
+def _way_in(robot: str, connect: Sequence[str]) -> str:
+    starts = f"`engage up --robot {robot}` starts one"
+    if any(map(is_encrypted, connect)):
+        return (
+            f"{starts}; if one runs, the router lets in only --keys that it knows, and shows nothing to revoked ones"
+        )
+    return starts
 
 
 def unseen(absent: Iterable[str], statuses: Iterable[Status]) -> list[Unseen]:
@@ -120,20 +146,27 @@ async def _statuses(bus: Bus) -> list[Status]:
 
 async def robots(connect: Sequence[str]) -> tuple[str, ...]:
     """Names of the robots on the bus, in order; without endpoints: on this machine's. Raises nothing."""
+    return tuple(sorted(name for name, spoken in (await versions(connect)).items() if keys.PREFIX in spoken))
+
+
+async def versions(connect: Sequence[str]) -> dict[str, set[str]]:
+    """Versions of the protocol that are spoken, by robot; without endpoints: on this machine. Raises nothing."""
     if any(map(is_encrypted, connect)):
-        return ()  # a link without keys is refused there
+        return {}  # a link without keys is refused there
     try:
         session, _ = open_session(None, connect or (RENDEZVOUS,), (), None)
     except EngageError:
-        return ()
+        return {}
     try:
-        names: set[str] = set()
+        found: dict[str, set[str]] = {}
         until = asyncio.get_running_loop().time() + LOOK
-        while not names and asyncio.get_running_loop().time() < until:  # the link itself takes a moment
+        while not found and asyncio.get_running_loop().time() < until:  # the link itself takes a moment
             await asyncio.sleep(POLL)
-            replies = session.liveliness().get(f"*/{keys.ANY_TOKEN}", timeout=LOOK)
-            names.update([key.partition("/")[0] async for key in _keys(replies, until)])
-        return tuple(sorted(names))
+            replies = session.liveliness().get(f"*/{keys.ANY_PROTOCOL}", timeout=LOOK)
+            async for key in _keys(replies, until):
+                robot, root, version, _ = key.split("/", 3)
+                found.setdefault(robot, set()).add(f"{root}/{version}")
+        return found
     finally:
         session.close()  # type: ignore[no-untyped-call]
 

@@ -213,13 +213,11 @@ def server(order: Order) -> str:
     return ""
 
 
-def missing(order: Order, role: str, trusted: bool) -> str:
-    """Say why this order is not carried out; empty: it may be. trusted: the page was called with the token."""
-    return denied(role, trusted).get(order.needs, "") if order.needs else ""
+def denied(role: str, trusted: bool, *, keyed: bool = False) -> dict[str, str]:
+    """The rights that a page does not have, each with the reason.
 
-
-def denied(role: str, trusted: bool) -> dict[str, str]:
-    """The rights that a page does not have, each with the reason."""
+    trusted: the page was called with the token. keyed: the role is that of the window's keys.
+    """
     if role in RIGHTS and not trusted:
         reason = "this address lacks the token: open the one that `engage console` has printed"
         return dict[str, str].fromkeys(ALL_RIGHTS, reason)
@@ -227,7 +225,10 @@ def denied(role: str, trusted: bool) -> dict[str, str]:
     for right in ALL_RIGHTS:
         if right not in RIGHTS.get(role, ()):
             able = " or ".join(name for name, has in RIGHTS.items() if right in has)
-            found[right] = f"the window has the role {role}; start it with `--role` {able}"
+            if keyed:
+                found[right] = f"the window has keys of the role {role}; start it with those of {able}"
+            else:
+                found[right] = f"the window has the role {role}; start it with `--role` {able}"
     return found
 
 

@@ -39,12 +39,13 @@ PATIENCE: Seconds = 1.0
 class Window:
     """The picture of a robot's bus, kept up to date, and what people need who take part.
 
-    viewers: number of browsers; while there is none, services are not asked how they are. listeners: what gets each
-    message.
+    keyed: its role is that of its keys. viewers: number of browsers; while there is none, services are not asked how
+    they are. listeners: what gets each message.
     """
 
-    def __init__(self, hub: Hub, bus: Bus, robot: Robot, script: Script) -> None:
+    def __init__(self, hub: Hub, bus: Bus, robot: Robot, script: Script, *, keyed: bool = False) -> None:
         self.hub = hub
+        self.keyed = keyed
         self.bus = bus
         self.robot = robot
         self.script = script
@@ -89,6 +90,10 @@ class Window:
         self.bus.log.info("%s", text)
         self.picture.note(text, self.bus.now())
 
+    def warn(self, text: str) -> None:
+        """Show all who look a warning that no message tells."""
+        self.picture.note(text, self.bus.now(), "warning")
+
     async def look_after(self) -> None:
         """Ask the services how they are, again and again, and the body once what it is; until cancelled."""
         described = False
@@ -125,10 +130,13 @@ class Window:
 
 
 @asynccontextmanager
-async def window(hub: Hub, bus: Bus, script: Script) -> AsyncIterator[Window]:
-    """Follow the bus while the body of `async with` runs. bus: the window's own, with its role."""
+async def window(hub: Hub, bus: Bus, script: Script, *, keyed: bool = False) -> AsyncIterator[Window]:
+    """Follow the bus while the body of `async with` runs. bus: the window's own, with its role.
+
+    keyed: the role is that of its keys.
+    """
     async with Robot.on(bus) as robot:
-        shown = Window(hub, bus, robot, script)
+        shown = Window(hub, bus, robot, script, keyed=keyed)
         async with _following(shown):
             yield shown
 

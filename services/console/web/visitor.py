@@ -36,8 +36,7 @@ class Visitor:
 
     def __init__(self, window: Window, trusted: bool) -> None:
         self._window = window
-        self._trusted = trusted
-        self._denied = orders.denied(window.bus.role, trusted)
+        self._denied = orders.denied(window.bus.role, trusted, keyed=window.keyed)
         self._told: deque[Told] = deque(maxlen=TOLD_KEPT)
         self._tasks: set[asyncio.Task[None]] = set()
         self._person: PerceivedPerson | None = None
@@ -72,7 +71,7 @@ class Visitor:
         order = None
         try:
             order = orders.decoded(text)
-            if reason := orders.missing(order, self._window.bus.role, self._trusted):
+            if reason := self._denied.get(order.needs, ""):
                 raise InputRefused(Fault(reason=reason, where="not allowed"))
             if isinstance(order, orders.Drawn):
                 return True

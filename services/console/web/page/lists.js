@@ -251,7 +251,7 @@ export function away(place) {
       text = "The window does not answer: `engage console` has ended, or this page cannot reach it. The picture below is the last one. It is called again every second.";
     } else if (missing?.length) {
       text = missing.length === 4
-        ? "No robot is on the bus. The picture below is the last one. `engage up` starts a robot; a robot elsewhere takes `engage console --connect`."
+        ? "No robot is on the bus. The picture below is the last one. `engage up` starts a robot; a robot elsewhere takes `engage console --connect`; `engage doctor` tells why none is seen."
         : `Not on the bus: ${missing.map((each) => `${each} (${WITHOUT[each][0]})`).join(", ")}.`;
     }
     for (const [service, [, panels]] of Object.entries(WITHOUT)) {
