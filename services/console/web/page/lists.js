@@ -116,7 +116,7 @@ export function head(panel) {
 }
 
 const GESTURES = {
-  none: "nothing", gaze: "glance", directed_gaze: "look until they look", directed_gaze_with_pointing: "look and point",
+  none: "words alone", gaze: "a glance", directed_gaze: "looking until they look", directed_gaze_with_pointing: "looking and pointing",
 };
 
 function table(choice) {

@@ -20,15 +20,18 @@ export function part(panel, order) {
     element("div", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name, sit));
   away.addEventListener("submit", (event) => {
     event.preventDefault();
-    if (sit.disabled) return;
-    sit.disabled = true; // until it is known what became of it
+    if (isSitting) return;
+    isSitting = true; // until it is known what became of it; a disabled button would lose the focus
+    sit.setAttribute("aria-disabled", "true");
     sit.textContent = "Sitting down…";
     order({ do: "sit", name: name.value.trim() });
     setTimeout(rise, PATIENCE);
   });
   let seat = "Take a seat";
+  let isSitting = false;
   const rise = () => {
-    sit.disabled = false;
+    isSitting = false;
+    sit.removeAttribute("aria-disabled");
     sit.textContent = seat;
   };
 
@@ -82,7 +85,7 @@ export function part(panel, order) {
         const [before, after] = person ? [away, here] : [here, away];
         const keepsFocus = before.contains(document.activeElement);
         away.hidden = Boolean(reason || person);
-        if (!sit.disabled) sit.textContent = seat;
+        if (!isSitting) sit.textContent = seat;
         if (there.dataset.text !== (company ?? "")) {
           there.dataset.text = company ?? "";
           there.replaceChildren(...prose(company ?? ""));
