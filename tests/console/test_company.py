@@ -23,8 +23,8 @@ def test_who_is_simulated_and_has_the_task_is_told_before_one_sits_beside() -> N
 
     assert invited.button == "Sit beside human"
     assert invited.there == (
-        "human, whom a program plays, sits before the robot. "
-        "You sit beside, the robot sees you and looks back at you. "
+        "Before the robot sits human, whom a program plays. "
+        "You may sit beside: the robot sees you, and looks back at you. "
         "But it does its task with whom it met first, until they leave. "
         "To have the robot for yourself, start it with `engage demo --you`."
     )
@@ -34,8 +34,8 @@ def test_other_visitors_are_people_of_their_own() -> None:
     invited = invitation(("ann", "bob"), {"ann": "perceive-1", "bob": "perceive-2"}, {"simulation"})
 
     assert invited.button == "Sit beside ann and bob"
-    assert (
-        invited.there == "ann and bob sit before the robot. You sit beside, the robot sees you and looks back at you."
+    assert invited.there == (
+        "Before the robot sit ann and bob. You may sit beside: the robot sees you, and looks back at you."
     )
 
 
@@ -49,6 +49,6 @@ async def test_the_window_knows_who_is_there_and_who_tells_of_them(hub: MemoryHu
         assert shown.invitation.button == "Take a seat"
         async with perceive("human", hub=hub, name="simulation"):
             await asyncio.sleep(0.1)
-            assert "human, whom a program plays, sits before the robot." in shown.invitation.there
+            assert "Before the robot sits human, whom a program plays." in shown.invitation.there
         await asyncio.sleep(0.1)
         assert shown.invitation.button == "Take a seat"

@@ -190,6 +190,33 @@ async def test_a_turn_is_one_bubble_with_what_was_stopped_apart_and_each_word_is
 
 
 @needs_browser
+async def test_who_sits_down_by_the_keyboard_keeps_the_focus_and_buttons_answer(place: Place) -> None:
+    focus = "document.activeElement.textContent"
+    async with opened(place) as page:
+        await page.until("document.querySelector('#part .there').textContent.includes('before the robot')")
+        await page.value("document.querySelector('#your-name').value = 'yan'")
+        await page.value("document.querySelector('#part button[type=submit]').focus()")
+        await page.value("document.querySelector('#part button[type=submit]').click()")
+        assert await page.value("document.querySelector('#part button[type=submit]').textContent") == "Sitting down…"
+        await page.until(f"window.engage.state.you.person === 'yan' && {focus} === 'Look at the robot'")
+
+        await press(page, "Stop", "#wizard")
+        await page.until("document.querySelector('#wizard .told').textContent.includes('nothing is being performed')")
+        await press(page, "Leave", "#part")
+        await page.until("document.querySelector('#part button[type=submit]').checkVisibility()")
+
+
+@needs_browser
+async def test_who_may_not_sit_down_is_told_and_may_try_again(place: Place) -> None:
+    seat = "document.querySelector('#part button[type=submit]')"
+    async with opened(place) as page:
+        await page.value("document.querySelector('#your-name').value = 'blue-square'")
+        await page.value(f"{seat}.click()")
+        await page.until("document.querySelector('#part .told').textContent.includes('blue-square')")
+        await page.until(f"{seat}.getAttribute('aria-disabled') === null")
+
+
+@needs_browser
 async def test_the_map_shows_things_where_the_pictures_of_a_recording_do(place: Place) -> None:
     drawn = "document.querySelector('.map .object[data-id=blue-square]').getAttribute('points')"
     corners = "window.engage.state.scene.things.find((each) => each.id === 'blue-square').outline"

@@ -30,10 +30,10 @@ def invitation(people: Collection[str], reporters: Mapping[str, str], here: Coll
     others = [each for each in people if each not in simulated]
     told = []
     if simulated:
-        told.append(f"{_listed(simulated)}, whom a program plays, {_sits(simulated)} before the robot.")
+        told.append(f"Before the robot {_sits(simulated)} {_listed(simulated)}, whom a program plays.")
     if others:
-        told.append(f"{_listed(others)} {_sits(others)} {'there, too' if simulated else 'before the robot'}.")
-    told.append("You sit beside, the robot sees you and looks back at you.")
+        told.append(f"{'Beside' if simulated else 'Before the robot'} {_sits(others)} {_listed(others)}.")
+    told.append("You may sit beside: the robot sees you, and looks back at you.")
     if TASK in here:
         told.append("But it does its task with whom it met first, until they leave.")
     if simulated:

@@ -1,5 +1,5 @@
 // Panels of text: words, the owner of the head, references, services, notes, and what is wrong.
-import { clock, element, seconds } from "./look.js";
+import { clock, element, prose, seconds } from "./look.js";
 
 // Why some words of a turn were not said, for who reads them apart from the others.
 const LEFT = {
@@ -116,7 +116,7 @@ export function head(panel) {
 }
 
 const GESTURES = {
-  none: "nothing", gaze: "glance", directed_gaze: "look until they look", directed_gaze_with_pointing: "look and point",
+  none: "words alone", gaze: "a glance", directed_gaze: "looking until they look", directed_gaze_with_pointing: "looking and pointing",
 };
 
 function table(choice) {
@@ -127,9 +127,10 @@ function table(choice) {
     element("td", {}, pair.channel.toFixed(2)), element("td", {}, pair.reliability.toFixed(3)),
     element("td", {}, pair.minimum.toFixed(2)), element("td", {}, seconds(pair.cost)),
     element("td", {}, pair.chosen ? `chosen: ${pair.reason ?? ""}` : pair.reason ?? "")));
-  const names = ["", "gesture", "phrase", "|D|", "r", "R", "Rmin", "cost", "verdict"];
+  const names = [["", ""], ["gesture", ""], ["phrase", ""], ["|D|", "distractors: the other things that it could still mean"], ["r", "reliability of the gesture alone"],
+    ["R", "reliability: how likely it is understood"], ["Rmin", "the least reliability that is allowed"], ["cost", "time that it takes"], ["verdict", ""]];
   return element("div", { class: "scroll", tabindex: "0" }, element("table", {},
-    element("thead", {}, element("tr", {}, ...names.map((name) => element("th", { scope: "col" }, name)))),
+    element("thead", {}, element("tr", {}, ...names.map(([name, title]) => element("th", { scope: "col", title: title || null }, name)))),
     element("tbody", {}, ...rows)));
 }
 
@@ -146,7 +147,7 @@ export function references(panel) {
         if (shown.has(key)) continue;
         const details = element("details", {}, element("summary", {},
           element("strong", {}, choice.target), ` “${choice.phrase}” by ${GESTURES[choice.gesture] ?? choice.gesture}`,
-          element("span", { class: "why" }, `R ${choice.reliability.toFixed(2)}, ${seconds(choice.cost)}; ${choice.fragment}:${choice.reference}`)));
+          element("span", { class: "why" }, `understood with a likelihood of ${choice.reliability.toFixed(2)}, takes ${seconds(choice.cost)}; ${choice.fragment}:${choice.reference}`)));
         details.addEventListener("toggle", () => {
           if (details.open && details.children.length === 1) details.append(table(choice));
         });
@@ -257,7 +258,8 @@ export function away(place) {
     for (const [service, [, panels]] of Object.entries(WITHOUT)) {
       for (const id of panels) stale(document.getElementById(id), missing?.includes(service) ? service : "");
     }
-    if (place.textContent !== text) place.textContent = text;
+    if (place.dataset.text !== text) place.replaceChildren(...prose(text));
+    place.dataset.text = text;
     place.hidden = !text;
   }
   return {
