@@ -277,14 +277,15 @@ async def test_what_is_no_order_is_told_and_ends_nothing(place: Place) -> None:
             await socket.send_str(text)
         told: list[dict[str, str]] = []
         async with asyncio.timeout(20):
-            while len(told) < 2:
+            while len(told) < 3:
                 frame = await socket.receive_json()
                 told += frame.get("told", [])
                 await socket.send_str('{"do": "drawn"}')
 
     assert "reload the page" in told[0]["text"]
     assert "take a seat first" in told[1]["text"]
-    assert [each["panel"] for each in told] == ["part", "part"]
+    assert "goes on: nothing is being performed" in told[2]["text"]
+    assert [each["panel"] for each in told] == ["part", "part", "wizard"]
 
 
 @needs_browser
