@@ -285,7 +285,7 @@ async def test_what_is_no_order_is_told_and_ends_nothing(place: Place) -> None:
 
     assert "reload the page" in told[0]["text"]
     assert "take a seat first" in told[1]["text"]
-    assert "nothing" in told[2]["text"]
+    assert "goes on: nothing is being performed" in told[2]["text"]
     assert [each["panel"] for each in told] == ["part", "part", "wizard"]
 
 
