@@ -6,6 +6,7 @@ A unit is a file or folder directly within one of the folders that have layers, 
 
 import ast
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,14 +54,22 @@ def _units(path: Path, prefix: str) -> set[str]:
     return {name.removeprefix(prefix).split(".")[0] for name in imported(path) if name.startswith(prefix)}
 
 
-def imported(path: Path) -> Iterator[str]:
+def imported(path: Path) -> tuple[str, ...]:
     """Every module that a file imports anywhere in it, with what it takes of it."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    return _imported(path.read_text(encoding="utf-8"), path)
+
+
+@cache
+def _imported(text: str, path: Path) -> tuple[str, ...]:
+    """A file is asked for several times: for the picture of its folder, and of the folders around that."""
+    found: list[str] = []
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert not node.level, f"{path}: imports begin with {OURS}"
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            found += (f"{node.module}.{alias.name}" for alias in node.names)
+    return tuple(found)
 
 
 def upwards(made: Picture) -> Iterator[str]:

@@ -30,6 +30,7 @@ from engage_hri.services.bus.interface import (
     Tap,
 )
 from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
+from engage_hri.services.bus.subscription import KEYS_KEPT
 
 
 class Past(NamedTuple):
@@ -238,6 +239,8 @@ class MemoryBus(Bus):
         self._hub = hub
         self._subscriptions: dict[Subscription, int] = {}
         """Subscriptions, and the number of the last message that was replayed to each."""
+        self._wanting: dict[str, tuple[tuple[Subscription, int], ...]] = {}
+        """Subscriptions that want a key, of keys seen lately: most messages are for few participants."""
         self._taps: dict[Tap, int] = {}
         self._overflowed = 0
 
@@ -277,19 +280,32 @@ class MemoryBus(Bus):
         return any(tap.wants(key) for tap in self._taps)
 
     def deliver(self, received: Received, number: int) -> None:
-        key = received.key
-        for subscription, replayed in self._subscriptions.items():
+        try:
+            wanting = self._wanting[received.key]
+        except KeyError:
+            wanting = self._look_up(received.key)
+        for subscription, replayed in wanting:
             # A message that was on its way when the subscription was made has been replayed to it.
-            if number > replayed and subscription.wants(key):
+            if number > replayed:
                 subscription.offer(received)
+
+    def _look_up(self, key: str) -> tuple[tuple[Subscription, int], ...]:
+        wanting = tuple(each for each in self._subscriptions.items() if each[0].wants(key))
+        if not keys.is_presence(key):  # each who comes and goes has a key, which is hardly ever asked for again
+            if len(self._wanting) >= KEYS_KEPT:
+                self._wanting.clear()
+            self._wanting[key] = wanting
+        return wanting
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         subscription = Subscription(patterns, keep, capacity, self._drop)
         if not self._gone:
             self._subscriptions[subscription] = self._hub.replay(self.name, subscription)
+            self._wanting.clear()
         return subscription
 
     def _drop(self, subscription: Subscription) -> None:
+        self._wanting.clear()
         if self._subscriptions.pop(subscription, None) is not None:
             self._overflowed += subscription.overflowed
 
@@ -360,6 +376,7 @@ class MemoryBus(Bus):
         self._gone = True
         self.under_way.end()
         self._subscriptions.clear()
+        self._wanting.clear()
         self._taps.clear()
         self._hub.forget(self.name)
         if self.is_alive:

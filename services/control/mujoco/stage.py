@@ -52,7 +52,7 @@ class Stage:
 
     def planned(self, part: str, now: Seconds) -> dict[str, Radians]:
         """The planned angles of a part."""
-        angles = self._motions[part].at(now).q.tolist()
+        angles = self._motions[part].position(now).tolist()
         return {limit.joint: angle for limit, angle in zip(self.limits[part], angles, strict=True)}
 
     def is_moving(self, part: str) -> bool:

@@ -67,7 +67,7 @@ class Moves:
 
     def planned(self, t: Seconds) -> Tracks:
         """Angles of each track at an instant. A look stays on its target while the body turns or leans."""
-        planned = {name: tuple(track.motion.at(t).q.tolist()) for name, track in self.tracks.items()}
+        planned = {name: tuple(track.motion.position(t).tolist()) for name, track in self.tracks.items()}
         yaw, pitch, follow = planned["head"]
         aside, up = self._added(planned)
         planned["head"] = (yaw + aside, pitch + up, follow)
@@ -146,7 +146,7 @@ class Moves:
 
     def planned_raw(self, t: Seconds) -> Tracks:
         """Angles of each track by its own path."""
-        return {name: tuple(track.motion.at(t).q.tolist()) for name, track in self.tracks.items()}
+        return {name: tuple(track.motion.position(t).tolist()) for name, track in self.tracks.items()}
 
     # -- motion -------------------------------------------------------------------------------------------------
 
