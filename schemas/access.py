@@ -154,6 +154,7 @@ TABLE: tuple[Row, ...] = (
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
     *_manages("manager"),
     Row("manager", "publishes", _OWN_SETTINGS),
+    *(Row("manager", "subscribes", key) for key in (keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING)),
     *_watches("observer"),
     *_looks("observer", keys.WORLD),
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),

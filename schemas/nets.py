@@ -48,12 +48,21 @@ class Fired(Struct, frozen=True, kw_only=True, omit_defaults=True):
     time: Seconds
 
 
+class NetSpeech(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A speech of a block. behavior: its id. text: the words that it is to say."""
+
+    behavior: str
+    text: str
+
+
 class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defaults=True):
     """stream: realizer: the net that a block runs on, and where its tokens are; all that a late watcher needs.
 
     Told at the block's start, when it is planned anew, and every two seconds. Points that the block's dialect gives
     one name are told once.
     at: when the block started. marked: numbers of the places that hold a token. fired: the transitions so far.
+    speeches: what the block is to say, in the order of the block, also of speeches that were dropped.
+    follows: ids of the blocks before it in the same turn that were live when it came.
     """
 
     block: str
@@ -62,6 +71,8 @@ class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defa
     places: tuple[NetPlace, ...]
     marked: tuple[int, ...] = ()
     fired: tuple[Fired, ...] = ()
+    speeches: tuple[NetSpeech, ...] = ()
+    follows: tuple[str, ...] = ()
 
 
 class NetWaiting(Struct, frozen=True, kw_only=True, tag="net_waiting", omit_defaults=True):

@@ -1,5 +1,6 @@
 """Entry of `engage` and `python -m engage_hri`. It sees to signals before it loads anything large."""
 
+import gc
 import os
 import signal
 import sys
@@ -11,6 +12,9 @@ def main(arguments: list[str] | None = None) -> None:
     # has begun yet, so leaving at once is orderly. `services/commandline/process.py` takes over when something runs.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: os._exit(128 + number))
+    # What is loaded stays: to search it for garbage would be a sixth of the time of loading.
+    # `services/commandline/app.py` switches the search on again when the command has been loaded.
+    gc.disable()
     from engage_hri.services.commandline import app as cli
 
     cli.main(arguments)

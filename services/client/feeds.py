@@ -4,10 +4,13 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
+from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, events
+from engage_hri.services.runtime.ongoing_actions import ActionEvent
 
 M = TypeVar("M")
 
@@ -90,4 +93,40 @@ class EventFeed(Feed[ConnectionEvent]):
                 self._told += self._stream.expire(self._now())
             else:
                 return None
+        return self._told.popleft()
+
+
+class ActionFeed(Feed[ActionEvent]):
+    """Actions as all who report them together tell them: they end, also if their reporter was killed.
+
+    It begins with the people who are there, and with the looks, points and other actions that go on.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        patterns = (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ALIVE)
+        super().__init__(bus.subscribe(*patterns), (), bus.now)
+        self._bus = bus
+        self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
+        self._told: deque[ActionEvent] = deque()
+
+    def _instant(self, stamp: Stamp) -> Seconds:
+        """Local time of a stamp, at most now."""
+        return min(self._bus.local(stamp), self._bus.now())
+
+    async def next(self, timeout: Seconds | None = None) -> ActionEvent | None:
+        """Return the next event; None after `timeout` seconds without one, or at the end.
+
+        timeout: seconds; None: for ever.
+        """
+        deadline = None if timeout is None else self._now() + timeout
+        while not self._told:
+            due = self._reports.deadline
+            until = min((at for at in (deadline, due) if at is not None), default=None)
+            if (one := await self._subscription.next(until)) is not None:
+                told = self._reports.take(one.message, one.key, one.source, one.life, self._now(), past=one.past)
+            elif due is not None and self._now() >= due:
+                told = self._reports.advance(self._now())
+            else:
+                return None
+            self._told += (event for event, _ in events(told, self._bus.clock))
         return self._told.popleft()

@@ -1,4 +1,4 @@
-"""Words of people, for a manager: as they are recognized, and in the outcomes of what it performs."""
+"""Words and actions of people, for a manager: as they are recognized; words in the outcomes of what it performs."""
 
 from collections.abc import Iterable
 from typing import TypeVar
@@ -6,11 +6,13 @@ from typing import TypeVar
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.perception import Utterance
-from engage_hri.services.client.feeds import Feed
+from engage_hri.services.client.feeds import ActionFeed, Feed
 from engage_hri.services.client.studied import Studied
+from engage_hri.services.requests.ends import Requester
 
 MOST = 256
 """Number of utterances that are remembered."""
@@ -36,9 +38,19 @@ class NewWords:
 
 
 class Hearing(Studied):
-    """The part of `Robot` that tells what people say."""
+    """The part of `Robot` that tells what people say, and what they and the robot do."""
 
     _words: NewWords
+    _requests: Requester
+
+    def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
+        """Follow the actions of the robot and of people as they are seen, and the coming and going of people.
+
+        It begins with the people who are there and with what goes on now. What a program told that was killed is over
+        after 4 s: its people go, and their actions end.
+        """
+        self._requests.check()
+        return ActionFeed(self._bus)
 
     def utterances(self) -> Feed[Utterance]:
         """Follow the words of people: partial results, final ones, corrections, as perception tells them."""

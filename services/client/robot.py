@@ -18,7 +18,6 @@ from typing import Any, Literal, get_args
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner, Inhibit
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
 from engage_hri.schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
@@ -263,10 +262,6 @@ class Robot(Hearing):
             return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
         self._requests.check()
         return NewFeed(self._bus, Feedback.__args__, (keys.ANY_FEEDBACK,))
-
-    def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
-        """Follow the actions of the robot and of people as they are seen, and the coming and going of people."""
-        return self._feed((ActionBegan, ActionEnded, ActorFound, ActorLost), keys.ANY_ACTION)
 
     def faults(self) -> Feed[Fault]:
         """Follow the faults that services tell of: bad messages, and errors while one was taken."""

@@ -5,6 +5,7 @@ from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondi
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.faulting import Faulting
 from engage_hri.services.client.feeds import Feed
+from engage_hri.services.client.results import in_time
 
 
 class Studied(Faulting):
@@ -31,3 +32,14 @@ class Studied(Faulting):
     def conditions(self) -> Feed[StudyCondition]:
         """Follow the condition: the one in force now, and each that begins."""
         return self._feed((StudyCondition,), keys.STUDY_CONDITION)
+
+    async def condition(self, timeout: Seconds | None = None) -> StudyCondition:
+        """Return the condition that is in force now; waits for generation.
+
+        timeout: seconds to wait; None: for ever.
+
+        Raises:
+            NoReply: none within `timeout`.
+        """
+        with self.conditions() as feed:
+            return in_time(await feed.next(timeout), "condition of a study", timeout)

@@ -3,15 +3,18 @@
 The file is loaded when its command is called. The list of all commands needs only the table here.
 """
 
+import gc
 import inspect
 import sys
 from importlib import import_module
 from io import TextIOWrapper
+from math import isnan
 from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.ends import exit_code
 
@@ -37,6 +40,8 @@ COMMANDS = {
     "Exit 2 if it is not being performed.",
     "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. "
     "Exit 2 if it cannot play them.",
+    "condition": "Begin a condition of a study on a running robot, or tell which one is in force. "
+    "Exit 2 if the name is too long.",
     "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate body). "
     "Exit 2 if nobody sees where it points.",
     "hostile": "Attack the whole robot, in memory and virtual time only. "
@@ -60,6 +65,12 @@ def command(name: str) -> Any:
     def run(**given: Any) -> None:
         # Other commands show faults themselves, as they come on the bus.
         logs.configure(given.get("log"), given.get("log_level") or (), alerts=name in ("run", "up"))
+        if not gc.isenabled():  # `services/__main__.py` has switched it off; what has been loaded stays
+            gc.freeze()
+            gc.enable()
+        for option, value in given.items():
+            if isinstance(value, float) and isnan(value):  # it is within all bounds, as Typer compares
+                raise InputRefused(Fault(reason="nan is not a number", where=f"--{option.replace('_', '-')}"))
         raise typer.Exit(module.main(module.Options(**given)))
 
     run.__signature__ = inspect.Signature([taken[option] for option in names])  # type: ignore[attr-defined]

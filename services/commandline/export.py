@@ -9,7 +9,6 @@ from urllib.parse import quote
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.process import DONE
 
@@ -43,9 +42,9 @@ class Options:
         Path | None, typer.Option(metavar="FILE", help="Another name for the one file.", show_default=False)
     ] = None
     speed: Annotated[float, typer.Option(metavar="X", min=0.1, max=100, help="Of the film.")] = 1.0
-    until: Annotated[
-        Seconds | None, typer.Option(metavar="S", min=0, help="End of the film.", show_default=False)
-    ] = None
+    until: Annotated[float | None, typer.Option(metavar="S", min=0, help="End of the film.", show_default=False)] = (
+        None
+    )
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False
 
 

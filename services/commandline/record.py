@@ -12,7 +12,6 @@ import typer
 
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.kept import needed
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.patient import complain
@@ -39,7 +38,7 @@ class Options(Connected):
         list[str] | None, typer.Option(metavar="TEXT", help="Anything worth knowing later; may be repeated.")
     ] = None
     seconds: Annotated[
-        Seconds | None, typer.Option(metavar="S", min=0, help="End by itself after so long.", show_default=False)
+        float | None, typer.Option(metavar="S", min=0, help="End by itself after so long.", show_default=False)
     ] = None
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if there is one.")] = False
     repair: Annotated[

@@ -39,7 +39,7 @@ class Options(Listening):
     speed: Annotated[float, typer.Option(metavar="X", min=0.01, max=100, help="Times as fast as it was.")] = 1.0
     at: Annotated[Seconds, typer.Option(metavar="S", min=0, help="Begin at this time of the recording.")] = 0.0
     until: Annotated[
-        Seconds | None, typer.Option(metavar="S", min=0, help="End at this time of it.", show_default=False)
+        float | None, typer.Option(metavar="S", min=0, help="End at this time of it.", show_default=False)
     ] = None
     commands: Annotated[
         bool, typer.Option("--commands", help="Say commands, too. A robot that hears them moves.")

@@ -7,14 +7,11 @@ killed.
 
 from collections.abc import Callable, Iterator
 
-from msgspec.structs import replace
-
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
+from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
-from engage_hri.services.runtime.reports import GoesOn, Told
 from engage_hri.services.runtime.world_report import WorldReport
 
 
@@ -48,7 +45,7 @@ class Heard:
     def advance(self, now: Seconds) -> Iterator[tuple[Message, Seconds]]:
         """Let time pass: what was said by somebody who was killed is over at some time."""
         self._now = max(self._now, now)
-        yield from self._shown(self._reports.advance(self._now))
+        yield from events(self._reports.advance(self._now), self._clock)
         if (world := self._world.advance(self._now)) is not None:
             yield world, self._now
 
@@ -59,18 +56,10 @@ class Heard:
         told = self._reports.take(one.message, one.key, one.source, one.life, self._now, past=one.past)
         if not isinstance(one.message, ActionEvent):
             yield one.message, self._told(one.message, one.at)
-        yield from self._shown(told)
+        yield from events(told, self._clock)
         world = self._world.take(one.message, one.source, one.life, self._now)
         if world is not None and world is not one.message:
             yield world, self._now
-
-    def _shown(self, told: list[Told]) -> Iterator[tuple[Message, Seconds]]:
-        for observation, at, is_sure in told:
-            if isinstance(observation, GoesOn):
-                if observation.began.action != "speak":  # nobody heard where these words began
-                    yield observation.began, observation.since
-            else:
-                yield observation if is_sure else replace(observation, at=Stamp(self._clock, at)), at
 
     def _instant(self, stamp: Stamp) -> Seconds:
         at = self._local(stamp, self._now)

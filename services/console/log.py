@@ -17,7 +17,7 @@ from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
-from engage_hri.services.console.view import OWN_BLOCKS, Scene
+from engage_hri.services.console.view import OWN_BLOCKS, Scene, is_again
 
 NOTICED: Seconds = 0.1
 """Time for which something is held that is told with it."""
@@ -84,7 +84,7 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
         case BlockProgress(progress="end", block=str() as block) if not block.startswith(OWN_BLOCKS):
             return f"block {block}: {message.status}"
         case WarningFeedback() if telling.warnings:
-            return wording.warning(message)
+            return None if is_again(before, message) else wording.warning(message)
         case Fault():
             return f"! {message.service or 'fault'}: {message}"
     return None

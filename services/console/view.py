@@ -26,9 +26,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.shelf import Shelf
 from engage_hri.services.runtime.in_force import InForce
 
-UTTERANCES_KEPT = 40
+UTTERANCES_KEPT = 160
 EVENTS_KEPT = 100
 NOTES_KEPT = 3
+WARNINGS_KEPT = 64
 ENDED_BLOCKS_KEPT = 2
 LOST_KEPT = 3
 """Number of people that are shown as gone: those who left last."""
@@ -110,6 +111,10 @@ class HoldInView(Struct, frozen=True):
     until: Seconds
 
 
+Warned = tuple[str | None, str, str]
+"""Block, kind and words of a warning."""
+
+
 class Scene(Struct, frozen=True, kw_only=True):
     """State of everything that is shown. robot: its actor id. began: the instant that counts as zero."""
 
@@ -130,6 +135,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     faults: tuple[BodyFault, ...] = ()
     study: InForce = InForce()
     """Condition of the study."""
+    warned: tuple[Warned, ...] = ()
+    """Warnings of behaviors of the last blocks: each again for another behavior is no news."""
     faults_by: str = ""
     """Participant that switched them; empty: the configuration."""
     realizer: str = ""
@@ -197,11 +204,27 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return replace(scene, faults=faults, faults_by=by)
         case Statistics(actor="", session=session):
             return replace(scene, session=session)
+        case WarningFeedback() if is_again(scene, message):
+            return scene
         case WarningFeedback(kind=kind, message=text):
+            if message.behavior:
+                scene = replace(scene, warned=(*scene.warned, _warned(message))[-WARNINGS_KEPT:])
             return _note(scene, f"{' '.join(filter(None, (kind, message.place)))}: {text}")
         case Fault():
             return _note(scene, f"{message.service or 'fault'}: {message}")
     return scene
+
+
+def is_again(scene: Scene, warning: WarningFeedback) -> bool:
+    """Tell whether another behavior of the same block has been warned of in the same words.
+
+    Who leaves in the middle of a turn is missed by every behavior that was for this person.
+    """
+    return bool(warning.behavior) and _warned(warning) in scene.warned
+
+
+def _warned(warning: WarningFeedback) -> Warned:
+    return (warning.block, warning.kind, warning.message)
 
 
 def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLost, at: Seconds) -> Scene:
@@ -273,6 +296,7 @@ def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
     assert message.block is not None
     if message.progress == "start":
         others = tuple(block for block in scene.blocks if block.id != message.block)
+        scene = replace(scene, warned=tuple(each for each in scene.warned if each[0] != message.block))
         return replace(scene, blocks=(*others, BlockInView(id=message.block, began=at)))
     blocks = [replace(block, status=message.status) if block.id == message.block else block for block in scene.blocks]
     return replace(scene, blocks=_without_old(blocks))

@@ -7,7 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +18,7 @@ from matplotlib.patches import Circle, Polygon
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity
+from engage_hri.services.recording.above import Frame, frame, outline, seen, together
 from engage_hri.services.recording.scenes import Scene
 
 if TYPE_CHECKING:
@@ -33,11 +34,11 @@ COLUMNS = 4
 def sheet(scenes: Sequence[Scene], format: str = "png") -> bytes:
     """Draw scenes beside one another, with the times and what is said."""
     rows = math.ceil(len(scenes) / COLUMNS)
-    figure = Figure(figsize=(3.6 * COLUMNS, 3.4 * rows), layout="constrained")
+    figure, in_view = Figure(figsize=(3.6 * COLUMNS, 4.4 * rows), layout="constrained"), _frame(scenes)
     axes = figure.subplots(rows, COLUMNS, squeeze=False)
     for number, place in enumerate(axes.flat):
         if number < len(scenes):
-            draw(place, scenes[number])
+            draw(place, scenes[number], in_view)
         else:
             place.set_axis_off()
     file = io.BytesIO()
@@ -45,24 +46,31 @@ def sheet(scenes: Sequence[Scene], format: str = "png") -> bytes:
     return file.getvalue()
 
 
-def pictures(scenes: Sequence[Scene], size: tuple[int, int] = (480, 400)) -> list["NDArray[np.uint8]"]:
+def pictures(scenes: Sequence[Scene], size: tuple[int, int] = (400, 560)) -> list["NDArray[np.uint8]"]:
     """Draw each scene as an array of height x width x 3, 0..255."""
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100)
-    canvas = FigureCanvasAgg(figure)
+    canvas, in_view = FigureCanvasAgg(figure), _frame(scenes)
     drawn = []
     for scene in scenes:
         figure.clear()
-        draw(figure.add_axes((0.02, 0.02, 0.96, 0.82)), scene)
+        draw(figure.add_axes((0.02, 0.02, 0.96, 0.86)), scene, in_view)
         canvas.draw()  # type: ignore[no-untyped-call]
         seen = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         drawn.append(seen[:, :, :3].copy())
     return drawn
 
 
-def draw(axes: Axes, scene: Scene) -> None:
-    """Draw a scene from above: the robot at the bottom looks up, its left is on the left."""
-    axes.set_xlim(0.9, -0.9)
-    axes.set_ylim(-0.35, 1.6)
+def _frame(scenes: Sequence[Scene]) -> Frame:
+    """Frame of all of these scenes, so that it stands still from one to the next."""
+    return together(
+        frame(scene.world.entities, [each.position for each in scene.world.people]) for scene in scenes if scene.world
+    )
+
+
+def draw(axes: Axes, scene: Scene, in_view: Frame) -> None:
+    """Draw a scene from above, as the map of the window has it. in_view: what is in the picture."""
+    axes.set_xlim(in_view.left, in_view.right)
+    axes.set_ylim(in_view.bottom, in_view.top)
     axes.set_aspect("equal")
     axes.set_axis_off()
     for entity in scene.world.entities if scene.world else ():
@@ -71,15 +79,13 @@ def draw(axes: Axes, scene: Scene) -> None:
         _ray(axes, scene, scene.body.gaze, scene.body.looking_at, GAZE)
         for target in scene.doing.get((scene.robot, "point"), ())[:1]:
             _ray(axes, scene, _pointing(scene, target), target, POINT)
-    axes.add_patch(Circle((0, 0), 0.09, color=ROBOT, zorder=3))
+    axes.add_patch(Circle(seen(*_face(scene)), 0.09, color=ROBOT, zorder=3))
     for (actor, action), targets in scene.doing.items():
         if actor != scene.robot and action in ("look", "point") and targets:
             start, end = _place(scene, actor), _place(scene, targets[0])
             if start is not None and end is not None:
                 color = GAZE if action == "look" else POINT
-                axes.plot(
-                    [start[1], end[1]], [start[0], end[0]], color=color, linewidth=1.5, linestyle="--", zorder=2
-                )
+                _line(axes, start, end, color=color, linewidth=1.5, linestyle="--")
     marks = [f"{actor} {action}s" for actor, action in scene.doing if action in ("speak", "nod", "shake")]
     lines = [f"{int(scene.at) // 60}:{scene.at % 60:04.1f}  {', '.join(marks)}"]
     if scene.caption:
@@ -90,33 +96,27 @@ def draw(axes: Axes, scene: Scene) -> None:
 
 
 def _entity(axes: Axes, entity: Entity) -> None:
-    x, y, _ = entity.position
+    place = seen(*entity.position[:2])
     if entity.kind == "person":
-        axes.add_patch(Circle((y, x), 0.09, color=PERSON, zorder=3))
+        axes.add_patch(Circle(place, 0.09, color=PERSON, zorder=3))
         axes.annotate(
-            entity.id, (y, x), ha="center", va="center", fontsize=6, color="white", zorder=4, parse_math=False
+            entity.id, place, ha="center", va="center", fontsize=6, color="white", zorder=4, parse_math=False
         )
         return
     if entity.kind == "hand":
-        axes.add_patch(Circle((y, x), 0.03, color=PERSON, alpha=0.6, zorder=3))
+        axes.add_patch(Circle(place, 0.03, color=PERSON, alpha=0.6, zorder=3))
         return
     color = entity.color if entity.color in _NAMED else "0.6"
     look = {"facecolor": "0.93", "edgecolor": "0.7", "zorder": 0} if entity.kind == "surface" else {
         "facecolor": color, "edgecolor": "black", "alpha": 0.8, "zorder": 1,
     }  # fmt: skip
     if entity.footprint:
-        turned = [_turned(corner, entity.yaw) for corner in entity.footprint]
-        axes.add_patch(Polygon([(y + dy, x + dx) for dx, dy in turned], closed=True, **look))
+        axes.add_patch(Polygon([seen(*corner) for corner in outline(entity)], closed=True, **look))
     else:
-        axes.add_patch(Circle((y, x), entity.radius or 0.03, **look))
+        axes.add_patch(Circle(place, entity.radius or 0.03, **look))
 
 
 _NAMED = ("red", "green", "blue", "yellow", "orange", "purple", "pink", "brown", "black", "white", "gray", "grey")
-
-
-def _turned(corner: tuple[float, float], yaw: float) -> tuple[float, float]:
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return cos * corner[0] - sin * corner[1], sin * corner[0] + cos * corner[1]
 
 
 def _pointing(scene: Scene, target: str) -> Ray | None:
@@ -141,12 +141,22 @@ def _ray(axes: Axes, scene: Scene, ray: Ray | None, target: str, color: str) -> 
     length = REACH if end is None else max(0.05, math.hypot(end[0] - start[0], end[1] - start[1]))
     flat = math.hypot(ray.axis[0], ray.axis[1]) or 1.0
     x, y = start[0] + ray.axis[0] / flat * length, start[1] + ray.axis[1] / flat * length
-    axes.plot([start[1], y], [start[0], x], color=color, linewidth=2.0, zorder=2)
+    _line(axes, (start[0], start[1]), (x, y), color=color, linewidth=2.0)
+
+
+def _line(axes: Axes, start: tuple[float, float], end: tuple[float, float], **look: Any) -> None:
+    axes.plot(*zip(seen(*start), seen(*end), strict=True), zorder=2, **look)
+
+
+def _face(scene: Scene) -> tuple[float, float]:
+    """Place of the robot's face, where its looks begin."""
+    gaze = scene.body.gaze if scene.body is not None else None
+    return (0.0, 0.0) if gaze is None else (gaze.origin[0], gaze.origin[1])
 
 
 def _place(scene: Scene, id: str) -> tuple[float, float] | None:
     if id == scene.robot:
-        return (0.0, 0.0)
+        return _face(scene)
     found = scene.world.entity(id) if scene.world and id else None
     return None if found is None else (found.position[0], found.position[1])
 

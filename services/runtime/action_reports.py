@@ -9,7 +9,9 @@ left to tell that this person has gone. `Reporters` tells it.
 """
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
@@ -17,7 +19,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent
 from engage_hri.services.runtime.reporters import Reporters
-from engage_hri.services.runtime.reports import Told
+from engage_hri.services.runtime.reports import GoesOn, Told
 
 REPORT_GRACE: Seconds = 4.0
 """Time for which what a reporter said holds after it has vanished, where no configuration says otherwise."""
@@ -75,6 +77,19 @@ class ActionReports:
             if len(self._strangers) > STRANGERS_KEPT:
                 self._strangers.popitem(last=False)
         return name, ""
+
+
+def events(told: Iterable[Told], clock: str) -> Iterator[tuple[ActionEvent, Seconds]]:
+    """Events for readers that know nothing of reporters, each with its local time. clock: that of local time.
+
+    An action that goes on is told as begun. Of a speech that goes on nothing is told: nobody heard its beginning.
+    """
+    for observation, at, is_sure in told:
+        if isinstance(observation, GoesOn):
+            if observation.began.action != "speak":
+                yield observation.began, observation.since
+        else:
+            yield observation if is_sure else replace(observation, at=Stamp(clock, at)), at
 
 
 def is_proper(message: ActionEvent | OngoingActions, key: str, source: str, robot: str) -> bool:

@@ -78,7 +78,7 @@ class Story:
             self._make_wire_bad(hub)
 
     def _make_wire_bad(self, hub: ZenohHub) -> None:
-        """What is published is lost at times before any reader of this process gets it, or is slow from one sender."""
+        """Lose what is published at times before any reader of this process gets it, or delay it for one sender."""
         came, loop = hub.readers._sample_came, asyncio.get_running_loop()
         wires: dict[str, deque[tuple[str, Arrived]]] = defaultdict(deque)
 

@@ -10,7 +10,21 @@ from tests.console.browser import waited
 from tests.console.test_window import URL, engage
 
 FOLDER = Path(__file__).parents[2] / "docs" / "console"
+PLACE = 27.5
+"""Place in the recording, in seconds: the robot points."""
 SIZES = ((1920, 1200), (1280, 1000), (400, 1400))
+
+
+async def take_recording(url: str, port: int) -> None:
+    """Go to a place in a recording, and take a picture there."""
+    async with browser.at_port(port) as running, running.page() as page:
+        await page.look(1280, 800)
+        await page.go(url)
+        await page.until("window.engage?.state.place?.at > 0.5", 60)
+        await page.value(f"window.engage.send({{ do: 'play', on: false, at: {PLACE} }})")
+        await page.until(f"window.engage.state.place.at === {PLACE}")
+        await page.value("new Promise((done) => setTimeout(done, 1500))")
+        (FOLDER / "recording.png").write_bytes(await page.picture(whole=False))
 
 
 async def take(url: str, port: int) -> None:
@@ -42,10 +56,14 @@ def main() -> None:
         folder = Path(name)
         up = ("up", "--task", "--in-one", "--listen", endpoint)
         console = ("console", "--connect", endpoint, "--port", "0", "--role", "wizard")
-        with engage(folder / "console", *console) as window, engage(folder / "up", *up):
-            url = waited(window, folder / "console", URL)
-            with browser.running(folder) as port:
-                asyncio.run(take(url, port))
+        file = folder / "session.mcap"
+        with browser.running(folder) as port:
+            with engage(folder / "console", *console) as window, engage(folder / "up", *up):
+                url = waited(window, folder / "console", URL)
+                with engage(folder / "record", "record", str(file), "--connect", endpoint):
+                    asyncio.run(take(url, port))
+            with engage(folder / "recorded", "console", "--recording", str(file), "--port", "0") as window:
+                asyncio.run(take_recording(waited(window, folder / "recorded", URL), port))
 
 
 if __name__ == "__main__":

@@ -96,7 +96,15 @@ async def test_a_panel_that_fails_stops_neither_the_others_nor_the_next_frames(p
     async with opened(place) as page:
         await page.value("void (window.engage.drawn[0].take = () => { throw new Error('broken panel'); })")
         await page.value("void (window.engage.drawn[1].tick = () => { throw new Error('broken clock'); })")
-        word = {"actor": "robot", "since": 1.0, "words": "still here", "open": False}
+        word = {
+            "actor": "robot",
+            "since": 1.0,
+            "words": "still here",
+            "open": False,
+            "settled": 10,
+            "left": [],
+            "state": "",
+        }
         await take(page, sections={"words": [word]})
         await page.until("document.querySelector('.words').textContent.includes('still here')")
         frames = "Number(document.querySelector('.window').dataset.frames)"

@@ -147,7 +147,8 @@ def test_the_owner_of_the_head_has_its_reason_and_those_who_wait_have_theirs() -
     head = section(made, "head")
 
     assert (head["since"], head["owner"]["reason"]) == (2.5, "ref-2")
-    assert head["waiting"] == [{"kind": "face", "priority": 6, "target": "ann", "reason": "spoken to last"}]
+    assert (head["owner"]["does"], head["owner"]["why"]) == ("look at blue", "this belongs to what it is saying")
+    assert [(each["target"], each["why"]) for each in head["waiting"]] == [("ann", "it spoke to this person last")]
 
 
 def test_an_event_keeps_its_decision_when_its_shared_phase_is_over() -> None:

@@ -5,6 +5,7 @@ import importlib.util
 
 import pytest
 
+from engage_hri.services.recording.above import seen
 from tests.console.browser import Page
 from tests.console.test_window import Place, needs_browser, opened, press, sit
 from tests.console.test_window import place as place  # a fixture
@@ -142,9 +143,7 @@ async def test_a_screen_reader_hears_what_was_said_once_and_each_news_once(place
         await page.value(watch)
         await page.value("document.querySelector('#wizard-tell').value = 'Three words here'")
         await press(page, "Say it", "#wizard")
-        await page.until(
-            "document.querySelector('#said [role=status]').textContent.includes('robot: Three words here')"
-        )
+        await page.until("document.querySelector('#said [role=log]').textContent.includes('robot: Three words here')")
         heard = await page.value("window.heard")
 
         assert sum("says 16 characters" in each for each in heard) == 1
@@ -155,6 +154,82 @@ async def test_a_screen_reader_hears_what_was_said_once_and_each_news_once(place
             "told",
             "unseen",
         }  # nothing that runs on by itself
+
+
+@needs_browser
+async def test_a_turn_is_one_bubble_with_what_was_stopped_apart_and_each_word_is_read_once(place: Place) -> None:
+    watch = """window.read = [];
+      new MutationObserver((changes) => changes.forEach(({ addedNodes }) =>
+        addedNodes.forEach((node) => window.read.push(node.textContent))))
+        .observe(document.querySelector('#said [role=log]'), { childList: true })"""
+    last = "document.querySelector('.words li:last-child')"
+    async with opened(place) as page:
+        await sit(page, "tia")
+        await page.value(watch)
+        await page.until(
+            "[...document.querySelector('#wizard-target').options].some((each) => each.value === 'blue-square')"
+        )
+        words = (
+            "Now look carefully at " + "this and " * 60 + "that"
+        )  # half a minute, so that even a slow page holds it
+        await page.value(f"document.querySelector('#wizard-tell').value = '{words}'")
+        await page.value("document.querySelector('#wizard-target').value = 'blue-square'")
+        await press(page, "Say it", "#wizard")
+        await page.until(f"{last}.querySelector('.text').textContent.includes('Now look')")
+        await page.value("window.engage.send({ do: 'steer', to: 'hold' })")
+        await page.until(f"{last}.querySelector('.left.held')?.textContent.includes('held, still to come:')")
+        await page.value("window.engage.send({ do: 'steer', to: 'continue' })")
+        await page.until(f"!{last}.querySelector('.left')")
+        await page.value("window.engage.send({ do: 'steer', to: 'stop' })")
+        await page.until(f"{last}.querySelector('.left.stopped')?.textContent.includes('stopped, not said:')")
+        await page.until("window.read.some((each) => each.includes('not said'))")
+
+        shown = (await page.value(f"{last}.querySelector('.text').textContent")).split()
+        read = (await page.value("window.read.join(' ')")).replace(".", "").split()
+        assert read == ["robot:", *shown]
+        mark = shown.index("stopped,")
+        assert shown[mark : mark + 3] == ["stopped,", "not", "said:"]
+        assert [*shown[:mark], *shown[mark + 3 :]] == [*words.split(), "the", "square"]
+        assert await page.value("document.querySelectorAll('.words .left').length") == 1
+
+
+@needs_browser
+async def test_who_sits_down_by_the_keyboard_keeps_the_focus_and_buttons_answer(place: Place) -> None:
+    focus = "document.activeElement.textContent"
+    async with opened(place) as page:
+        await page.until("document.querySelector('#part .there').textContent.includes('before the robot')")
+        await page.value("document.querySelector('#your-name').value = 'yan'")
+        await page.value("document.querySelector('#part button[type=submit]').focus()")
+        await page.value("document.querySelector('#part button[type=submit]').click()")
+        assert await page.value("document.querySelector('#part button[type=submit]').textContent") == "Sitting down…"
+        await page.until(f"window.engage.state.you.person === 'yan' && {focus} === 'Look at the robot'")
+
+        await press(page, "Stop", "#wizard")
+        await page.until("document.querySelector('#wizard .told').textContent.includes('nothing is being performed')")
+        await press(page, "Leave", "#part")
+        await page.until("document.querySelector('#part button[type=submit]').checkVisibility()")
+
+
+@needs_browser
+async def test_who_may_not_sit_down_is_told_and_may_try_again(place: Place) -> None:
+    seat = "document.querySelector('#part button[type=submit]')"
+    async with opened(place) as page:
+        await page.value("document.querySelector('#your-name').value = 'blue-square'")
+        await page.value(f"{seat}.click()")
+        await page.until("document.querySelector('#part .told').textContent.includes('blue-square')")
+        await page.until(f"{seat}.getAttribute('aria-disabled') === null")
+
+
+@needs_browser
+async def test_the_map_shows_things_where_the_pictures_of_a_recording_do(place: Place) -> None:
+    drawn = "document.querySelector('.map .object[data-id=blue-square]').getAttribute('points')"
+    corners = "window.engage.state.scene.things.find((each) => each.id === 'blue-square').outline"
+    async with opened(place) as page:
+        await page.until(f"{drawn}.length")
+        points, outline = await page.value(f"[{drawn}, {corners}]")
+
+        shown = [tuple(float(number) / 1000 for number in each.split(",")) for each in points.split()]
+        assert shown == [pytest.approx(seen(x, y), abs=1e-3) for x, y in outline]
 
 
 @needs_browser

@@ -11,11 +11,19 @@ from rich.console import Console
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.feedback import (
+    BlockProgress,
+    PlannedPoint,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.console import tally, view
+from engage_hri.services.console.log import Telling, line
 from engage_hri.services.console.render import render
+from engage_hri.services.console.web.picture import Picture
 from tests.console.scenes import SCENE, at, event, fed
 
 
@@ -93,6 +101,23 @@ def test_the_arbiters_own_blocks_are_not_shown(scene: view.Scene) -> None:
     )
 
     assert after == msgspec.structs.replace(scene, now=12.5)
+
+
+def test_a_warning_in_the_same_words_for_another_behavior_of_a_block_is_no_news(scene: view.Scene) -> None:
+    def warning(behavior: str, block: str = "b") -> WarningFeedback:
+        text = "'human' has gone"
+        return WarningFeedback(block=block, behavior=behavior, kind="CANNOT_CREATE_BEHAVIOR", message=text)
+
+    lines, picture = [], Picture("robot", 10.0)
+    start = BlockProgress(block="b", progress="start", at=at(14.0))
+    for message in (warning("e1"), warning("e2"), warning("turn"), warning("e", "c"), start, warning("e1")):
+        before, scene = scene, view.feed(scene, message, 13.0)
+        lines.append(line(message, before, scene, 13.0, Telling()))
+        picture.feed(message, 13.0, 13.0)
+
+    places = ["b:e1", "c:e", "b:e1"]
+    assert [text.split()[3] for text in lines if text] == [f"{place}:" for place in places]
+    assert [note.text.split()[1] for note in picture._notes] == [f"{place}:" for place in places]
 
 
 def test_only_the_last_ended_blocks_are_kept(scene: view.Scene) -> None:

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Wait
-from engage_hri.schemas.blocks import Block, BlockOutcome, Composition
+from engage_hri.schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlanned, NetWaiting
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
@@ -387,3 +387,14 @@ async def test_a_block_that_is_over_holds_the_tokens_that_it_began_with_though_a
     assert watcher.is_over
     assert "e:start" in watcher.under_way(watcher.seen[-2])
     assert watcher.seen[-1] == watcher.initial()
+
+
+async def test_the_net_has_the_words_that_the_block_is_to_say_and_what_it_follows() -> None:
+    watcher, _ = await watched(block((GAZE, SPEECH)))
+    assert [(each.behavior, each.text) for each in watcher.plans[0].speeches] == [("speech-1", "This can?")]
+    async with stage() as seen, watching(seen, follower := Watcher("second")):
+        first = seen.ask(block((SPEECH,)))
+        request = PerformBlock(id="r-2", block=replace(block((SPEECH,)), id="second"), follows=("b",))
+        await seen.requests.send(keys.BLOCK, request).outcome
+        await first.outcome
+    assert follower.plans[0].follows == ("b",)

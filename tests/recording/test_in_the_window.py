@@ -116,7 +116,8 @@ async def test_a_recording_is_scrubbed_in_a_browser(anchor: Anchor, tmp_path: Pa
             await page.until("window.engage.state.place.at === 5")
             assert await page.value("JSON.stringify(window.engage.state.scene.things)") != later
             await page.value("window.engage.send({ do: 'look', target: 'robot' })")
-            await page.until("window.engage.state.told?.some((each) => each.text.includes('this is a recording'))")
+            told = "document.querySelector('.player .told')"
+            await page.until(f"{told}.checkVisibility() && {told}.textContent.includes('this is a recording')")
             assert await page.value(
                 "document.querySelector('#part').hidden && document.querySelector('.away').hidden"
             )

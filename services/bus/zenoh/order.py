@@ -299,7 +299,7 @@ class Follower:
 class NewestStates:
     """The newest value of each state that a subscription has got, of whichever process, and when it was sent.
 
-    Several processes may publish one state, as the world. Each has a wire of its own, and hands out its own last value at
+    Several processes may publish one state, as the world. Each has a link of its own, and hands out its last value at
     its own pace: the oldest of these may come last.
     """
 

@@ -14,9 +14,12 @@ HEARTBEAT: Seconds = 1.0
 
 
 class Told(Struct, frozen=True):
-    """News of an order for who gave it. panel: where it was given: the seat (`part`), or the robot by hand."""
+    """News of an order for who gave it.
 
-    panel: Literal["part", "wizard"]
+    panel: where it was given: the seat (`part`), the robot by hand (`wizard`), or the bar of a recording (`player`).
+    """
+
+    panel: Literal["part", "wizard", "player"]
     text: str
 
 
@@ -51,12 +54,16 @@ class Place(Struct, frozen=True):
 class You(Struct, frozen=True):
     """The one who looks at a page.
 
-    person: id of the person that they are; empty: none. denied: rights that they do not have, with the reason.
+    person: id of the person that they are; empty: none. there: who sits before the robot already, in words, and what
+    that means for somebody who sits down. sit: what the button for that says. denied: rights that they do not have,
+    with the reason.
     script: titles of the prepared fragments. faults: kinds of faults that the body can play. inhibits: they keep the
     gaze now.
     """
 
     person: str = ""
+    there: str = ""
+    sit: str = ""
     denied: dict[str, str] = {}
     script: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()

@@ -83,11 +83,11 @@ def _warnings(status: Status) -> list[str]:
 
 def _facts(status: Status) -> list[str]:
     up = status.at.seconds - status.joined.seconds
-    facts = [f"up {up:.0f} s", f"{status.bus.passed} messages in"]
+    facts = [f"up {up:.0f} s", f"{status.bus.passed} messages received"]
     if status.bus.lag >= STOOD:
         facts.append(f"once stood still for {status.bus.lag:.2f} s")
     if status.process.host:
-        facts.append(status.process.host)
+        facts.append(f"on {status.process.host}")
     if status.process.loop:
         facts.append(f"Python {status.process.python}, {status.process.loop}")
     return facts

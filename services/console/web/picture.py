@@ -12,8 +12,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.body import Capabilities, RobotState, WordSpoken
+from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
@@ -31,8 +31,10 @@ from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import net_layout, scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
+from engage_hri.services.console.web.looking import plainly
 from engage_hri.services.console.web.measures import Measures
-from engage_hri.services.console.web.sections import Choice, ClaimShown, HeadSection, Note, Switched, Utterance
+from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, Utterance
+from engage_hri.services.console.web.turns import Turns
 
 CHOICES_KEPT = 40
 NOTES_KEPT = 40
@@ -69,6 +71,7 @@ class Picture:
         self._head_since = began
         self._events = EventLanes()
         self._blocks = BlockLanes()
+        self._turns = Turns()
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
@@ -89,6 +92,12 @@ class Picture:
         return self._world or World(entities=())
 
     @property
+    def present(self) -> tuple[str, ...]:
+        """Ids of the people who are there, and have a place."""
+        gone = {each.id for each in self._scene.actors if not each.present}
+        return tuple(each.id for each in self.world.people if each.id not in gone)
+
+    @property
     def body(self) -> Capabilities | None:
         """The body as it described itself; None: not yet."""
         return self._body
@@ -106,6 +115,7 @@ class Picture:
     def feed(self, message: Message, at: Seconds, now: Seconds) -> None:
         """Take a message. at: local instant that it tells of. now: local time, which never goes back."""
         self.now = max(self.now, now)
+        is_again = isinstance(message, WarningFeedback) and view.is_again(self._scene, message)
         self._see(message, at)
         match message:
             case World():
@@ -139,7 +149,8 @@ class Picture:
                     self._take_presence(message, at)
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
-        self._note(message, at)
+        if not is_again:
+            self._note(message, at)
 
     def _see(self, message: Message, at: Seconds) -> None:
         before = self._scene
@@ -147,7 +158,8 @@ class Picture:
         if self._scene.owner != before.owner:
             self._head_since = at
             self._changed("head")
-        if isinstance(message, WordSpoken) or self._scene.said != before.said:
+        is_news = self._turns.feed(message, at)
+        if is_news or self._scene.said != before.said or self._scene.held != before.held:
             self._changed("words")
         if self._scene.actors != before.actors:
             self._changed("scene")
@@ -284,16 +296,15 @@ class Picture:
         return made[name]()
 
     def _words(self) -> list[Utterance]:
-        said = sorted(self._scene.said, key=lambda each: each.began)
-        return [Utterance(each.actor, self.zero(each.began), each.text, each.open) for each in said]
+        holds = [each.hold for each in self._scene.held]
+        return self._turns.shown(self._scene.said, holds, self.zero)
 
     def _head(self) -> HeadSection:
-        def shown(claim: Claim) -> ClaimShown:
-            return ClaimShown(claim.kind, claim.priority, claim.target, claim.reason)
-
         owner = self._scene.owner
-        waiting = tuple(map(shown, self._scene.waiting))
-        return HeadSection(None if owner is None else shown(owner), self.zero(self._head_since), waiting)
+        waiting = tuple(plainly(claim, self.world) for claim in self._scene.waiting)
+        return HeadSection(
+            None if owner is None else plainly(owner, self.world), self.zero(self._head_since), waiting
+        )
 
     def _switched(self) -> Switched:
         held = tuple(wording.held(each.hold) for each in self._scene.held)

@@ -1,12 +1,11 @@
 """The scene in space: the world as perception tells it, the robot's body, and who does what. Pure."""
 
-import math
-
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.units import Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
-from engage_hri.services.console.web.sections import Arm, Body, Person, SceneSection, Thing
+from engage_hri.services.console.web.sections import Above, Arm, Body, Person, SceneSection, Thing
+from engage_hri.services.recording import above
 
 HALF_ANGLE: Radians = 0.1
 """Half the angle of the gaze cone of a body that has not said its own."""
@@ -17,22 +16,27 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
     entities = world.entities if world is not None else ()
     people = {entity.id: entity.position for entity in entities if entity.kind == "person"}
     actors = [actor.id for actor in scene.actors if actor.id != scene.robot and actor.present]
+    shown = tuple(_person(scene.actor(id), people.get(id)) for id in dict.fromkeys((*people, *actors)))
+    edges = above.frame(entities, [each.at for each in shown if each.at is not None and each.present])
     return SceneSection(
         robot=scene.robot,
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,
         things=tuple(_thing(entity) for entity in entities if entity.kind != "person"),
-        people=tuple(_person(scene.actor(id), people.get(id)) for id in dict.fromkeys((*people, *actors))),
+        people=shown,
+        above=Above(above.RIGHT, above.DOWN, above.Frame(*map(_short, edges))),
     )
 
 
+def label(entity: Entity) -> str:
+    """Name of a thing for people: its own, else its color and what it is, else its id."""
+    return entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
+
+
 def _thing(entity: Entity) -> Thing:
-    x, y, _ = entity.position
-    cos, sin = math.cos(entity.yaw), math.sin(entity.yaw)
-    outline = [(_short(x + cos * u - sin * v), _short(y + sin * u + cos * v)) for u, v in entity.footprint]
-    label = entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
+    outline = [(_short(x), _short(y)) for x, y in above.outline(entity)]
     return Thing(
         entity.id, entity.kind, _place(entity.position), _short(entity.yaw), tuple(outline), _short(entity.radius),
-        entity.color, label, entity.owner,
+        entity.color, label(entity), entity.owner,
     )  # fmt: skip
 
 

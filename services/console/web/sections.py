@@ -71,31 +71,62 @@ class Body(Struct, frozen=True):
     joints: dict[str, float]
 
 
+class Above(Struct, frozen=True):
+    """The view from above. right, down: parts of x and y in what is to the right and down in it.
+
+    frame: its left, upper, right and lower edge, in metres.
+    """
+
+    right: Point
+    down: Point
+    frame: tuple[Meters, Meters, Meters, Meters]
+
+
 class SceneSection(Struct, frozen=True):
-    """Scene in space. robot: its actor id. body: None: nothing is known of it yet."""
+    """Scene in space. robot: its actor id. body: None: nothing is known of it yet. above: its view from above."""
 
     robot: str
     body: Body | None
     things: tuple[Thing, ...]
     people: tuple[Person, ...]
+    above: Above
+
+
+class Left(Struct, frozen=True):
+    """Words of a turn that were not said. before: characters of the words that were said before them."""
+
+    before: int
+    words: str
 
 
 class Utterance(Struct, frozen=True):
-    """Words of an actor, as far as they are said. words: empty: they are not known."""
+    """A turn of an actor, as far as it is said. words: empty: they are not known. open: it goes on.
+
+    settled: characters of the words that will not change any more. left: words that were not said, or not yet.
+    state: why words are left: `held`, `stopped`, `failed`, `lost` with the realizer; `left`: it went on without them.
+    """
 
     actor: str
     since: Seconds
     words: str
     open: bool
+    settled: int
+    left: tuple[Left, ...] = ()
+    state: str = ""
 
 
 class ClaimShown(Struct, frozen=True):
-    """A claim on the head, with the reason."""
+    """A claim on the head, with the reason.
+
+    does, why: the same in plain words: `look at ann`, and `it spoke to this person last`.
+    """
 
     kind: str
     priority: int
     target: str
     reason: str
+    does: str
+    why: str
 
 
 class HeadSection(Struct, frozen=True):

@@ -187,7 +187,7 @@ async def _show_recording(recording: Recording, browser: WebSocket) -> None:
         try:
             order = orders.decoded_in_recording(text)
         except InputRefused as error:
-            told.append(Told("part", str(error)))
+            told.append(Told("player", str(error)))
             return False
         if isinstance(order, orders.Play):
             at = now()

@@ -9,15 +9,17 @@ from contextlib import asynccontextmanager
 from itertools import count
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.bus.interface import Bus, Hub, Subscription
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.console.follow import FOLLOWED, following
+from engage_hri.services.console.web.company import Invitation, invitation
 from engage_hri.services.console.web.health import NOTABLE
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.script import Script
@@ -52,6 +54,8 @@ class Window:
         self.viewers = 0
         self.listeners: set[Callable[[Message], None]] = set()
         self._here: set[str] = set()
+        self._reporters: dict[str, str] = {}
+        """Participant that tells of each person."""
         self._numbers = count(1)
 
     def __call__(self, message: Message, at: Seconds) -> None:
@@ -65,6 +69,17 @@ class Window:
         self.picture.feed(message, at, self.bus.now())
         for listener in self.listeners:
             listener(message)
+
+    @property
+    def invitation(self) -> Invitation:
+        """Invitation to who may sit down."""
+        return invitation(self.picture.present, self._reporters, self._here)
+
+    async def note_reporters(self, reports: Subscription) -> None:
+        """Note who tells of whom, until the subscription is closed."""
+        async for received in reports:
+            if isinstance(received.message, OngoingActions):
+                self._reporters[received.message.actor] = keys.reporter_of(received.key)
 
     def new_id(self) -> str:
         """Make an id for a fragment that somebody makes at the page."""
@@ -129,9 +144,12 @@ async def window(hub: Hub, bus: Bus, script: Script, *, keyed: bool = False) -> 
 @asynccontextmanager
 async def _following(shown: Window) -> AsyncIterator[None]:
     async with following(shown.bus, (shown,), patterns=PATTERNS):
-        looking = asyncio.create_task(shown.look_after(), name="status")
-        try:
-            yield
-        finally:
-            looking.cancel()
-            await asyncio.wait([looking])
+        with shown.bus.subscribe(keys.ANY_PERCEIVED_ONGOING) as reports:
+            looking = asyncio.create_task(shown.look_after(), name="status")
+            noting = asyncio.create_task(shown.note_reporters(reports), name="who tells of whom")
+            try:
+                yield
+            finally:
+                looking.cancel()
+                noting.cancel()
+                await asyncio.wait([looking, noting])

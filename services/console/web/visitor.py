@@ -18,6 +18,7 @@ from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.perceive import check_id, perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
+from engage_hri.services.console.web.company import Invitation
 from engage_hri.services.console.web.frames import Told, You
 from engage_hri.services.console.web.laying import laid
 from engage_hri.services.console.web.seats import SETTLED
@@ -48,8 +49,11 @@ class Visitor:
     @property
     def you(self) -> You:
         body = self._window.picture.body
+        invited = Invitation("", "") if self._person else self._window.invitation
         return You(
             person=self._person.id if self._person else "",
+            there=invited.there,
+            sit=invited.button,
             denied=self._denied,
             script=self._window.script.titles,
             faults=body.faults if body else (),
@@ -189,11 +193,11 @@ class Visitor:
             case orders.InhibitGaze():
                 self._lets_go.set()
             case orders.SteerOrder(to="hold"):
-                self._drives(_done(robot.hold(timeout=PATIENCE)))
+                self._drives(self._steered("held", robot.hold(timeout=PATIENCE)))
             case orders.SteerOrder(to="continue"):
-                self._drives(_done(robot.resume(timeout=PATIENCE)))
+                self._drives(self._steered("goes on", robot.resume(timeout=PATIENCE)))
             case orders.SteerOrder(to="stop"):
-                self._drives(_done(robot.stop(timeout=PATIENCE)))
+                self._drives(self._steered("stopped", robot.stop(timeout=PATIENCE)))
             case orders.SwitchOrder(fault=fault, off=off):
                 switch = robot.switch_off if off else robot.switch_on
                 self._drives(_done(switch(fault, timeout=PATIENCE)))
@@ -212,6 +216,10 @@ class Visitor:
         outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
         if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
             self._tell("; ".join(problems), is_by_hand=True)
+
+    async def _steered(self, verb: str, work: Coroutine[Any, Any, tuple[str, ...]]) -> None:
+        blocks = await work
+        self._tell(f"{verb}: {', '.join(blocks) or 'nothing is being performed'}", is_by_hand=True)
 
     async def _inhibit(self, mode: Any, target: str) -> None:
         async with self._window.robot.inhibit_gaze(mode, target=target, timeout=PATIENCE):

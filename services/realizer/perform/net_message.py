@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetTransition
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetSpeech, NetTransition
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net.petri_net import Marking
 from engage_hri.services.realizer.perform.live_blocks import as_told
@@ -36,6 +37,11 @@ def described(
         places=tuple(places),
         marked=tokens(marking),
         fired=firings(fired),
+        speeches=tuple(
+            NetSpeech(behavior=as_told(each.id), text=each.text)
+            for each in plan.block.behaviors
+            if isinstance(each, Speech)
+        ),
     )
 
 

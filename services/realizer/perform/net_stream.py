@@ -28,12 +28,13 @@ AGAIN: Seconds = 2.0
 
 
 class NetStream(Observer):
-    """Publisher of one block's marking."""
+    """Publisher of one block's marking. follows: ids of the blocks before it in the same turn."""
 
-    def __init__(self, bus: Bus, block: str, spelling: Spelling) -> None:
+    def __init__(self, bus: Bus, block: str, spelling: Spelling, follows: tuple[str, ...] = ()) -> None:
         self._bus = bus
         self._block = block
         self._spelling = spelling
+        self._follows = follows
         self._fired: dict[int, Seconds] = {}
         """Transitions that have fired since the last message."""
         self._net: RunningNet | None = None
@@ -90,7 +91,7 @@ class NetStream(Observer):
         self._fired.clear()
         fired = {each: at - self._began for each, at in self._net.instants.items()}
         message = described(self._plan, self._bus.stamp(self._began), self._net.marking, fired, self._spelling)
-        self._bus.publish(keys.NET, replace(message, block=self._block))
+        self._bus.publish(keys.NET, replace(message, block=self._block, follows=self._follows))
         self._again.set(self._bus.now() + AGAIN)
 
     # -- what happens (see `Observer`) ---------------------------------------------------------------------------

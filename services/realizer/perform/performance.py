@@ -61,7 +61,7 @@ class BlockPerformance:
         self.futures = SyncPointFutures()
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
         spelling = Spelling(plan.block, live.elsewhere)
-        self._net = NetStream(shared.bus, live.id, spelling)
+        self._net = NetStream(shared.bus, live.id, spelling, live.request.follows)
         self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}

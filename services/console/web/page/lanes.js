@@ -22,7 +22,7 @@ function lanes(panel, told, draw) {
       const rect = canvas.getBoundingClientRect();
       if (rect.bottom < 0 || rect.top > window.innerHeight) return;
       const { context, width, height } = sized(canvas);
-      const names = Math.min(190, Math.max(96, width * 0.24));
+      const names = Math.min(190, Math.max(112, width * 0.24));
       const narrow = width < 600;
       const [past, ahead] = narrow ? [PAST / 2, AHEAD / 2] : [PAST, AHEAD];
       const now = state.now();

@@ -1,67 +1,112 @@
 // Panels of text: words, the owner of the head, references, services, notes, and what is wrong.
-import { clock, element, seconds } from "./look.js";
+import { clock, element, prose, seconds } from "./look.js";
+
+// Why some words of a turn were not said, for who reads them apart from the others.
+const LEFT = {
+  held: "held, still to come:", stopped: "stopped, not said:", failed: "failed, not said:", lost: "broken off, not said:", left: "not said:",
+};
+
+// A turn: the words that were said, and between them those that were not, each apart.
+function turnWords(said) {
+  const parts = [];
+  let from = 0;
+  for (const { before, words: left } of said.left) {
+    parts.push(said.words.slice(from, before));
+    parts.push(element("span", { class: `left ${said.state}` }, element("span", { class: "mark" }, ` ${LEFT[said.state] ?? LEFT.left} `), element(said.state === "held" ? "span" : "s", {}, left)));
+    from = before;
+  }
+  return [...parts, said.words.slice(from)].filter(Boolean);
+}
 
 export function words(panel) {
   const list = panel.querySelector(".words");
-  const aloud = panel.querySelector("[role=status]");
-  const announced = new Set();
   let follows = true; // until somebody scrolls up
   list.addEventListener("scroll", () => (follows = list.scrollHeight - list.scrollTop - list.clientHeight < 40));
   new ResizeObserver(() => follows && (list.scrollTop = list.scrollHeight)).observe(list);
-  // A screen reader hears words once they have been said: while they come, it would begin anew with each.
-  function announce(said) {
-    const name = (each) => `${each.actor}|${each.since}`;
-    const news = said.filter((each) => !announced.has(name(each)));
-    announced.clear();
-    for (const each of said) announced.add(name(each));
-    if (news.length) aloud.textContent = news.slice(-2).map((each) => `${each.actor}: ${each.words}`).join(" ");
-  }
+  const announce = announcing(panel.querySelector("[role=log]"));
 
   return {
     take(state, changed) {
       if (!changed.has("words")) return;
-      const shown = state.words.filter((said) => said.words || said.open);
+      const shown = state.words.filter((said) => said.words || said.open || said.left.length);
       while (list.children.length > shown.length) list.lastChild.remove();
       shown.forEach((said, index) => {
         const item = list.children[index] ?? list.appendChild(element("li"));
-        const key = `${said.actor}|${said.since}|${said.words}|${said.open}`;
+        const key = JSON.stringify(said);
         if (item.dataset.key === key) return;
         item.dataset.key = key;
         item.className = `${said.actor === state.robot ? "robot" : "person"}${said.open ? " open" : ""}`;
+        const text = turnWords(said);
         item.replaceChildren(
           element("span", { class: "who" }, `${said.actor} ${clock(said.since)}`),
-          element("span", { class: "text" }, said.words || (said.open ? "speaks" : "(spoke)")),
+          element("span", { class: "text" }, ...(text.length ? text : [said.open ? "speaks" : "(spoke)"])),
         );
       });
       if (follows) list.scrollTop = list.scrollHeight;
-      announce(state.words.filter((said) => said.words && !said.open));
+      announce(state.words, state.place?.visit);
     },
   };
 }
 
-const claim = (each) => [each.kind, each.target].filter(Boolean).join(" → ");
+const HEARD = 10000; // ms after which words that a screen reader has read are no part of the page: they stand in the list
+
+// A screen reader hears words once: of a turn that grows the speeches that have ended since, and at its end what was not said.
+function announcing(log) {
+  const told = new Map(); // characters that were read of each turn, and what was said to be left
+  let last; // visit of a recording
+  let isFirst = true; // who opens the page, or jumps in a recording, hears no past
+  return (turns, visit) => {
+    if (visit !== last) isFirst = true;
+    last = visit;
+    const keys = new Set();
+    for (const said of turns) {
+      const key = `${said.actor}|${said.since}`;
+      keys.add(key);
+      const known = told.get(key);
+      const isOver = !said.open && said.left.length && said.state !== "held";
+      const left = isOver ? said.left.map((each) => each.words).join(" … ") : "";
+      const news = said.words.slice(known?.read ?? 0, Math.max(said.settled, known?.read ?? 0)).trim();
+      told.set(key, { read: Math.max(said.settled, known?.read ?? 0), left: left || known?.left || "" });
+      if (isFirst) continue;
+      const text = [news && `${known?.read ? "" : `${said.actor}: `}${news}`, left && left !== known?.left ? `${LEFT[said.state] ?? LEFT.left} ${left}` : ""].filter(Boolean).join(". ");
+      if (!text) continue;
+      const line = log.appendChild(element("p", {}, text));
+      setTimeout(() => line.remove(), HEARD);
+    }
+    for (const key of [...told.keys()]) if (!keys.has(key)) told.delete(key);
+    isFirst = false;
+  };
+}
+
+// The claim as the arbiter has it, for researchers.
+const claim = (each) => `claim ${each.kind}${each.priority ? `, priority ${each.priority} (1 is the strongest)` : ""}${each.target ? `, target ${each.target}` : ""}${each.reason ? `: ${each.reason}` : ""}`;
 
 export function head(panel) {
   const place = panel.querySelector(".head");
   const told = element("p", { class: "owner" });
   const since = element("span", { class: "since" });
   const waiting = element("ol", { class: "waiting" });
-  place.replaceChildren(told, waiting);
+  const terms = element("ol");
+  place.replaceChildren(told, waiting, element("details", { class: "terms" },
+    element("summary", {}, "For researchers: who owns the head"), terms));
   let from = 0;
   return {
     take(state, changed) {
       if (!changed.has("head")) return;
       const { owner } = state.head;
       from = state.head.since;
+      const does = owner ? `${owner.does.replace(/^(look|keep)/, (verb) => `${verb}s`)}` : "";
+      told.title = owner ? claim(owner) : "";
       told.replaceChildren(
-        element("strong", {}, owner && owner.kind !== "none" ? claim(owner) : "nobody"), " ", since,
-        element("span", { class: "why" }, owner?.reason ? `because: ${owner.reason}` : ""),
+        element("strong", {}, owner ? `It ${does}` : "Nobody says where it looks"), " ", since,
+        element("span", { class: "why" }, owner ? `because ${owner.why}` : ""),
       );
-      waiting.replaceChildren(
-        ...state.head.waiting.map((each) => element("li", {}, element("strong", {}, claim(each)), " waits",
-          element("span", { class: "why" }, each.reason ? `because: ${each.reason}` : ""))),
-      );
-      if (!state.head.waiting.length) waiting.replaceChildren(element("li", { class: "none" }, "nobody waits for it"));
+      waiting.replaceChildren(...state.head.waiting.map((each, index) => element("li", { title: claim(each) },
+        index ? "after that " : "otherwise it would ", element("strong", {}, each.does),
+        element("span", { class: "why" }, `because ${each.why}`))));
+      if (!state.head.waiting.length) waiting.replaceChildren(element("li", { class: "none" }, "nothing else calls for a look"));
+      terms.replaceChildren(...[owner, ...state.head.waiting].filter(Boolean).map((each, index) =>
+        element("li", {}, `${index ? "waits" : "owns it"}: ${claim(each)}`)));
     },
     tick(state) {
       const text = state.head?.owner ? `for ${Math.max(0, state.now() - from).toFixed(1)} s` : "";
@@ -71,7 +116,7 @@ export function head(panel) {
 }
 
 const GESTURES = {
-  none: "nothing", gaze: "glance", directed_gaze: "look until they look", directed_gaze_with_pointing: "look and point",
+  none: "words alone", gaze: "a glance", directed_gaze: "looking until they look", directed_gaze_with_pointing: "looking and pointing",
 };
 
 function table(choice) {
@@ -82,9 +127,10 @@ function table(choice) {
     element("td", {}, pair.channel.toFixed(2)), element("td", {}, pair.reliability.toFixed(3)),
     element("td", {}, pair.minimum.toFixed(2)), element("td", {}, seconds(pair.cost)),
     element("td", {}, pair.chosen ? `chosen: ${pair.reason ?? ""}` : pair.reason ?? "")));
-  const names = ["", "gesture", "phrase", "|D|", "r", "R", "Rmin", "cost", "verdict"];
+  const names = [["", ""], ["gesture", ""], ["phrase", ""], ["|D|", "distractors: the other things that it could still mean"], ["r", "reliability of the gesture alone"],
+    ["R", "reliability: how likely it is understood"], ["Rmin", "the least reliability that is allowed"], ["cost", "time that it takes"], ["verdict", ""]];
   return element("div", { class: "scroll", tabindex: "0" }, element("table", {},
-    element("thead", {}, element("tr", {}, ...names.map((name) => element("th", { scope: "col" }, name)))),
+    element("thead", {}, element("tr", {}, ...names.map(([name, title]) => element("th", { scope: "col", title: title || null }, name)))),
     element("tbody", {}, ...rows)));
 }
 
@@ -101,7 +147,7 @@ export function references(panel) {
         if (shown.has(key)) continue;
         const details = element("details", {}, element("summary", {},
           element("strong", {}, choice.target), ` “${choice.phrase}” by ${GESTURES[choice.gesture] ?? choice.gesture}`,
-          element("span", { class: "why" }, `R ${choice.reliability.toFixed(2)}, ${seconds(choice.cost)}; ${choice.fragment}:${choice.reference}`)));
+          element("span", { class: "why" }, `understood with a likelihood of ${choice.reliability.toFixed(2)}, takes ${seconds(choice.cost)}; ${choice.fragment}:${choice.reference}`)));
         details.addEventListener("toggle", () => {
           if (details.open && details.children.length === 1) details.append(table(choice));
         });
@@ -212,7 +258,8 @@ export function away(place) {
     for (const [service, [, panels]] of Object.entries(WITHOUT)) {
       for (const id of panels) stale(document.getElementById(id), missing?.includes(service) ? service : "");
     }
-    if (place.textContent !== text) place.textContent = text;
+    if (place.dataset.text !== text) place.replaceChildren(...prose(text));
+    place.dataset.text = text;
     place.hidden = !text;
   }
   return {

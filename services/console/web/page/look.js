@@ -61,6 +61,11 @@ export function drawn(name, attributes = {}, ...children) {
   return made;
 }
 
+// A text whose commands stand between backticks, as what can be shown.
+export function prose(text) {
+  return text.split("`").map((part, index) => (index % 2 ? element("code", {}, part) : part));
+}
+
 // News of the orders that were given in a panel: shown for a while in its line for them.
 export function news(panel) {
   const line = panel.querySelector(".told");
@@ -68,7 +73,7 @@ export function news(panel) {
   return (told) => {
     const texts = told.filter((each) => each.panel === panel.id).map((each) => each.text);
     if (!texts.length) return;
-    line.textContent = texts.join(" ");
+    line.replaceChildren(...prose(texts.join(" ")));
     clearTimeout(clearing);
     clearing = setTimeout(() => (line.textContent = ""), 9000);
   };

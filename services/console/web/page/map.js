@@ -2,13 +2,15 @@
 import { drawn, pieceColor } from "./look.js";
 import { described, sceneInWords } from "./tell.js";
 
-// What is in view at least, in metres: x of the robot, which is down the screen, and y, to the right.
-const AHEAD = [-0.27, 1.5];
-const ASIDE = [-0.62, 0.62];
-const AROUND = 0.3; // room for a person and their name
-
-// Coordinates of the screen, in millimetres, of a place.
-const place = ([x, y]) => [y * 1000, x * 1000];
+// How a place is seen, as the scene says (services/recording/above.py): x and y of the robot, in metres, and of the screen, in millimetres.
+let axes = { right: [0, 0], down: [0, 0] };
+const along = ([a, b], x, y) => (a * x + b * y) * 1000;
+const place = ([x, y]) => [along(axes.right, x, y), along(axes.down, x, y)];
+const back = (right, down) => [0, 1].map((at) => (axes.right[at] * right + axes.down[at] * down) / 1000); // they are at right angles
+const turned = (direction) => { // degrees, clockwise from the right
+  const [right, down] = place(direction);
+  return (Math.atan2(down, right) * 180) / Math.PI;
+};
 const points = (outline) => outline.map((corner) => place(corner).map((v) => v.toFixed(1)).join(",")).join(" ");
 
 export function map(panel, order) {
@@ -25,7 +27,8 @@ export function map(panel, order) {
       if (!changed.has("scene") || panel.offsetParent === null) return;
       describe(state);
       const { body, things, people, robot } = state.scene;
-      frame(svg, things, people);
+      ({ right: axes.right, down: axes.down } = state.scene.above);
+      frame(svg, state.scene.above.frame);
       const places = new Map(things.map((thing) => [thing.id, thing.at]));
       for (const person of people) if (person.at) places.set(person.id, person.at);
       if (body?.eyes) places.set(robot, body.eyes);
@@ -43,16 +46,10 @@ export function map(panel, order) {
   };
 }
 
-// Show everybody and everything: a second person sits beside the table, another world may be wider.
-function frame(svg, things, people) {
-  const seen = people.filter((each) => each.at && each.present).map((each) => each.at);
-  const lying = things.filter((each) => each.kind !== "hand").flatMap((each) => (each.outline.length ? each.outline : [each.at]));
-  const steps = (value) => Math.ceil(value * 20) / 20; // so that it stands still while somebody moves a little
-  const reach = (value) => Math.max(...seen.map((at) => steps(value(at) + AROUND)), ...lying.map((at) => steps(value(at))));
-  const left = Math.max(-ASIDE[0], reach((at) => -at[1]));
-  const right = Math.max(ASIDE[1], reach((at) => at[1]));
-  const down = Math.max(AHEAD[1], reach((at) => at[0]));
-  const box = `${-left * 1000} ${AHEAD[0] * 1000} ${(left + right) * 1000} ${(down - AHEAD[0]) * 1000}`;
+// Show everybody and everything. It changes in steps, so that it stands still while somebody moves a little.
+function frame(svg, edges) {
+  const [left, top, right, bottom] = edges.map((each) => each * 1000);
+  const box = `${left} ${top} ${right - left} ${bottom - top}`;
   if (svg.getAttribute("viewBox") !== box) svg.setAttribute("viewBox", box);
 }
 
@@ -66,7 +63,7 @@ function hands(svg, order) {
   let drag = null;
   const at = (event) => {
     const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-    return [point.y / 1000, point.x / 1000];
+    return back(point.x, point.y);
   };
   const mean = (id, points) => order({ do: points ? "point" : "look", target: id });
   svg.addEventListener("pointerdown", (event) => {
@@ -80,8 +77,8 @@ function hands(svg, order) {
   svg.addEventListener("pointermove", (event) => {
     if (!drag?.moves) return;
     drag.to = at(event);
-    const [dx, dy] = [drag.to[0] - drag.from[0], drag.to[1] - drag.from[1]];
-    drag.shape.setAttribute("transform", `translate(${dy * 1000} ${dx * 1000})`);
+    const way = place([drag.to[0] - drag.from[0], drag.to[1] - drag.from[1]]);
+    drag.shape.setAttribute("transform", `translate(${way.join(" ")})`);
   });
   const end = (event) => {
     if (!drag) return;
@@ -101,7 +98,8 @@ function hands(svg, order) {
   svg.addEventListener("keydown", (event) => {
     const shape = event.target.closest("[data-id]");
     if (!seated() || !shape) return;
-    const way = { ArrowUp: [-STEP, 0], ArrowDown: [STEP, 0], ArrowLeft: [0, -STEP], ArrowRight: [0, STEP] }[event.key];
+    const pressed = { ArrowUp: [0, -STEP], ArrowDown: [0, STEP], ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0] }[event.key];
+    const way = pressed && back(...pressed.map((each) => each * 1000));
     if (way && shape.classList.contains("object")) {
       const [x, y] = shape.dataset.at.split(",").map(Number);
       order({ do: "move", thing: shape.dataset.id, x: x + way[0], y: y + way[1] });
@@ -169,7 +167,6 @@ function line(from, to, kind) {
 // A head from above, with the direction in which it faces. It stays the same element, so that it keeps the focus.
 function face(layer, at, direction, kind, id, name, speaks) {
   const [x, y] = place(at);
-  const turn = (Math.atan2(direction[1], direction[0]) * 180) / Math.PI;
   const shape = keyed(layer, id, () => drawn("g", { "data-id": id, tabindex: "0", role: "button" },
     drawn("ellipse", { class: "shoulders", rx: 190, ry: 75 }),
     drawn("g", { class: "turned" }, drawn("ellipse", { class: "skull", rx: 100, ry: 78 }),
@@ -178,7 +175,7 @@ function face(layer, at, direction, kind, id, name, speaks) {
   const text = speaks ? `${name} speaks` : name;
   shape.setAttribute("class", `${kind}${speaks ? " speaks" : ""}`);
   shape.setAttribute("transform", `translate(${x} ${y})`);
-  shape.querySelector(".turned").setAttribute("transform", `rotate(${90 - turn})`);
+  shape.querySelector(".turned").setAttribute("transform", `rotate(${turned(direction)})`);
   const label = shape.querySelector(".name");
   if (label.textContent !== text) {
     label.textContent = text;

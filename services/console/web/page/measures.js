@@ -38,8 +38,8 @@ function draw(canvas, state) {
   const left = 38;
   const x = (time) => left + (Math.max(0, time) / end) * (width - left - 8); // what was before the window is at its edge
   const charts = [
-    ["engagement", 1, persons.map((each, index) => [each.engagement, ["--gaze", "--pair", "--point"][index % 3]])],
-    ["MTBCE (s)", ceiling(everyone?.mtbce ?? [], 5), [[everyone?.mtbce ?? [], "--mutual"]]],
+    ["engagement, from 0 to 1", 1, persons.map((each, index) => [each.engagement, ["--gaze", "--pair", "--point"][index % 3]])],
+    ["mean time between connection events, MTBCE (s)", ceiling(everyone?.mtbce ?? [], 5), [[everyone?.mtbce ?? [], "--mutual"]]],
   ];
   charts.forEach(([name, most, courses], index) => {
     const y = frame(context, name, most, index * part, part, left, width);
@@ -47,7 +47,7 @@ function draw(canvas, state) {
     if (!index) persons.forEach((each, number) => signed(context, each, x, y, color(courses[number][1]), number));
   });
   const most = ceiling(delays, 2);
-  const y = frame(context, "delays (s)", most, 2 * part, part, left, width);
+  const y = frame(context, "delay of each event (s)", most, 2 * part, part, left, width);
   const looks = new Map(KINDS.map(([kind, , shade, mark]) => [kind, [shade, mark]]));
   context.textAlign = "center";
   for (const [at, delay, kind] of delays) {

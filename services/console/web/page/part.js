@@ -1,5 +1,7 @@
 // The seat: whoever looks at the page becomes a person before the robot.
-import { element, news } from "./look.js";
+import { element, news, prose } from "./look.js";
+
+const PATIENCE = 8000; // ms after which one may try again to sit down
 
 export function part(panel, order) {
   const place = panel.querySelector(".part");
@@ -12,12 +14,26 @@ export function part(panel, order) {
     return made;
   };
   const name = element("input", { type: "text", id: "your-name", maxlength: "40", autocomplete: "off", placeholder: "visitor" });
-  const away = element("form", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name,
-    element("button", { type: "submit", class: "main" }, "Take a seat"));
+  const sit = element("button", { type: "submit", class: "main" }, "Take a seat");
+  const there = element("p", { class: "why there" });
+  const away = element("form", {}, there,
+    element("div", { class: "row" }, element("label", { for: "your-name" }, "Your name"), name, sit));
   away.addEventListener("submit", (event) => {
     event.preventDefault();
+    if (isSitting) return;
+    isSitting = true; // until it is known what became of it; a disabled button would lose the focus
+    sit.setAttribute("aria-disabled", "true");
+    sit.textContent = "Sitting down…";
     order({ do: "sit", name: name.value.trim() });
+    setTimeout(rise, PATIENCE);
   });
+  let seat = "Take a seat";
+  let isSitting = false;
+  const rise = () => {
+    isSitting = false;
+    sit.removeAttribute("aria-disabled");
+    sit.textContent = seat;
+  };
 
   const hold = button("Hold to speak", { "aria-pressed": "false" }, () => {});
   const speak = (on) => {
@@ -38,7 +54,7 @@ export function part(panel, order) {
     if (words.value.trim()) order({ do: "type", text: words.value.trim() });
     words.value = "";
   });
-  const pointing = button("Click points", { "aria-pressed": "false", id: "points" }, () => {
+  const pointing = button("Point by clicking", { "aria-pressed": "false", id: "points" }, () => {
     const on = pointing.getAttribute("aria-pressed") !== "true";
     pointing.setAttribute("aria-pressed", String(on));
     panel.ownerDocument.body.classList.toggle("pointing", on);
@@ -61,15 +77,28 @@ export function part(panel, order) {
     take(state, changed) {
       here.dataset.robot = state.robot;
       if (changed.has("you")) {
-        const { person, denied } = state.you;
+        const { person, denied, there: company } = state.you;
+        seat = state.you.sit || seat;
+        if (person) rise();
         const reason = denied?.seat ?? "";
-        refused.textContent = reason ? `You only look on: ${reason}.` : "";
+        refused.replaceChildren(...prose(reason ? `You only look on: ${reason}.` : ""));
+        const [before, after] = person ? [away, here] : [here, away];
+        const keepsFocus = before.contains(document.activeElement);
         away.hidden = Boolean(reason || person);
+        if (!isSitting) sit.textContent = seat;
+        if (there.dataset.text !== (company ?? "")) {
+          there.dataset.text = company ?? "";
+          there.replaceChildren(...prose(company ?? ""));
+        }
         here.hidden = !person;
+        if (keepsFocus && before.hidden && !after.hidden) after.querySelector(person ? "button" : "input").focus();
         who.replaceChildren("You are ", element("strong", {}, person), ".");
         document.body.classList.toggle("seated", Boolean(person));
       }
-      if (changed.has("told")) told(state.told);
+      if (changed.has("told")) {
+        if (state.told.some((each) => each.panel === panel.id)) rise();
+        told(state.told);
+      }
     },
   };
 }

@@ -1,5 +1,5 @@
 // The bar of a recording: play and pause, a place to go to, and how fast.
-import { clock, element } from "./look.js";
+import { clock, element, news } from "./look.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 10];
 const STEP = 5; // seconds that an arrow key goes
@@ -30,11 +30,13 @@ export function player(bar, order) {
     ...SPEEDS.map((each) => element("option", { value: String(each) }, `${each} x`)));
   speed.value = "1";
   speed.addEventListener("change", () => go({ speed: Number(speed.value) }));
-  const told = element("span", {});
-  bar.replaceChildren(button, slider, told, speed);
+  const where = element("span", { class: "where" });
+  bar.replaceChildren(button, slider, where, speed, element("p", { class: "told", role: "status" }));
+  const told = news(bar);
 
   return {
     take(state, changed) {
+      if (changed.has("told")) told(state.told);
       if (!changed.has("place")) return;
       place = state.place;
       bar.hidden = false;
@@ -43,7 +45,7 @@ export function player(bar, order) {
       slider.max = String(place.end);
       if (performance.now() - asked > 2 * EACH) slider.value = String(place.at);
       slider.setAttribute("aria-valuetext", clock(place.at));
-      told.textContent = `${clock(place.at)} of ${clock(place.end)}`;
+      where.textContent = `${clock(place.at)} of ${clock(place.end)}`;
     },
   };
 }

@@ -5,9 +5,9 @@ import { described, sceneInWords } from "./tell.js";
 
 const SHOULDERS = 0.2; // metres from the middle of the trunk
 const VIEWS = {
-  "across": [[1.9, 1.55, 1.8], [0.6, 0, 0.84]],
-  "as the person": [[1.55, 0, 1.38], [0.3, 0, 0.85]],
-  "as the robot": [[-0.55, 0.25, 1.75], [0.75, 0, 0.7]],
+  "from the side": [[1.9, 1.55, 1.8], [0.6, 0, 0.84]],
+  "as the person sees it": [[1.55, 0, 1.38], [0.3, 0, 0.85]],
+  "as the robot sees it": [[-0.55, 0.25, 1.75], [0.75, 0, 0.7]],
 };
 
 const vector = (at) => new THREE.Vector3(...at);
@@ -51,7 +51,7 @@ export function space(panel, order) {
     controls.update();
     stale = true;
   }
-  view("across");
+  view("from the side");
   panel.querySelector(".views").append(...Object.keys(VIEWS).map((name) => {
     const button = element("button", { type: "button" }, name);
     button.addEventListener("click", () => view(name));

@@ -1,22 +1,23 @@
 // The part of the page that is drawn from frames: where its panels stand. What they show is drawn by the other modules.
 import { begin } from "engage-window/main.js";
 
+const what = (text) => `<p class="what">${text}</p>`; // what a panel shows, for whoever sees it for the first time
 const MAIN = [
   ["scene", "Scene", `<div class="space" role="img" aria-label="The scene in 3D"></div>
     <div class="views" role="group" aria-label="Where you look from"></div>`],
   ["above", "From above", `<svg class="map" role="group" aria-label="The table from above"></svg>`],
-  ["events", "Connection events", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
-  ["behaviors", "Behaviors: planned and measured", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
-  ["net", "Petri net", `<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0" role="group" aria-labelledby="net-title"></div><p class="legend"></p>`],
-  ["references", "References", `<div class="references"></div>`],
+  ["events", "Connection events", `${what("Moments in which robot and people connect: a look that the other follows, eyes that meet, a turn that is answered, a nod while listening.")}<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
+  ["behaviors", "Behaviors: planned and measured", `${what("What the body was to do, and below it what it did.")}<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
+  ["net", "Petri net", `${what("The plan of what the robot says and does now. A token moves on when all that its instant waits for has happened.")}<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0" role="group" aria-labelledby="net-title"></div><p class="legend"></p>`],
+  ["references", "References", `${what("Each time the robot named a thing: open it to see why it looked or pointed, and why in these words.")}<div class="references"></div>`],
   ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" aria-labelledby="notes-title" tabindex="0"></ul>`],
 ];
 const SIDE = [
   ["part", "You", `<div class="part"></div><p class="told" role="status"></p>`],
+  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><div class="unseen" role="log" aria-label="What was said just now"></div>`],
   ["wizard", "The robot by hand", `<div class="wizard"></div><p class="told" role="status"></p>`],
-  ["said", "Words", `<ol class="words" aria-labelledby="said-title" tabindex="0"></ol><p class="unseen" role="status"></p>`],
-  ["head", "Who owns the head", `<div class="head"></div>`],
-  ["measures", "Engagement", `<canvas role="img" tabindex="0"></canvas><p class="legend"></p><p class="reasons"></p>`],
+  ["head", "Where the robot looks, and why", `<div class="head"></div>`],
+  ["measures", "Engagement", `${what("How much each person takes part, by the connection events of late.")}<canvas role="img" tabindex="0"></canvas><p class="legend"></p><p class="reasons"></p>`],
   ["health", "Services", `<ul class="health"></ul>`],
 ];
 
@@ -29,7 +30,7 @@ export default {
     <h1 class="unseen">Engage: {{ robot }}</h1>
     <p class="away" role="alert" hidden></p>
     <p class="switched" role="status" hidden></p>
-    <div class="player row" role="group" aria-label="The recording" hidden></div>
+    <div id="player" class="player row" role="group" aria-label="The recording" hidden></div>
     <div class="column main">${panels(MAIN)}</div>
     <div class="column side">${panels(SIDE)}</div>
   </div>`,

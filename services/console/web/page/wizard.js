@@ -1,5 +1,5 @@
 // The robot by hand: words, references, questions, signs of listening, its gaze, what is held, conditions of a study, faults of the body.
-import { element, news } from "./look.js";
+import { element, news, prose } from "./look.js";
 
 export function wizard(panel, order) {
   const place = panel.querySelector(".wizard");
@@ -63,7 +63,7 @@ export function wizard(panel, order) {
     take(state, changed) {
       if (changed.has("you")) {
         const { denied = {}, script: titles = [], faults: kinds = [], inhibits } = state.you;
-        refused.textContent = denied.steer ? `Only watched here: ${denied.steer}.` : "";
+        refused.replaceChildren(...prose(denied.steer ? `Only watched here: ${denied.steer}.` : ""));
         speaks.hidden = Boolean(denied.speak);
         steer.hidden = Boolean(denied.steer);
         study.hidden = Boolean(denied.condition);
