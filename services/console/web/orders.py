@@ -219,7 +219,7 @@ def denied(role: str, trusted: bool, *, keyed: bool = False) -> dict[str, str]:
     trusted: the page was called with the token. keyed: the role is that of the window's keys.
     """
     if role in RIGHTS and not trusted:
-        reason = "this address lacks the token: open the one that `engage console` has printed"
+        reason = "this address lacks the token of this window: open the one that `engage console` printed last"
         return dict[str, str].fromkeys(ALL_RIGHTS, reason)
     found: dict[str, str] = {}
     for right in ALL_RIGHTS:

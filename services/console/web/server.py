@@ -29,6 +29,8 @@ TICK: Seconds = 1 / 15
 """Least time between two frames of a browser."""
 LARGEST_ORDER = 2**16
 """Bytes of one order of a page."""
+AWAY: Seconds = 60.0
+"""Time for which NiceGUI waits for a page that sleeps; after that the page is loaded anew, without its seat."""
 MOST_VIEWERS = 100
 FULL = 4429
 """Code with which a WebSocket is closed for which there is no room: 4000 and the status that HTTP has for it."""
@@ -127,7 +129,7 @@ def _with_page(app: FastAPI, robot: str) -> None:
 
     ui.run_with(
         app, dark=None, language="en-US", tailwind=False, show_welcome_message=False, storage_secret=None,
-        reconnect_timeout=10.0, binding_refresh_interval=None, gzip_middleware_factory=None,
+        reconnect_timeout=AWAY, binding_refresh_interval=None, gzip_middleware_factory=None,
     )  # fmt: skip
 
 

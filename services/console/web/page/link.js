@@ -1,12 +1,13 @@
 // The WebSocket with frames. The next one comes only when we say that we have drawn the last.
 const AGAIN = 1000; // ms from a broken link to the next try
-const SILENCE = 4000; // ms without any frame after which the window is away
-const DEAD = 15000; // ms without any frame after which the link is given up: that of a computer that has slept, or changed its network, never ends by itself
+const LOOK = 1000; // ms between two looks at whether frames come
+const SILENCE = 4; // looks without any frame after which the window is away
+const DEAD = 15; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
 
 export function follow(take, tell) {
   let socket = null;
   let ended = false;
-  let heard = performance.now();
+  let silent = 0; // looks since the last frame: time in which this page does not run, as that of a computer that sleeps, does not count
   let reason = ""; // why the window has closed the link itself
 
   function open() {
@@ -15,7 +16,7 @@ export function follow(take, tell) {
     let isFirst = true;
     own.onmessage = (message) => {
       if (own !== socket) return;
-      heard = performance.now();
+      silent = 0;
       reason = "";
       tell(true);
       take(JSON.parse(message.data), isFirst);
@@ -30,16 +31,15 @@ export function follow(take, tell) {
     };
   }
   const watch = setInterval(() => {
-    const silent = performance.now() - heard;
-    if (document.hidden || silent < SILENCE) return;
+    if (document.hidden) return (silent = 0); // it draws nothing, and so gets nothing
+    silent += 1;
+    if (silent < SILENCE) return;
     tell(false, reason);
     if (silent < DEAD || socket.readyState > WebSocket.OPEN) return; // closed: it is opened again already
-    heard = performance.now();
+    silent = 0;
     socket.close();
     open();
-  }, 1000);
-  const shown = () => (heard = performance.now()); // a hidden page has drawn nothing, and so got nothing
-  document.addEventListener("visibilitychange", shown);
+  }, LOOK);
   open();
   return {
     send(order) {
@@ -48,7 +48,6 @@ export function follow(take, tell) {
     end() {
       ended = true;
       clearInterval(watch);
-      document.removeEventListener("visibilitychange", shown);
       socket.close();
     },
   };
