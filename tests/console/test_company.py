@@ -23,9 +23,9 @@ def test_who_is_simulated_and_has_the_task_is_told_before_one_sits_beside() -> N
 
     assert invited.button == "Sit beside human"
     assert invited.there == (
-        "Before the robot sits human, whom a program plays. "
-        "You may sit beside: the robot sees you, and looks back at you. "
-        "But it does its task with whom it met first, until they leave. "
+        "human sits before the robot already, and is played by a program. "
+        "You may sit down beside them: the robot sees you, and looks back at you. "
+        "But it does its task with the person whom it met first, until that person leaves. "
         "To have the robot for yourself, start it with `engage demo --you`."
     )
 
@@ -35,7 +35,7 @@ def test_other_visitors_are_people_of_their_own() -> None:
 
     assert invited.button == "Sit beside ann and bob"
     assert invited.there == (
-        "Before the robot sit ann and bob. You may sit beside: the robot sees you, and looks back at you."
+        "ann and bob sit before the robot already. You may sit down beside them: the robot sees you, and looks back at you."
     )
 
 
@@ -49,6 +49,6 @@ async def test_the_window_knows_who_is_there_and_who_tells_of_them(hub: MemoryHu
         assert shown.invitation.button == "Take a seat"
         async with perceive("human", hub=hub, name="simulation"):
             await asyncio.sleep(0.1)
-            assert "Before the robot sits human, whom a program plays." in shown.invitation.there
+            assert "human sits before the robot already, and is played by a program." in shown.invitation.there
         await asyncio.sleep(0.1)
         assert shown.invitation.button == "Take a seat"

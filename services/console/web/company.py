@@ -30,12 +30,13 @@ def invitation(people: Collection[str], reporters: Mapping[str, str], here: Coll
     others = [each for each in people if each not in simulated]
     told = []
     if simulated:
-        told.append(f"Before the robot {_sits(simulated)} {_listed(simulated)}, whom a program plays.")
+        played = "is" if len(simulated) == 1 else "are"
+        told.append(f"{_listed(simulated)} {_sits(simulated)} before the robot already, and {played} played by a program.")
     if others:
-        told.append(f"{'Beside' if simulated else 'Before the robot'} {_sits(others)} {_listed(others)}.")
-    told.append("You may sit beside: the robot sees you, and looks back at you.")
+        told.append(f"{_listed(others)} {_sits(others)} {'there, too' if simulated else 'before the robot already'}.")
+    told.append("You may sit down beside them: the robot sees you, and looks back at you.")
     if TASK in here:
-        told.append("But it does its task with whom it met first, until they leave.")
+        told.append("But it does its task with the person whom it met first, until that person leaves.")
     if simulated:
         told.append(f"{ALONE[0].upper()}{ALONE[1:]}.")
     return Invitation(" ".join(told), f"Sit beside {_listed(list(people))}")
