@@ -35,7 +35,8 @@ def test_other_visitors_are_people_of_their_own() -> None:
 
     assert invited.button == "Sit beside ann and bob"
     assert invited.there == (
-        "ann and bob sit before the robot already. You may sit down beside them: the robot sees you, and looks back at you."
+        "ann and bob sit before the robot already. "
+        "You may sit down beside them: the robot sees you, and looks back at you."
     )
 
 

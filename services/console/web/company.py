@@ -31,7 +31,8 @@ def invitation(people: Collection[str], reporters: Mapping[str, str], here: Coll
     told = []
     if simulated:
         played = "is" if len(simulated) == 1 else "are"
-        told.append(f"{_listed(simulated)} {_sits(simulated)} before the robot already, and {played} played by a program.")
+        who = _listed(simulated)
+        told.append(f"{who} {_sits(simulated)} before the robot already, and {played} played by a program.")
     if others:
         told.append(f"{_listed(others)} {_sits(others)} {'there, too' if simulated else 'before the robot already'}.")
     told.append("You may sit down beside them: the robot sees you, and looks back at you.")
