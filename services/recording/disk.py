@@ -43,7 +43,7 @@ class RecordingFile:
         try:
             self._file = descriptor.opened(path, overwrite=overwrite)
         except BlockingIOError as error:
-            fault = Fault(reason="another recorder writes it", where=str(path), advice="another name")
+            fault = Fault(reason="another recorder writes this file", where=str(path), advice="give another one")
             raise InputRefused(fault) from error
         except FileExistsError as error:
             fault = Fault(reason="there is such a file", where=str(path), advice="another name, or --overwrite")

@@ -107,7 +107,7 @@ def test_nobody_records_into_a_file_that_is_recorded_whatever_its_name_by_now(tm
     told.add(1)
     (tmp_path / "a.mcap").rename(tmp_path / name)
 
-    with pytest.raises(InputRefused, match=r"\.mcap: another recorder writes it \(another name\)"):
+    with pytest.raises(InputRefused, match=r"\.mcap: another recorder writes this file \(give another one\)"):
         Told(tmp_path / name, overwrite=True)
     told.add(2)
     assert told.file.close({})
