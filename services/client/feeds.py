@@ -1,5 +1,6 @@
 """Feeds of a client: messages of one kind as they come, with `async for` or one by one."""
 
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TypeVar
@@ -11,6 +12,7 @@ from engage_hri.services.bus.interface import Bus, Reading, Received, Subscripti
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
+from engage_hri.services.runtime.reports import Told
 
 M = TypeVar("M")
 
@@ -60,73 +62,96 @@ class NewFeed(Feed[M]):
         return is_new and super()._is_wanted(received)
 
 
-class EventFeed(Feed[ConnectionEvent]):
+class DerivedFeed(Feed[M]):
+    """News made of messages and of time that passes: several of one message, or none."""
+
+    def __init__(self, bus: Bus, patterns: Iterable[str]) -> None:
+        super().__init__(bus.subscribe(*patterns), (), bus.now)
+        self._bus = bus
+        self._told: deque[M] = deque()
+
+    async def next(self, timeout: Seconds | None = None) -> M | None:
+        """Return the next piece of news; None after `timeout` seconds without one, or at the end.
+
+        timeout: seconds; None: for ever.
+        """
+        deadline = None if timeout is None else self._now() + timeout
+        while not self._told:
+            due = self._due
+            until = min((at for at in (deadline, due) if at is not None), default=None)
+            if (received := await self._subscription.next(until)) is not None:
+                self._told += self._taken(received)
+            elif due is not None and self._now() >= due:
+                self._told += self._passed()
+            else:
+                return None
+        return self._told.popleft()
+
+    @property
+    @abstractmethod
+    def _due(self) -> Seconds | None:
+        """Local time at which something comes without a message; None: nothing does."""
+
+    @abstractmethod
+    def _taken(self, received: Received) -> Iterable[M]:
+        """Take a message."""
+
+    @abstractmethod
+    def _passed(self) -> Iterable[M]:
+        """Take the news that it is due."""
+
+
+class EventFeed(DerivedFeed[ConnectionEvent]):
     """Connection events: each change exactly once, in order. Events open when recognition dies end as `lost`."""
 
     def __init__(self, bus: Bus, stream: EventStream, patterns: Iterable[str]) -> None:
-        super().__init__(bus.subscribe(*patterns), (ConnectionEvent,), bus.now)
-        self._bus = bus
+        super().__init__(bus, patterns)
         self._stream = stream
-        self._told: deque[ConnectionEvent] = deque()
 
     @property
     def open(self) -> tuple[ConnectionEvent, ...]:
         """The events that have not ended, of those that `next` has returned or will return at once."""
         return tuple(self._stream.open.values())
 
-    async def next(self, timeout: Seconds | None = None) -> ConnectionEvent | None:
-        """Return the next change; None after `timeout` seconds without one, or at the end.
+    @property
+    def _due(self) -> Seconds | None:
+        return self._stream.deadline
 
-        timeout: seconds; None: for ever.
-        """
-        deadline = None if timeout is None else self._now() + timeout
-        while not self._told:
-            due = self._stream.deadline
-            received = await self._subscription.next(
-                min((at for at in (deadline, due) if at is not None), default=None)
-            )
-            if received is not None:
-                message = received.message
-                at = self._bus.local(message.at) if isinstance(message, ConnectionEvent) else received.at
-                self._told += self._stream.feed(message, at, self._now(), past=received.past)
-            elif due is not None and self._now() >= due:
-                self._told += self._stream.expire(self._now())
-            else:
-                return None
-        return self._told.popleft()
+    def _taken(self, received: Received) -> Iterable[ConnectionEvent]:
+        message = received.message
+        at = self._bus.local(message.at) if isinstance(message, ConnectionEvent) else received.at
+        return self._stream.feed(message, at, self._now(), past=received.past)
+
+    def _passed(self) -> Iterable[ConnectionEvent]:
+        return self._stream.expire(self._now())
 
 
-class ActionFeed(Feed[ActionEvent]):
+class ActionFeed(DerivedFeed[ActionEvent]):
     """Actions as all who report them together tell them: they end, also if their reporter was killed.
 
     It begins with the people who are there, and with the looks, points and other actions that go on.
     """
 
     def __init__(self, bus: Bus) -> None:
-        patterns = (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ALIVE)
-        super().__init__(bus.subscribe(*patterns), (), bus.now)
-        self._bus = bus
+        super().__init__(bus, (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ALIVE))
         self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
-        self._told: deque[ActionEvent] = deque()
+
+    @property
+    def _due(self) -> Seconds | None:
+        return self._reports.deadline
+
+    def _taken(self, received: Received) -> Iterable[ActionEvent]:
+        told = self._reports.take(
+            received.message, received.key, received.source, received.life, self._now(), past=received.past
+        )
+        return self._events(told)
+
+    def _passed(self) -> Iterable[ActionEvent]:
+        return self._events(self._reports.advance(self._now()))
+
+    def _events(self, told: Iterable[Told]) -> Iterable[ActionEvent]:
+        return (event for event, _ in events(told, self._bus.clock))
 
     def _instant(self, stamp: Stamp) -> Seconds:
         """Local time of a stamp, at most now."""
         return min(self._bus.local(stamp), self._bus.now())
-
-    async def next(self, timeout: Seconds | None = None) -> ActionEvent | None:
-        """Return the next event; None after `timeout` seconds without one, or at the end.
-
-        timeout: seconds; None: for ever.
-        """
-        deadline = None if timeout is None else self._now() + timeout
-        while not self._told:
-            due = self._reports.deadline
-            until = min((at for at in (deadline, due) if at is not None), default=None)
-            if (one := await self._subscription.next(until)) is not None:
-                told = self._reports.take(one.message, one.key, one.source, one.life, self._now(), past=one.past)
-            elif due is not None and self._now() >= due:
-                told = self._reports.advance(self._now())
-            else:
-                return None
-            self._told += (event for event, _ in events(told, self._bus.clock))
-        return self._told.popleft()
