@@ -306,17 +306,17 @@ class NewestStates:
     def __init__(self) -> None:
         self._newest: dict[str, tuple[str, Seconds]] = {}
 
-    def delivered(self, written: Written, run: str, sent: Seconds) -> None:
-        """Note a state's value that is delivered. sent: local time at which it was."""
-        self._newest.pop(written.key, None)
-        self._newest[written.key] = (run, sent)
+    def take(self, written: Written, run: str, sent: Seconds) -> bool:
+        """Take a state's value that has come. False: another process' newer one has been delivered before it.
+
+        sent: local time at which it was sent.
+        """
+        by, newest = self._newest.pop(written.key, (run, sent))
+        is_overtaken = by != run and sent < newest
+        self._newest[written.key] = (by, newest) if is_overtaken else (run, sent)
         if len(self._newest) > STATES_KEPT:
             del self._newest[next(iter(self._newest))]
-
-    def has_overtaken(self, written: Written, run: str, sent: Seconds) -> bool:
-        """Tell whether a value is a state of which another process' newer value has been delivered."""
-        by, newest = self._newest.get(written.key, (run, sent))
-        return by != run and sent < newest
+        return not is_overtaken
 
 
 def may_skip(key: str) -> bool:

@@ -122,7 +122,7 @@ class Readers:
                 reader.subscription.offer(_sample(written, self._sent.run, now))
             else:
                 if may_skip(written.key):
-                    reader.newest.delivered(written, self._sent.run, now)
+                    reader.newest.take(written, self._sent.run, now)
                 reader.subscription.offer(received)
 
     def want(self, key: str) -> bool:
@@ -226,12 +226,9 @@ class Readers:
             return
         if message is not None:
             envelope, now = written.envelope, self._loop.time()
-            if may_skip(written.key):  # others are many
-                sent = min(now, self._sent_at(written))
-                # What comes late is not to be the last word: another process may have said a newer one.
-                if reader.newest.has_overtaken(written, run, sent):
-                    return
-                reader.newest.delivered(written, run, sent)
+            # A state that comes late is not to be the last word: another process may have said a newer one.
+            if may_skip(written.key) and not reader.newest.take(written, run, min(now, self._sent_at(written))):
+                return
             reader.subscription.offer(
                 Received(written.key, message, envelope.source, now, past, run, envelope.number)
             )
