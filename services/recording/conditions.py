@@ -4,7 +4,6 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.runtime.in_force import InForce
@@ -35,7 +34,7 @@ def stretches(told: Iterable[tuple[Message, Seconds]], named: str, duration: Sec
     names, study = [(0.0, named)], InForce()
     for message, at in told:
         before, study = study, study.after(message)
-        if study is not before and (isinstance(message, StudyCondition) or study.told is not before.told):
+        if study.told is not before.told:
             names.append((max(0.0, at), _name(study, named)))
     begun = dict(sorted(names, key=lambda one: one[0]))  # of two at one instant the later one holds
     found: list[Stretch] = []
