@@ -7,6 +7,7 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
 from engage_hri.services.control.voice.timeline import Utterance
+from engage_hri.services.text.ear import heard
 
 
 def speech_estimate(
@@ -14,17 +15,18 @@ def speech_estimate(
 ) -> Estimate:
     """Estimate a speech from its time line. pose: the one of the body that speaks, which it leaves as it is.
 
-    warnings: what of it would not be said as it is meant.
+    warnings: what of it would not be said as it is meant, besides what is for the eye.
     """
     times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
     times["end"] = utterance.seconds
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
+    degraded = "; ".join(dict.fromkeys((*heard(behavior.text).problems, *warnings)))
     phases = []
     for since, to in pairwise(sync_points(behavior)):
         seconds = times[to] - times[since]
         longest = None if to in gaps or not seconds else seconds
         phases.append(Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=longest, hold=to in gaps))
     return Estimate(
-        behavior=behavior.id, feasible=True, degraded="; ".join(dict.fromkeys(warnings)), parts=("voice",),
+        behavior=behavior.id, feasible=True, degraded=degraded, parts=("voice",),
         phases=tuple(phases), pose_after=pose, pose_end=pose,
     )  # fmt: skip

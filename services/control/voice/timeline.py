@@ -1,9 +1,12 @@
 """Time line of an utterance: the seconds at which words and marks of a text are said, known before it begins."""
 
+from collections.abc import Sequence
+
 from msgspec import Struct
 
 from engage_hri.schemas.speakable import Script, Token, tokens
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.text.ear import heard
 
 BEFORE_WORD: Seconds = 0.12
 PER_LETTER: Seconds = 0.05
@@ -56,7 +59,31 @@ class Utterance(Struct, frozen=True):
 
 
 def utter(text: str, pace: float = 1.0) -> Utterance:
-    """Lay `text` out in time; prosody is ignored. pace: 2 takes twice as long."""
+    """Lay a text out in time, as its author wrote it; prosody is ignored. pace: 2 takes twice as long."""
+    ear = heard(text)
+    model = modelled(ear.text, pace)
+    return Utterance(as_written(text, ear.places, model.words), model.seconds) if model.words else model
+
+
+def as_written(text: str, places: Sequence[int], said: Sequence[Word], start: int = 0) -> tuple[Word, ...]:
+    """The words of a text as its author wrote it, where there is more: what is for the eye takes no time.
+
+    places: see `Heard`, in characters of this text. said: words of the text for the ear. start: added to positions.
+    """
+    words: list[Word] = []
+    number, now = 0, 0.0
+    for token in tokens(text):
+        since = until = None
+        while number < len(said) and places[said[number].position - 1] < token.end:
+            since, until = (said[number].start if since is None else since), said[number].end
+            number += 1
+        begin, now = (now, now) if since is None or until is None else (since, max(now, until))
+        words.append(Word(token.text, min(begin, now), now, start + token.end))
+    return tuple(words)
+
+
+def modelled(text: str, pace: float = 1.0) -> Utterance:
+    """Lay a text for the ear out in time; prosody is ignored. pace: 2 takes twice as long."""
     words: list[Word] = []
     now = pause = 0.0
     is_speaking = False
