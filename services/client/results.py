@@ -34,5 +34,6 @@ S = TypeVar("S", bound=Struct)
 def in_time(message: S | None, what: str, timeout: Seconds | None) -> S:
     """Return the message, or raise NoReply if none has come in time. what: its name, for the reader."""
     if message is None:
-        raise NoReply(Fault(reason=f"no {what} within {timeout} s", advice="is its service running?"))
+        within = " any more: the connection is over" if timeout is None else f" within {timeout} s"
+        raise NoReply(Fault(reason=f"no {what}{within}", advice="is its service running?"))
     return message

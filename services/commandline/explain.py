@@ -19,6 +19,7 @@ from engage_hri.schemas.fragments import GestureChoice, PairConsidered, Referenc
 from engage_hri.services.commandline.generating import Unplanned, generated
 from engage_hri.services.commandline.options import Embodied, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.generation.block.emission import FragmentPlan
@@ -57,7 +58,7 @@ def main(options: Options) -> int:
             failure, plans = error, error.plans
     impossible = failure.choices if failure else ()
     if options.format == "json":
-        print(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
+        print_format(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)
     else:

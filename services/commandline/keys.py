@@ -12,6 +12,7 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import BusConfig
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.runtime.installation import extra_command
 
@@ -63,7 +64,7 @@ def main(options: Options) -> int:
         case "acl":
             from engage_hri.services.bus.zenoh.rules import access_control
 
-            print(json.dumps({"access_control": access_control(certificates.let_in(folder))}, indent=1))
+            print_format(json.dumps({"access_control": access_control(certificates.let_in(folder))}, indent=1))
     return DONE
 
 

@@ -20,6 +20,7 @@ from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Embodied, Strict, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
@@ -62,7 +63,7 @@ def main(options: Options) -> int:
                 reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
                 print(readable(Fault(reason=reason, where=plan.block.id), options.file), file=sys.stderr)
                 code = FAILED
-    print("\n".join(text.rstrip("\n") for text in texts))
+    (print if options.format == "text" else print_format)("\n".join(text.rstrip("\n") for text in texts))
     if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
     return code

@@ -1,5 +1,6 @@
 """Reading of the files on the command line: fragments, blocks, worlds. All are checked before anything moves."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -17,6 +18,8 @@ from engage_hri.schemas.world import World
 from engage_hri.services.runtime.service import Service
 
 Thing = Block | TurnFragment
+STDIN = Path("-")
+"""Stands for standard input."""
 
 
 class InputFile(Struct, frozen=True, kw_only=True):
@@ -69,7 +72,9 @@ def still(world: World, *, is_attentive: bool = False) -> Service:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        if path != STDIN:
+            return path.read_bytes()
+        return b"" if sys.stdin is None else sys.stdin.buffer.read()
     except OSError as error:
         raise InputRefused(
             Fault(reason=error.strerror or str(error), where=str(path), advice="check the path")
