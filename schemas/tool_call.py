@@ -39,6 +39,8 @@ _BEHAVIOR = re.compile(r"\$\.behaviors\[(?P<index>\d+)\](?:\.options\[(?P<option
 CALL = 'for example {"turn_status": "full", "parts": [{"say": "Hello."}]}'
 """Advice for a call that is none."""
 _KINDS = {kind.__struct_fields__[0]: kind for kind in PARTS}
+_OF_CALLS = {*_KINDS, *ToolInput.__struct_fields__} - {*TurnFragment.__struct_fields__}
+"""Keys by which a call, or a part of one, is known: a fragment has none of them."""
 
 
 def is_tool_input(parsed: dict[str, Any]) -> bool:
@@ -46,9 +48,7 @@ def is_tool_input(parsed: dict[str, Any]) -> bool:
     if "behaviors" in parsed:
         return False
     is_named = "id" in parsed or "type" in parsed
-    return "parts" in parsed or (
-        not is_named and not parsed.keys().isdisjoint((*_KINDS, *ToolInput.__struct_fields__))
-    )
+    return "parts" in parsed or (not is_named and not parsed.keys().isdisjoint(_OF_CALLS))
 
 
 def from_tool(parsed: dict[str, Any], id: str, source: str = "", path: str = "$") -> TurnFragment:

@@ -92,6 +92,14 @@ def checked(request: R) -> R:
     return request
 
 
+def taken(value: Any, kind: Any, where: str) -> Any:
+    """Return a value as readers of messages take it: of this type, and within its bounds. Raises InputRefused."""
+    try:
+        return msgspec.json.decode(msgspec.json.encode(value), type=kind)
+    except (UnicodeEncodeError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputRefused(Fault(reason=f"{value!r:.60} is refused: {error}", where=where)) from error
+
+
 def _encoded(encode: Callable[[], bytes]) -> bytes:
     """Encode input. Raises InputRefused for half a character, and for values that JSON does not have."""
     try:

@@ -39,7 +39,7 @@ def main(options: Options) -> int:
     around = read_world(options.world)
     documents, warnings = [], []
     with source.naming_file():
-        plans = generated(source.things, around, config, str(options.file))
+        plans = generated(source.things, around, config, str(source.path))
         blocks = {plan.block.id: plan.block for plan in plans}
         for plan in plans:
             block = in_dialect(core(plan.block) if options.core else plan.block, options.dialect, blocks)

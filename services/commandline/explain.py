@@ -49,11 +49,11 @@ def main(options: Options) -> int:
     fragments = [thing for thing in source.things if isinstance(thing, TurnFragment)]
     if not fragments:
         advice = "only turn fragments refer to objects; for a block: engage plan"
-        raise InputRefused(Fault(reason="holds no turn fragment", where=str(options.file), advice=advice))
+        raise InputRefused(Fault(reason="holds no turn fragment", where=str(source.path), advice=advice))
     failure: Unplanned | None = None
     with source.naming_file():
         try:
-            plans = generated(fragments, around, config, str(options.file))
+            plans = generated(fragments, around, config, str(source.path))
         except Unplanned as error:
             failure, plans = error, error.plans
     impossible = failure.choices if failure else ()

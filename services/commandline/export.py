@@ -76,7 +76,8 @@ def _path(options: Options, name: str) -> Path:
     ending = ENDINGS[name]
     if name == "film" and not _has_ffmpeg():
         ending = ".gif"
-    return options.file.with_suffix(ending)
+    file = options.file  # what follows the last dot of its name may be part of a date
+    return file.with_suffix(ending) if file.suffix == ".mcap" else file.with_name(file.name + ending)
 
 
 def _has_ffmpeg() -> bool:

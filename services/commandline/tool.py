@@ -26,8 +26,8 @@ def main(options: Options) -> int:
     made = tool_definition(options.format, world)
     if world is not None and (fields := unlisted(world)):
         complain(
-            f"tool: {' and '.join(map(repr, fields))} take any text: the APIs take at most {MOST_VALUES} values in all,"
-            f" {MOST_LETTERS} letters in a list of more than {MANY}; what is no id is refused when it is performed"
+            f"tool: {' and '.join(map(repr, fields))} take any text: the APIs take at most {MOST_VALUES} values in"
+            f" all, and {MOST_LETTERS} letters in a list of more than {MANY}. What is no id is refused when performed"
         )
     print_format(msgspec.json.format(msgspec.json.encode(made), indent=2).decode())
     return DONE

@@ -39,19 +39,23 @@ def apart(actor: str, name: str, annotations: Iterable[Annotation]) -> Iterator[
     begins so much later.
     """
     lanes: list[list[Annotation]] = []
-    ends: list[int] = []
-    """Of each lane the end of its last annotation as it really was, in whole milliseconds."""
+    ends: list[Seconds] = []
+    """Of each lane the end of its last annotation as it really was."""
     for one in sorted(annotations, key=lambda one: (one.begin, one.end)):
         at = round(one.begin * 1000)
-        number = next((number for number, end in enumerate(ends) if end <= at), len(lanes))
+        number = next((number for number, end in enumerate(ends) if round(end * 1000) <= at), len(lanes))
         if number == len(lanes):
             lanes.append([])
-            ends.append(0)
+            ends.append(0.0)
         begin = one.begin
-        if lanes[number] and (until := lanes[number][-1].milliseconds[1]) > at:
-            begin = max(until / 1000, lanes[number][-1].end)
-        ends[number] = max(at, round(one.end * 1000))
-        lanes[number].append(Annotation(begin, max(one.end, begin + SHORTEST), one.value))
+        if lanes[number]:
+            last = lanes[number][-1]
+            until = last.milliseconds[1]
+            if until > at or (last.end > ends[number] and last.end > begin):
+                begin = max(until / 1000, last.end)
+        ends[number] = max(one.begin, one.end)
+        end = one.end if one.end - begin >= SHORTEST - 1e-9 else begin + SHORTEST
+        lanes[number].append(Annotation(begin, end, one.value))
     for number, lane in enumerate(lanes, 1):
         yield Tier(f"{actor} {name}" if number == 1 else f"{actor} {name} {number}", actor, tuple(lane))
 
