@@ -37,6 +37,7 @@ SHELLS = {
     "services/control/voice/pipe.py",  # runs the process of a player
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
+    "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
     "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once

@@ -70,9 +70,9 @@ ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
-WEB = {"nicegui", "fastapi", "starlette", "uvicorn"}
-WITH_WEB = {"services/console/web/server.py", "services/console/web/page.py"}
-"""The only files with a web stack. It is the exception to "no threads": it reads the files of the page on worker
+WEB = {"starlette", "uvicorn"}
+WITH_WEB = {"services/console/web/server.py"}
+"""The only file with a web stack. It is the exception to "no threads": it reads the files of the page on worker
 threads, which touch nothing of ours; pages, frames and orders stay on the one loop."""
 
 NO_SUBJECTS = re.compile(
@@ -339,7 +339,7 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         ("services/control/x.py", "import math", "no place in the layers"),
         ("schemas/x.py", "from engage_hri.schemas.documents.xml_grammar import PARTS", "not below"),
         ("services/commandline/app.py", "import threading", "no threads"),
-        ("services/console/web/visitor.py", "from nicegui import ui", "for the window's server alone"),
+        ("services/console/web/visitor.py", "from starlette import routing", "for the window's server alone"),
         ("services/bus/zenoh/hub.py", "from concurrent.futures import ThreadPoolExecutor", "no threads"),
         ("services/commandline/app.py", "async def f():\n    await asyncio.to_thread(g)", "no threads"),
         ("services/commandline/app.py", "loop.run_in_executor(None, f)", "no threads"),
