@@ -31,8 +31,8 @@ class Behavior(Struct, frozen=True, kw_only=True, tag_field="type", omit_default
     id: unique in its block or fragment; sync references name it.
     required: if it cannot be performed, the whole block fails instead of going on without it.
     timing: sync references written at the behavior itself.
-    needs: ids of behaviors of the same block without which this one means nothing: once one of these has been dropped,
-    interrupted or refused by the body, this one is dropped, too. A behavior that has begun is finished all the same;
+    needs: ids of behaviors of the same block without which this one means nothing: once one of these is dropped,
+    interrupted or refused by the body, this one is dropped, too. One that has begun is finished all the same;
     a connection event is withdrawn even then, as long as it is undecided.
     line: of its XML source, from 1; 0 when there is none.
     """

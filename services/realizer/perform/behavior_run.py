@@ -192,8 +192,8 @@ class BehaviorRun:
     async def _really_begun(self, event: Event) -> Seconds:
         """Time at which an event begins that may: with the first report of what it needs, else now.
 
-        The body may refuse what it needs only as that begins. Then recognition must not hear of the event: to a person
-        who looks already, it would have succeeded at once.
+        The body may refuse what it needs only as that begins. Then recognition must not hear of the event: with a
+        person who looks already, it would succeed at once.
         """
         block, now = self._block, self._block.bus.now()
         starts = [Point(id, "start") for id in event.needs if id in block.decisions.plan.chains]

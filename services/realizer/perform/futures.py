@@ -43,7 +43,7 @@ class SyncPointFutures(Observer):
             future.set_result(None)
 
     def reached(self, point: Point) -> "asyncio.Future[Seconds]":
-        """Resolved when the behavior itself has passed `point`, with the time: other points of its instant may not."""
+        """Resolved when the behavior itself has passed `point`, with the time, whatever else is of that instant."""
         return _future(self._reached, point)
 
     def reach(self, point: Point, at: Seconds) -> None:

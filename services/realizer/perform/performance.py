@@ -234,7 +234,8 @@ class BlockPerformance:
         if self._needs_replan:
             self.replan()
         while not self._ending.done():
-            if not any([self.apply(effect) for effect in self.decisions.advance(self.bus.now())]):
+            made = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
+            if not any(made):
                 break
         foresight = self.decisions.foresight
         if foresight.is_surprised and self.report.may_expect() and not self._ending.done():

@@ -29,7 +29,14 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
 from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import (
-    BlockRefused, Equal, Problem, Relations, Term, as_dropped, at_line, relation_steps,
+    BlockRefused,
+    Equal,
+    Problem,
+    Relations,
+    Term,
+    as_dropped,
+    at_line,
+    relation_steps,
 )  # fmt: skip
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
