@@ -5,10 +5,11 @@ moved, or the body does not make the gesture. What failed is not tried again.
 """
 
 from collections.abc import Collection, Iterable, Mapping
+from typing import TypeGuard
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Reference
+from engage_hri.schemas.behaviors import FragmentBehavior, Reference
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
@@ -88,3 +89,15 @@ def first_that_differs(
         if new is None or made.object in bars or (old.gesture, old.phrase) != (new.gesture, new.phrase):
             return made.gestures
     return ()
+
+
+def with_other_words(fragment: TurnFragment, bars: Mapping[str, Mapping[str, str]]) -> TurnFragment | None:
+    """The fragment with phrases of ours for objects with barred gestures; None: it has no others to offer."""
+
+    def is_helpless(behavior: FragmentBehavior) -> TypeGuard[Reference]:
+        return isinstance(behavior, Reference) and behavior.target in bars and behavior.options is not None
+
+    if not any(map(is_helpless, fragment.behaviors)):
+        return None
+    behaviors = tuple(replace(each, options=None) if is_helpless(each) else each for each in fragment.behaviors)
+    return replace(fragment, behaviors=behaviors)

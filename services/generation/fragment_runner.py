@@ -28,6 +28,7 @@ from engage_hri.services.generation.choosing_again import (
     named_objects,
     open_references,
     remembered,
+    with_other_words,
     without,
 )
 from engage_hri.services.generation.config import GenerationConfig
@@ -137,6 +138,7 @@ class FragmentRunner:
         match message:
             case World():
                 self._world = message
+                self._turns.see([person.id for person in message.people], now)
                 self._looks_again.set()
             case ConnectionEvent():
                 self._events.feed(message, now)
@@ -201,6 +203,7 @@ class FragmentRunner:
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
+        self._progress.set()
         if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
             self._recognition_lost_at = None
             self._events.lose()
@@ -284,9 +287,16 @@ class FragmentRunner:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
                 before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
                 heard, permitted, config = self._heard_in(turn), permits(), self._config
-                made = await self._body.planned(
-                    planning(fragment, turn, world, body, without(motions, bars), permitted, config, before, heard)
-                )
+                reachable = without(motions, bars)
+                try:
+                    made = await self._body.planned(
+                        planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
+                    )
+                except Unreferable:
+                    if (freed := with_other_words(fragment, bars)) is None:
+                        raise
+                    fragment = performance.left = freed  # the author has no phrase that is enough without a gesture
+                    continue
                 if performance.is_over:  # cancelled meanwhile
                     return None
                 if permits() != permitted:

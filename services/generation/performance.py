@@ -80,6 +80,8 @@ class FragmentPerformance:
         """What the fragment refers to, as it was when the fragment came."""
         self.barred: dict[str, dict[str, str]] = {}
         """Gestures, `gaze` and `point`, that failed for objects, and why: they are not chosen again."""
+        self._unspoken: dict[str, str] = {}
+        """Speeches that were dropped, and why."""
         self.acts: list[Act] = []
         """All blocks so far."""
         self.accepted = False
@@ -229,6 +231,7 @@ class FragmentPerformance:
         # What fell with another behavior is not worth a word: that one is named.
         fallen = {each.id for each in act.plan.block.behaviors if {*each.needs} & {*why, *outcome.interrupted}}
         told = {id: reason for id, reason in why.items() if id not in fallen}
+        self._unspoken |= {id: reason for id, reason in told.items() if self._speaks(id)}
         self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in told.items()]
         if rest is not None:
             self.left, self.turn_left, self.plan, self.is_sent = rest.fragment, rest.turn, None, False
@@ -241,7 +244,7 @@ class FragmentPerformance:
             self._gaze = ""
             return
         status, fault = outcome.status, outcome.fault
-        silence = self._silence(why)
+        silence = self._silence()
         none_left = self._none_left(why)
         if silence is not None and (status == "done" or none_left):
             status, fault = "failed", silence
@@ -255,13 +258,15 @@ class FragmentPerformance:
         """True if the block ended by itself: because all came, or fell."""
         return outcome.status == "done" or (outcome.status == "failed" and self._none_left(why))
 
-    def _silence(self, why: Mapping[str, str]) -> Fault | None:
+    def _speaks(self, id: str) -> bool:
+        return isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)
+
+    def _silence(self) -> Fault | None:
         """Fault that names the dropped speeches of a fragment of which no word was spoken; None: there are none."""
-        unspoken = [id for id in why if isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)]
-        if not unspoken or any(has_words(each.text) for act in self.acts for each in act.spoken):
+        if not self._unspoken or any(has_words(each.text) for act in self.acts for each in act.spoken):
             return None
-        reasons = "; ".join(dict.fromkeys(why[id] for id in unspoken if why[id])) or "see the block's warnings"
-        lost = f"{', '.join(unspoken)} {'was' if len(unspoken) == 1 else 'were'} dropped"
+        reasons = "; ".join(dict.fromkeys(filter(None, self._unspoken.values()))) or "see the block's warnings"
+        lost = f"{', '.join(self._unspoken)} {'was' if len(self._unspoken) == 1 else 'were'} dropped"
         return Fault(reason=f"none of its words was spoken: {lost}: {reasons}", where=self.fragment.id)
 
     @property
