@@ -1,8 +1,8 @@
 """An independent reader of what a robot did: from feedback, the voice's words and told events alone.
 
-It takes nothing of generation, and nothing that computes summaries: `by`, `looked`, `eye_contact`, `said` and the status
-are decided once more from messages that the realizer, the body and recognition have sent, for turns in worlds that
-change at random. `python -m tests.generation.deeds --turns 10000` tries many, and prints each difference.
+It takes nothing of generation, and nothing that computes summaries: `by`, `looked`, `eye_contact`, `said`, the status
+_X_are decided once more from messages that the realizer, the body and recognition have sent, for turns in worlds
+that change at random. `python -m tests.generation.deeds --turns 10000` tries many, and prints each difference.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from engage_hri import perceive
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.summary import Summary, summary
+from engage_hri.schemas.summary import Referred, Summary, summary
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call, stream
@@ -90,6 +90,9 @@ class Reader:
             "said": letters(said), "references": made,
             "eye_contact": next((each for each in reversed(contact) if each is not None), None),
         }  # fmt: skip
+
+
+__all__ = ["Reader", "Referred", "compared", "run", "summary"]
 
 
 def letters(text: str) -> str:
