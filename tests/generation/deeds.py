@@ -1,7 +1,7 @@
 """An independent reader of what a robot did: from feedback, the voice's words and told events alone.
 
-It takes nothing of generation, and nothing that computes summaries: `by`, `looked`, `eye_contact`, `said`, the status
-_X_are decided once more from messages that the realizer, the body and recognition have sent, for turns in worlds
+It takes nothing of generation, and nothing that computes summaries: `by`, `looked`, `eye_contact`, `said` and status
+are decided once more from messages that the realizer, the body and recognition have sent, for turns in worlds
 that change at random. `python -m tests.generation.deeds --turns 10000` tries many, and prints each difference.
 """
 
