@@ -77,7 +77,7 @@ class RequestRefused(EngageError):
 
 
 class OutcomeUnknown(RunFailed):
-    """What performed a request is gone, or does not answer any more: nobody knows what was done of it."""
+    """Failure of a request whose server is gone, or silent: nobody knows what was done of it."""
 
 
 class ServerRestarted(OutcomeUnknown):

@@ -66,7 +66,7 @@ def reasons(outcome: BlockOutcome) -> Mapping[str, str]:
 
 
 class Rest(Struct, frozen=True):
-    """What is left to be performed of a fragment, and of its turn, after a block that was cut.
+    """Rest of a fragment, and of its turn, after a block that was cut.
 
     again: references that are chosen again, each with the gestures that failed, and why.
     """

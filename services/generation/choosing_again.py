@@ -1,4 +1,4 @@
-"""What the choice of references has to know besides the world as it is: what has left it, and what has failed. Pure.
+"""Knowledge for choosing references again, besides the world as it is: what has left it, what has failed. Pure.
 
 A reference is chosen again when what it was chosen for has changed before its words begin: the object has left or
 moved, or the body does not make the gesture. What failed is not tried again.

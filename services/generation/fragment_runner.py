@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
-from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
 from engage_hri.schemas.body import AbortBehavior, WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
@@ -21,16 +21,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, is_asked_to_stop
 from engage_hri.services.generation.body_link import BodyLink
-from engage_hri.services.generation.choosing_again import (
-    barred,
-    changed,
-    first_that_differs,
-    named_objects,
-    open_references,
-    remembered,
-    with_other_words,
-    without,
-)
+from engage_hri.services.generation.choosing_again import barred, named_objects, remembered, with_other_words, without
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
@@ -38,6 +29,7 @@ from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, planning, targets
+from engage_hri.services.generation.reconsideration import Reconsideration
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -82,10 +74,7 @@ class FragmentRunner:
         self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
         self._blocks: dict[asyncio.Task[None], str] = {}
         """Tasks that wait for the end of a fragment's block, and the turn of each."""
-        self._progress = asyncio.Event()
-        """Set whenever a fragment may have become one whose references are not chosen again."""
-        self._looks_again = asyncio.Event()
-        """Set when the objects of references under way may have moved or left."""
+        self._choosing = Reconsideration(bus, config, requests, leases, self._body, self._live)
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Part of each request id, so that the ids differ after a restart."""
         self._signals = 0
@@ -139,7 +128,6 @@ class FragmentRunner:
             case World():
                 self._world = message
                 self._turns.see([person.id for person in message.people], now)
-                self._looks_again.set()
             case ConnectionEvent():
                 self._events.feed(message, now)
                 self._discourse = self._discourse.hearing(message, self._bus.robot)
@@ -174,7 +162,7 @@ class FragmentRunner:
         # A fragment that has ended is second choice, but it still hears of its events.
         performance = min(named, key=lambda each: each.is_over)
         performance.feed(progress)
-        self._progress.set()
+        self._choosing.look_again(self._world)
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn)
         self._follow_gaze(performance)
@@ -203,7 +191,7 @@ class FragmentRunner:
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
-        self._progress.set()
+        self._choosing.look_again(self._world)
         if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
             self._recognition_lost_at = None
             self._events.lose()
@@ -244,25 +232,19 @@ class FragmentRunner:
         The blocks of one turn are sent at once: each names the points of the others that it follows.
         """
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._keep_choosing(), name="choices")
+            tasks.create_task(self._choosing.keep(), name="choices")
             while True:
                 performance = await self._line.get()
                 turn = performance.turn.turn
                 if before := [block for block, its in self._blocks.items() if its != turn]:
                     await asyncio.wait(before)
-                await self._all_chosen(turn)
+                await self._choosing.all_made(turn)
                 if not performance.is_over and (pending := await self._begin(performance)) is not None:
                     block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
                     self._blocks[block] = turn
                     block.add_done_callback(self._blocks.pop)
                 with self._bus.containing(f"what follows the beginning of fragment {performance.fragment.id}"):
                     self._changed(self._bus.now())
-
-    async def _all_chosen(self, turn: str) -> None:
-        """Wait until no reference of the turn's fragments under way is chosen again: words follow on words."""
-        while any(each.acts and each.may_choose_again for each in self._live.values() if each.turn.turn == turn):
-            self._progress.clear()
-            await self._progress.wait()
 
     async def _begin(self, performance: FragmentPerformance) -> Pending | None:
         """Plan and send a block of a fragment. Returns its accepted request; None if the fragment has ended."""
@@ -313,7 +295,7 @@ class FragmentRunner:
                     named = [mention.object for mention in made.mentions]
                     self._discourse = self._heard_in(turn).naming(fragment.id, named)
                     performance.is_sent = True
-                    self._looks_again.set()
+                    self._choosing.look_again(self._world)
                     return pending
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())
@@ -371,51 +353,6 @@ class FragmentRunner:
         with self._bus.containing(f"the end of fragment {performance.fragment.id}"):
             self._block_ended(performance)
             self._changed(self._bus.now())
-
-    # -- references that are chosen again -------------------------------------------------------------------------
-
-    async def _keep_choosing(self) -> None:
-        """Look again at the choice of references whose objects have moved or left since it was made."""
-        while True:
-            await self._looks_again.wait()
-            self._looks_again.clear()
-            for performance in list(self._live.values()):
-                if self._has_changed(performance):
-                    with self._bus.containing(f"another choice for fragment {performance.fragment.id}"):
-                        await self._choose_again(performance)
-
-    def _has_changed(self, performance: FragmentPerformance) -> bool:
-        then, now = performance.world, self._world
-        is_going_on = performance.plan is not None and performance.is_sent and not performance.is_over
-        return is_going_on and then is not None and now is not None and changed(performance.acts[-1], then, now)
-
-    async def _choose_again(self, performance: FragmentPerformance) -> None:
-        """Take out the gestures of the first reference that would be made otherwise in the world as it is now.
-
-        What needs them falls, and the rest of the fragment is performed by another block (see `_await_end`).
-        """
-        act, turn, now = performance.acts[-1], performance.turn_left, self._world
-        assert now is not None
-        performance.world = world = remembered(now, performance.known)
-        fragment = open_references(performance.left, act)
-        bars = barred(targets(fragment), now, performance.known, performance.barred)
-        permits = self._leases.permits()
-        try:
-            motions = await self._body.motions(targets(fragment), permits.only_hand)
-            motions, config = without(motions, bars), self._config
-            made = await self._body.planned(
-                planning(fragment, turn, world, self._body.capabilities, motions, permits, config)
-            )
-            choices = made.choices
-        except Unreferable:
-            choices = ()
-        except EngageError:
-            return  # the body does not answer: its realizer will tell
-        if performance.is_over or performance.plan is None or performance.acts[-1] is not act:
-            return
-        for gesture in first_that_differs(act, choices, bars):
-            id = f"{performance.block_id}/{gesture}:again"
-            self._requests.send(keys.BLOCK, InterruptBehavior(id=id, block=performance.fragment.id, behavior=gesture))
 
     def _block_ended(self, performance: FragmentPerformance) -> None:
         """Draw the consequences of a block that has ended, or that will never be, for turn, head and discourse."""

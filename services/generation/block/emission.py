@@ -91,19 +91,15 @@ class Emission:
         self.kept = [each for old in kept if (each := punctuation.rest.get(old.id, old)) is not None]
         self.order = [each for old in order if (each := punctuation.rest.get(old.id, old)) is not None]
         self.parts: dict[str, Parts] = {}
-        self.hinge: tuple[str, ...] = ()
-        """The phrase that what comes now needs (see `Parts`)."""
-        self.needs: dict[str, tuple[str, ...]] = {}
-        """What the author's behaviors need."""
+        self.hinge: tuple[str, ...] = ()  # the phrase that what comes now needs (see `Parts`)
+        self.needs: dict[str, tuple[str, ...]] = {}  # of the author's behaviors
         for behavior in self.order:
-            self.needs[behavior.id] = self.hinge
             if isinstance(behavior, Reference):
-                hand = hands.get(behavior.id, permits.only_hand)
-                closing = punctuation.closings.get(behavior.id, "")
+                hand, closing = hands.get(behavior.id, permits.only_hand), punctuation.closings.get(behavior.id, "")
                 parts = Parts(behavior, chosen[behavior.id], closing, self.names, turn, hand, self.hinge)
                 self.parts[behavior.id] = parts
                 self.hinge = parts.hinge or self.hinge
-                self.needs[behavior.id] = self.hinge
+            self.needs[behavior.id] = self.hinge
         tie_needs(self.needs, self.kept, fragment)
         self.named = points_named(fragment.id, fragment.behaviors, fragment.constraints)
         self.named_behaviors = {behavior for behavior, _ in self.named}
@@ -170,14 +166,13 @@ class Emission:
         return behaviors
 
     def _passed_through(self, behavior: BlockBehavior) -> BlockBehavior:
-        timing, needs = self.rewriting.timing(behavior), self._needs(behavior)
         if isinstance(behavior, Pointing) and behavior.mode is None and self.permits.only_hand:
-            return msgspec.structs.replace(behavior, timing=timing, needs=needs, mode=self.permits.only_hand)
-        is_as_before = timing == behavior.timing and needs == behavior.needs
-        return behavior if is_as_before else msgspec.structs.replace(behavior, timing=timing, needs=needs)
+            behavior = msgspec.structs.replace(behavior, mode=self.permits.only_hand)
+        timing, needs = self.rewriting.timing(behavior), self._needs(behavior)
+        return msgspec.structs.replace(behavior, timing=timing, needs=needs)
 
     def _needs(self, behavior: BlockBehavior) -> tuple[str, ...]:
-        """What a behavior of the author needs: what it says itself, and what it stands behind."""
+        """Ids that a behavior of the author needs: those that it names, and the phrase that it stands behind."""
         said: list[str] = []
         for needed in behavior.needs:
             parts = self.parts.get(needed)
@@ -271,7 +266,7 @@ class Emission:
 
     def _glance(self, parts: Parts) -> Operator:
         parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
-        needs = parts.hinge or self.needs[parts.reference.id]
+        needs = self.needs[parts.reference.id]
         parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee, needs=needs))
         return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
@@ -315,11 +310,11 @@ class Emission:
         id: str,
         kind: EventKind,
         start: str,
+        needs: tuple[str, ...] = (),
         *,
         accept: tuple[Action, ...] = (),
         within: Seconds | None = None,
         optional: bool = False,
-        needs: tuple[str, ...] = (),
     ) -> Event:
         """An event of the turn. start: the sync point with which it begins; "": it begins with the block."""
         return Event(
@@ -332,24 +327,20 @@ class Emission:
         """The turn's event or signal that begins with the first speech, or with the block if there is none."""
         turn = self.turn
         start = f"{self.speeches[0]}:start" if self.speeches else ""
-        is_hinge = any((self.speeches[0],) == parts.hinge for parts in self.parts.values()) if start else False
-        needs = (self.speeches[0],) if is_hinge else ()
+        needs = next((each.hinge for each in self.parts.values() if [*each.hinge] == self.speeches[:1]), ())
         if turn.announces_pair:
-            pair = self._event(
-                "turn-pair", "adjacency_pair", start, accept=turn.accept, within=turn.within, needs=needs
-            )
-            return [pair]
+            return [self._event("turn-pair", "adjacency_pair", start, needs, accept=turn.accept, within=turn.within)]
         if turn.reply:
             id = self.names.fresh(f"turn-{turn.reply}")
             timing = (Timing("start", start),) if start else ()
-            actor = turn.addressee
-            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=actor, timing=timing, needs=needs)]
+            who = turn.addressee
+            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=who, timing=timing, needs=needs)]
         if turn.backchannel:
             nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
             if not start and nod and not self.permits.speech_only:
                 start = f"{nod}:start"
             about = (start.rpartition(":")[0],) if start else ()
-            return [self._event("backchannel", "backchannel", start, needs=about)]
+            return [self._event("backchannel", "backchannel", start, about)]
         return []
 
     def _closing(self) -> list[BlockBehavior]:

@@ -9,7 +9,7 @@ from engage_hri.services.generation.turns.policy import TurnPlan
 
 
 class Made(Struct, frozen=True):
-    """What a block has for one reference: ids of its behaviors; "": it has none.
+    """Ids of the behaviors that a block has for one reference; "": it has none.
 
     words: of its phrase, as chosen. falls: the phrase falls with a gesture (see `Parts`).
     """
@@ -117,7 +117,7 @@ class Parts:
 
     @property
     def hinge(self) -> tuple[str, ...]:
-        """What the behaviors behind it need: its phrase, if that falls with a gesture."""
+        """Ids that the behaviors behind it need: its phrase, if that falls with a gesture."""
         return (self.phrase,) if self.made.falls else ()
 
     @property

@@ -234,8 +234,7 @@ class BlockPerformance:
         if self._needs_replan:
             self.replan()
         while not self._ending.done():
-            made = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
-            if not any(made):
+            if not any([self.apply(each) for each in self.decisions.advance(self.bus.now())]):  # noqa: C419
                 break
         foresight = self.decisions.foresight
         if foresight.is_surprised and self.report.may_expect() and not self._ending.done():

@@ -17,6 +17,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
+from engage_hri.services.realizer.plan.comparison import compared
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
@@ -27,7 +28,6 @@ from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
-from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import (
     BlockRefused,
     Equal,
@@ -177,7 +177,7 @@ class _Planner:
                 plan = yield from self._plan(present, classes)
                 if self.untied:
                     present, _ = yield from self._remaining(said)
-                return (yield from self._compared(plan, present))
+                return (yield from compared(plan, present, self.known))
             except Misordered:
                 continue
             except Losses as found:
@@ -211,15 +211,6 @@ class _Planner:
 
     def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
         return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
-
-    def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
-        """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
-        if not self.known.points:
-            return replace(plan, relations=replace(plan.relations))
-        times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
-        yield len(times) // 4
-        broken = yield from broken_by(said, times)
-        return replace(plan, relations=replace(said), broken=tuple(broken))
 
     def _lose(self, loss: Loss) -> None:
         id = loss.behavior
