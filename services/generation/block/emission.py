@@ -168,8 +168,8 @@ class Emission:
     def _passed_through(self, behavior: BlockBehavior) -> BlockBehavior:
         if isinstance(behavior, Pointing) and behavior.mode is None and self.permits.only_hand:
             behavior = msgspec.structs.replace(behavior, mode=self.permits.only_hand)
-        timing, needs = self.rewriting.timing(behavior), self._needs(behavior)
-        return msgspec.structs.replace(behavior, timing=timing, needs=needs)
+        new = msgspec.structs.replace(behavior, timing=self.rewriting.timing(behavior), needs=self._needs(behavior))
+        return behavior if new == behavior else new
 
     def _needs(self, behavior: BlockBehavior) -> tuple[str, ...]:
         """Ids that a behavior of the author needs: those that it names, and the phrase that it stands behind."""
