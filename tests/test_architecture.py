@@ -17,7 +17,7 @@ import pytest
 from tests.shells import SHELLS
 
 ROOT = Path(__file__).resolve().parents[1]
-LONGEST = 400
+LONGEST = 600
 """Lines."""
 CODE = ("engage_hri", "schemas", "services", "examples", "benchmarks", "tests")
 
@@ -59,8 +59,8 @@ LAYERS = {
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions blame estimates refusals switching told unheard waiting > live warned > body"
     " > calibration > extras fitting > variability > config",
-    "services/generation": "service > fragment_runner > performance > body_link fragment_check > pipeline"
-    " > block head > references turns > permits > config",
+    "services/generation": "service > fragment_runner > reconsideration > performance > body_link choosing_again"
+    " fragment_check > acts pipeline > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
 }

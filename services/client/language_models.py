@@ -16,9 +16,9 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
-from engage_hri.schemas.summary import Summary, refusal, summary
+from engage_hri.schemas.summary import Summary, refusal, summary, unknown
 from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
@@ -53,7 +53,7 @@ def summary_of(error: EngageError) -> Summary:
     """Summary of a fragment for which `Robot.perform` raised `error`."""
     if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
         return summary(error.outcome)
-    return refusal(error.fault)
+    return unknown(error.fault) if isinstance(error, OutcomeUnknown) else refusal(error.fault)
 
 
 async def stream(
@@ -175,6 +175,12 @@ class _Speaking:
     def _as_outcome(self, id: str, error: EngageError) -> FragmentOutcome:
         if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
             return error.outcome
-        if isinstance(error, InputRefused):
+        if is_refused := isinstance(error, InputRefused):
             self._refused.add(id)
-        return FragmentOutcome(id=id, fragment=id, status="failed", fault=error.fault)
+        is_unknown = isinstance(error, OutcomeUnknown)
+        return FragmentOutcome(
+            id=id,
+            fragment=id,
+            status="refused" if is_refused else "unknown" if is_unknown else "failed",
+            fault=error.fault,
+        )

@@ -86,6 +86,9 @@ class PerceivedPerson:
         """Move the face to another place.
 
         position: metres, in the robot's frame.
+
+        Raises:
+            InputRefused: `position` is not a place.
         """
         self._check()
         self.bring(replace(self._body, position=taken(position, Vector, f"{self.id}: position")))
@@ -94,6 +97,9 @@ class PerceivedPerson:
         """Put entities into the world, or change them there: things, hands, the person.
 
         entities: as they are now; each replaces what has its id.
+
+        Raises:
+            InputRefused: an entity is not one that a world can hold.
         """
         self._check()
         taken(World(entities=entities), World, f"{self.id}: entities")
@@ -141,6 +147,9 @@ class PerceivedPerson:
         target: its id.
         to: place where it is laid, in a straight line, metres; None: it stays where it is.
         seconds: how many it takes.
+
+        Raises:
+            InputRefused: `seconds` is not a duration, or `to` not a place.
         """
         taken(seconds, Duration, f"{self.id}: seconds")
         place = None if to is None else taken(to, Vector, f"{self.id}: to")
@@ -170,6 +179,9 @@ class PerceivedPerson:
         seconds: that the speech takes; None: as long as such words do.
         partial: tell the words also while they are spoken, as a recognizer does.
         delay: seconds from the end of the speech until the words are known for good.
+
+        Raises:
+            InputRefused: `text` is not text, or `seconds` not a duration.
         """
         self._check_text(text)
         duration = speaking_time(text) if seconds is None else taken(seconds, Duration, f"{self.id}: seconds")
@@ -214,6 +226,9 @@ class PerceivedPerson:
 
         action: `look`, `speak`, `nod`, `shake`, `point` or `act`.
         targets: ids of entities; an actor's id means the face.
+
+        Raises:
+            InputRefused: `action` is not one of these, or a target is not an id.
         """
         taken(action, Action, f"{self.id}: action")
         self._check(*taken(targets, tuple[str, ...], f"{self.id}: targets"))
