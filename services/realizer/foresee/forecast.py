@@ -72,6 +72,7 @@ class Forecast(LongestPaths):
             if bound.kind == "phase"
         }
         unkept = {(plan.at.get(each.late), plan.at.get(each.early)): each.seconds for each in plan.broken}
+        unkept = {ends: seconds for ends, seconds in unkept.items() if ends not in plan.late}
         # What is tied to a point of another block keeps its distances: all of it is as late for that point.
         abroad = {plan.at.get(each.early): each.seconds for each in plan.broken if is_foreign(each.early.behavior)}
         for bound in net.bounds:

@@ -22,6 +22,7 @@ from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner, eased, missed, standing
 from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
@@ -55,13 +56,15 @@ def plan_block(
     known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
     turns: frozenset[Turn] = frozenset(),
+    manner: Manner = AT_EASE,
 ) -> Plan:
     """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
     dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
     cannot be done. turns: those to begin with.
     """
-    return finished(plan_steps(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns))
+    steps = plan_steps(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns, manner=manner)
+    return finished(steps)
 
 
 def plan_steps(
@@ -72,9 +75,10 @@ def plan_steps(
     known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
     turns: frozenset[Turn] = frozenset(),
+    manner: Manner = AT_EASE,
 ) -> Steps[Plan]:
     """Plan as `plan_block` does, in steps. turns: those to begin with."""
-    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known)
+    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known, manner)
     planner.parts = PartOrder(turns)
     yield from planner.read()
     return (yield from planner.plan())
@@ -88,8 +92,11 @@ class _Planner:
         dropped: Iterable[str],
         barred: Container[tuple[str, Hand]],
         known: Known,
+        manner: Manner,
     ) -> None:
         self.block = block
+        self.manner = manner
+        self.late: Late = {}
         self.known = known
         self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
         self.untied: set[Point] = set(known.untied)  # see `Plan`
@@ -99,7 +106,9 @@ class _Planner:
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
-        self.dropped = dict.fromkeys(dropped)  # in the order in which they were dropped; the values mean nothing
+        self.dropped = dict.fromkeys(
+            [*dropped, *(each.behavior for each in manner.lost)]
+        )  # in the order in which they were dropped; the values mean nothing
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
@@ -112,7 +121,7 @@ class _Planner:
 
     def read(self) -> Steps[None]:
         self.relations = yield from relation_steps(self.block, self.known.blocks)
-        self.problems = list(self.relations.problems)
+        self.problems = [*dict.fromkeys((*self.relations.problems, *self.manner.lost))]
         for portion in portions(self.block.behaviors):
             for behavior in portion:
                 if behavior.id not in self.dropped:
@@ -206,7 +215,7 @@ class _Planner:
 
     def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
         """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
-        if not self.known.points:
+        if not (self.known.points or plan.late):
             return replace(plan, relations=replace(plan.relations))
         times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
         yield len(times) // 4
@@ -272,7 +281,7 @@ class _Planner:
             conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
             rivals = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
-            if losses := (yield from rivals):
+            if (losses := (yield from rivals)) and not self.manner.may_be_late:
                 raise Losses(losses)
             for part in portions(conflicts):
                 for conflict in part:
@@ -304,6 +313,8 @@ class _Planner:
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=arranged.ranked,
             turns=self.turns,
+            manner=self.manner,
+            late=self.late,
             holders={
                 name: given[name].parts for name in sorted({turn[1].behavior for turn in self.turns} & given.keys())
             },
@@ -338,6 +349,8 @@ class _Planner:
         """
         while True:
             assembly = yield from assembler.assemble(arrangement)
+            net = standing(assembly.net, assembly.at, self.chains, self.manner.stands)
+            assembly = replace(assembly, net=net)
             if assembly.is_ordered or not (circles := (yield from assembler.circles())):
                 break
             for points in circles:
@@ -347,7 +360,11 @@ class _Planner:
         try:
             times = foresight.foreseen(assembly, self.known, self.doubted)
             behind = tuple(foresight.awaited(assembly, self.known, self.waived))
-            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times, behind)
+            is_custom, may_be_late = (lambda ties: bool(assembly.waits(ties))), self.manner.may_be_late
+            solution = yield from predict(net, is_custom, times, behind, may_be_late)
+            if may_be_late:
+                self.late = missed(net, solution.times)
+                assembly = replace(assembly, net=eased(net, self.late))
             if (yield from self.order.pass_alone(assembly.net, assembly.at, solution.times)):
                 raise Misordered
             return assembler, assembly, solution
