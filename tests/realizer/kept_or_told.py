@@ -1,6 +1,7 @@
-"""Blocks in XML on a simulated body, in virtual time: is each constraint kept, or was it told at planning that it is not?
+"""Blocks in XML on a simulated body, in virtual time: is each constraint kept, or told not to be at planning?
 
-    python -m tests.realizer.kept_or_told [--pairs] [--offsets 20] [--blocks 2000] [--seed 0] [--part 0/2]
+    python -m tests.realizer.kept_or_told [--step 0.05] [--only head] [--part 0/2]    every pair of one type
+    python -m tests.realizer.kept_or_told --blocks 2000 [--seed 0] [--part 0/2]       random blocks
 
 The oracle reads the document by the rules of docs/bml.md (`tests/judge/reading.py`) and the feedback. It knows no
 body and no plan.
@@ -9,7 +10,7 @@ body and no plan.
 import argparse
 import asyncio
 import re
-import sys
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from itertools import combinations
@@ -30,8 +31,9 @@ from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Requester, RequestRefused
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.judge.reading import Reading, Relation, Term, read
-from tests.realizer.exact_blocks import WORLD
+from tests.judge.generate import story
+from tests.judge.reading import Reading, Term, read
+from tests.judge.story import WORLD
 
 KEPT = 0.012
 """Seconds by which a constraint may be missed untold, or by another amount than told."""
@@ -39,9 +41,9 @@ BML = "http://www.bml-initiative.org/bml/bml-1.0"
 
 
 class Told(NamedTuple):
-    """What came of a block. times: of each point, from the block's start. planned, later: warnings, by when they came.
+    """What came of a block. times: of each point, from the block's start.
 
-    outcome: None if the block was refused.
+    planned, later: warnings that came before its first point, and after. outcome: None if the block was refused.
     """
 
     block: Reading
@@ -118,7 +120,7 @@ def missed(told: Told) -> Iterator[Missed]:
                 continue
             gap = abs(at - then) if relation.kind == "same" else at - then if relation.kind == "after" else then - at
             if gap > KEPT:
-                yield Missed(relation.text, gap, _warned(one, other, gap, relation, told))
+                yield Missed(relation.text, gap, _warned(one, other, gap, told))
 
 
 def _time(term: Term, told: Told) -> float | None:
@@ -129,9 +131,14 @@ def _time(term: Term, told: Told) -> float | None:
     return None if at is None else at + term.offset
 
 
-def _warned(one: Term, other: Term, gap: float, relation: Relation, told: Told) -> float | None:
-    """Seconds by which a warning at planning says that one of the two is not on time: those nearest to the truth."""
+def _warned(one: Term, other: Term, gap: float, told: Told) -> float | None:
+    """Seconds by which a warning at planning says that one of the two is not on time: those nearest to the truth.
+
+    A speech that gives a time up for its words says which, and not by how much.
+    """
     ids = {one.place.behavior, other.place.behavior}
+    if any(each.kind == "IMPOSSIBLE_TO_SCHEDULE" and each.behavior in ids for each in told.planned):
+        return gap
     said = [
         float(match[1])
         for each in told.planned
@@ -142,17 +149,16 @@ def _warned(one: Term, other: Term, gap: float, relation: Relation, told: Told) 
     return min(said, key=lambda seconds: abs(seconds - gap), default=None)
 
 
-# -- pairs of one type ------------------------------------------------------------------------------------------------
+# -- pairs of one type -----------------------------------------------------------------------------------------------
 
 SEVEN = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
 FOUR = ("start", "ready", "relax", "end")
 PAIRS = {
     "head": (SEVEN, 'head id="{id}" lexeme="NOD"', 'head id="{id}" lexeme="NOD"'),
     "gesture": (SEVEN, *['gesture id="{id}" lexeme="BEAT" mode="LEFT_HAND"'] * 2),
-    "gaze": (FOUR, 'gaze id="{id}" target="box"', 'gaze id="{id}" target="ball"'),
+    "gaze": (FOUR, 'gaze id="{id}" target="box"', 'gaze id="{id}" target="cup"'),
 }
 """Points of each type, and two behaviors of it."""
-OWN = {"start", "strokeStart", "stroke", "strokeEnd", "ready", "relax", "end"}
 
 
 def pairs(offsets: list[float]) -> Iterator[tuple[str, str]]:
@@ -167,39 +173,49 @@ def pairs(offsets: list[float]) -> Iterator[tuple[str, str]]:
                     yield name, f'<bml xmlns="{BML}" id="k"><{first}/><{second} {own}="a:{to}+{offset:g}"/></bml>'
 
 
+def random_blocks(seed: int, blocks: int) -> Iterator[tuple[str, str]]:
+    """So many random blocks: a name and the block."""
+    for number in range(blocks):
+        yield f"block {number}", story(seed, number, "alone").blocks[0].xml
+
+
+def offsets(step: float) -> list[float]:
+    """Offsets from 0.05 to 1 s, and three at random."""
+    chance = Random(1)
+    return [
+        *(round(step * n, 3) for n in range(1, round(1 / step) + 1)),
+        *(round(chance.uniform(0.05, 1.0), 3) for _ in range(3)),
+    ]
+
+
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--step", type=float, default=0.05)
     arguments.add_argument("--part", default="0/1")
     arguments.add_argument("--only", default="")
+    arguments.add_argument("--blocks", type=int, default=0)
+    arguments.add_argument("--seed", type=int, default=0)
     given = arguments.parse_args()
     part, parts = map(int, given.part.split("/"))
-    offsets = [round(given.step * n, 3) for n in range(1, round(1 / given.step) + 1)]
-    chance = Random(1)
-    offsets += [round(chance.uniform(0.05, 1.0), 3) for _ in range(3)]
-    count = kept = told = dropped = refused = silent = 0
-    for number, (name, xml) in enumerate(pairs(offsets)):
+    cases = random_blocks(given.seed, given.blocks) if given.blocks else pairs(offsets(given.step))
+    count: Counter[str] = Counter()
+    for number, (name, xml) in enumerate(cases):
         if number % parts != part or given.only not in name:
             continue
-        count += 1
         each = perform(xml)
         found = list(missed(each))
-        bad = [it for it in found if it.is_silent]
-        silent += bool(bad)
-        told += bool(found) and not bad
-        refused += each.outcome is None
-        dropped += each.outcome is not None and bool(each.outcome.dropped)
-        if bad:
-            print(name, f"off {bad[0].seconds:.3f} told {bad[0].told} end {each.end:.3f}", flush=True)
+        if silent := [it for it in found if it.is_silent]:
+            count["in silence"] += 1
+            later = [it.message for it in each.later if it.kind == "LATE"]
+            print(name, *(f"{it.text} off {it.seconds:.3f} told {it.told}" for it in silent), later, flush=True)
+        elif each.outcome is None:
+            count["refused"] += 1
         elif found:
-            print(name, f"TOLD {found[0].seconds:.3f} {found[0].told}", flush=True)
-        elif each.outcome is None or each.outcome.dropped:
-            why = [it.message for it in (*each.planned, *each.later)]
-            print(name, "DROPPED", why, flush=True)
-        kept += not found and each.outcome is not None and not each.outcome.dropped
-    print(f"{count} pairs: {kept} kept, {told} told late, {dropped} dropped, {refused} refused, {silent} in silence")
+            count["told at planning"] += 1
+        else:
+            count["with a behavior dropped" if each.outcome.dropped else "kept"] += 1
+    print(sum(count.values()), dict(count))
 
 
 if __name__ == "__main__":
     main()
-    sys.exit()

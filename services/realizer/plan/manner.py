@@ -21,7 +21,7 @@ STAND: Seconds = 0.05
 
 
 class Manner(Struct, frozen=True):
-    """stands: hold points at which behaviors stand. may_be_late: true if a time is missed rather than a behavior lost.
+    """stands: hold points at which behaviors stand. may_be_late: true to miss times, and lose no behavior.
 
     lost: why behaviors are dropped all the same: what the body promises leaves no time for them.
     """
@@ -51,21 +51,18 @@ def standing(
     return replace(net, places=tuple(places)) if len(places) > len(net.places) else net
 
 
-def missed(net: PetriNet, times: Sequence[Seconds]) -> Late:
-    """The bounds on what the block says that these times miss."""
-    return {
+def eased(net: PetriNet, times: Sequence[Seconds]) -> tuple[PetriNet, Late]:
+    """The net with the bounds on what the block says as much later as these times miss them, and which those are.
+
+    So whoever performs it hurries as the plan does, and no more.
+    """
+    late = {
         (each.source, each.target): by
         for each in net.bounds
         if not each.behavior and (by := times[each.source] + each.lag - times[each.target]) > EPSILON
     }
-
-
-def eased(net: PetriNet, late: Late) -> PetriNet:
-    """The net with the bounds that are missed as much later: whoever performs it hurries for them, and no more."""
-    if not late:
-        return net
     bounds = [
         each if each.behavior else replace(each, lag=each.lag - late.get((each.source, each.target), 0.0))
         for each in net.bounds
     ]
-    return replace(net, bounds=tuple(bounds))
+    return replace(net, bounds=tuple(bounds)), late

@@ -22,7 +22,7 @@ from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
-from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner, eased, missed, standing
+from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner, eased, standing
 from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
@@ -45,26 +45,7 @@ from engage_hri.services.realizer.plan.speaking_order import Misordered, Speakin
 from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
-from engage_hri.services.runtime.steps import PORTION, Steps, finished, portions
-
-
-def plan_block(
-    block: Block,
-    estimates: Iterable[Estimate] = (),
-    *,
-    dropped: Iterable[str] = (),
-    known: Known = NOTHING,
-    barred: Container[tuple[str, Hand]] = (),
-    turns: frozenset[Turn] = frozenset(),
-    manner: Manner = AT_EASE,
-) -> Plan:
-    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
-
-    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
-    cannot be done. turns: those to begin with.
-    """
-    steps = plan_steps(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns, manner=manner)
-    return finished(steps)
+from engage_hri.services.runtime.steps import PORTION, Steps, in_one_go, portions
 
 
 def plan_steps(
@@ -77,11 +58,19 @@ def plan_steps(
     turns: frozenset[Turn] = frozenset(),
     manner: Manner = AT_EASE,
 ) -> Steps[Plan]:
-    """Plan as `plan_block` does, in steps. turns: those to begin with."""
+    """Plan `block` in steps; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
+
+    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
+    cannot be done. turns: those to begin with. manner: see there.
+    """
     planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known, manner)
     planner.parts = PartOrder(turns)
     yield from planner.read()
     return (yield from planner.plan())
+
+
+plan_block = in_one_go(plan_steps)
+"""Plan as `plan_steps` does, in one go."""
 
 
 class _Planner:
@@ -174,11 +163,12 @@ class _Planner:
         while True:
             self.turns = self.parts.turns - self.overlaps
             said = self.relations
-            present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
+            left = untied(said, self.untied) if self.untied else said
+            present, classes = yield from remaining(left, self.chains, self.dropped, self.block.id)
             try:
                 plan = yield from self._plan(present, classes)
                 if self.untied:
-                    present, _ = yield from self._remaining(said)
+                    present, _ = yield from remaining(said, self.chains, self.dropped, self.block.id)
                 return (yield from self._compared(plan, present))
             except Misordered:
                 continue
@@ -209,9 +199,6 @@ class _Planner:
                     yield len(part)
                 self.order.begin_anew(self.chains)
                 self.parts.begin_anew()
-
-    def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
-        return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
 
     def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
         """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
@@ -278,7 +265,9 @@ class _Planner:
             waits = foresight.waits(assembly, self.known)
             sharing = share(self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits)
             arranged, others = yield from sharing
-            conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
+            conflicts = [
+                each for each in (*conflicts, *others) if each.is_open(self.known.begun, self.overlaps | self.turns)
+            ]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
             rivals = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
             if (losses := (yield from rivals)) and not self.manner.may_be_late:
@@ -332,14 +321,6 @@ class _Planner:
             ),
         )
 
-    def _is_open(self, conflict: Conflict) -> bool:
-        """True if a conflict can be settled: who has begun waits no more."""
-        if conflict.hand:
-            return True
-        assert conflict.turn is not None
-        is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
-        return conflict.turn[0] not in self.known.begun and not is_settled
-
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
     ) -> Steps[tuple[Assembler, Assembly, Solution]]:
@@ -350,7 +331,6 @@ class _Planner:
         while True:
             assembly = yield from assembler.assemble(arrangement)
             net = standing(assembly.net, assembly.at, self.chains, self.manner.stands)
-            assembly = replace(assembly, net=net)
             if assembly.is_ordered or not (circles := (yield from assembler.circles())):
                 break
             for points in circles:
@@ -363,8 +343,8 @@ class _Planner:
             is_custom, may_be_late = (lambda ties: bool(assembly.waits(ties))), self.manner.may_be_late
             solution = yield from predict(net, is_custom, times, behind, may_be_late)
             if may_be_late:
-                self.late = missed(net, solution.times)
-                assembly = replace(assembly, net=eased(net, self.late))
+                net, self.late = eased(net, solution.times)
+            assembly = replace(assembly, net=net)
             if (yield from self.order.pass_alone(assembly.net, assembly.at, solution.times)):
                 raise Misordered
             return assembler, assembly, solution

@@ -114,7 +114,7 @@ def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> 
 
 
 def _said(circle: Circle) -> int | None:
-    """Number of the tie in a circle by which something may be late: of the bounds of the block, on the last instant."""
+    """Number of the tie in a circle that may be missed: of what the block says, that of the last instant."""
     said = [number for number, (tie, _) in enumerate(circle) if isinstance(tie, Bound) and not tie.behavior]
     return max(said, key=lambda number: circle[number][0].source, default=None)
 

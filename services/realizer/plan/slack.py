@@ -10,6 +10,8 @@ BRIEF: Seconds = 0.05
 """Most seconds by which a behavior is slower on its way, so as not to stop."""
 UNNOTICED: Seconds = 0.008
 """Seconds by which it may pass there too early."""
+BRAKING: Seconds = 0.1
+"""Seconds before a hold point at which a movement that is to stop there begins to brake, at the most."""
 
 
 def slack(plan: Plan, point: Point) -> Seconds:
