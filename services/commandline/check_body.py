@@ -19,6 +19,7 @@ from engage_hri.services.commandline.options import Configured
 from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.process import DONE, end_like_ctrl_c
 from engage_hri.services.commandline.sources import read_world
+from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from engage_hri.services.control.body import Body
@@ -62,7 +63,7 @@ def main(options: Options) -> int:
     """
     if missing := [name for name in NEEDED if find_spec(name) is None]:
         reason = f"check-body needs {' and '.join(missing).replace('_', '-')}"
-        raise InputRefused(Fault(reason=reason, advice="install the extra: pip install 'engage-hri[check]'"))
+        raise InputRefused(Fault(reason=reason, advice=extra_command("check")))
     from engage_hri.services.control.testing.check import check
     from engage_hri.services.control.testing.render import rendered
     from engage_hri.services.control.testing.report import Stated, as_json

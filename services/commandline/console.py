@@ -18,6 +18,7 @@ from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name, until_closed
 from engage_hri.services.commandline.sources import Thing, read_source
+from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from engage_hri.services.console.web.guard import Hosts
@@ -115,8 +116,8 @@ def _web() -> ModuleType:
     try:
         from engage_hri.services.console.web import server
     except ModuleNotFoundError as error:
-        advice = "python -m pip install 'engage-hri[console]', in the environment of `engage`"
-        raise InputRefused(Fault(reason=f"{error.name} is not installed", where="console", advice=advice)) from error
+        reason = f"{error.name} is not installed"
+        raise InputRefused(Fault(reason=reason, where="console", advice=extra_command("console"))) from error
     return server
 
 

@@ -13,6 +13,7 @@ import typer
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.commandline.process import DONE, FAILED
+from engage_hri.services.runtime.installation import extra_command
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ class Options:
 def main(options: Options) -> int:
     """Make or show keys. Exit 3 if `show` finds a certificate that has expired, and was not revoked."""
     if find_spec("cryptography") is None:
-        advice = "pip install 'engage-hri[keys]', on the machine where keys are made; no other needs it"
+        advice = f"{extra_command('keys')}; only the machine where keys are made needs it"
         raise InputRefused(Fault(reason="the package `cryptography` is missing", where="engage keys", advice=advice))
     from engage_hri.services.commandline import certificates
 
