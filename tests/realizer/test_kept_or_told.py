@@ -1,4 +1,4 @@
-"""Ties that leave little time: each is kept, or told at planning not to be; and arms that come together do not stop."""
+"""Ties that leave little time are kept, or told not to be at planning; arms that come together do not stop."""
 
 import pytest
 
