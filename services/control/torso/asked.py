@@ -1,4 +1,4 @@
-"""What a plan asks of a behavior: where it is to wait, and for which points it is to hurry or dawdle. Pure."""
+"""Times that a plan asks of a behavior: where it is to wait, and for which points it is to hurry or dawdle. Pure."""
 
 from collections.abc import Container, Mapping
 from itertools import pairwise
