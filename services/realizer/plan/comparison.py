@@ -11,7 +11,7 @@ from engage_hri.services.runtime.steps import Steps
 
 def compared(plan: Plan, said: Relations, known: Known) -> Steps[Plan]:
     """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
-    if not known.points:
+    if not (known.points or plan.late):
         return replace(plan, relations=replace(plan.relations))
     times = known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
     yield len(times) // 4
