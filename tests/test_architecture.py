@@ -61,7 +61,7 @@ LAYERS = {
     " > actions blame estimates refusals switching told unheard waiting > live warned > body"
     " > calibration > extras fitting > variability > config",
     "services/generation": "service > fragment_runner > reconsideration > performance > body_link choosing_again"
-    " fragment_check > acts pipeline > block head > references turns > permits > config",
+    " fragment_check > acts lost pipeline > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
 }
