@@ -12,10 +12,12 @@ Start robots with the command `engage`; drive and follow them from a program wit
 What a name stands for is loaded when it is first used: a service that only drives motors loads no client.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False
+"""Checkers take it as true. `typing` itself takes milliseconds in which a Ctrl-C would be a traceback of `engage`."""
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from engage_hri.schemas.behaviors import Gaze as Gaze
     from engage_hri.schemas.behaviors import Head as Head
     from engage_hri.schemas.behaviors import Pointing as Pointing
@@ -116,7 +118,9 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
+    from importlib import import_module
+
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_MODULES[name]), name)
