@@ -9,13 +9,12 @@ from typing import Annotated, Literal
 import typer
 from msgspec.structs import replace
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Embodied, Strict, WorldFile
@@ -23,10 +22,9 @@ from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
-from engage_hri.services.commandline.sources import read_source, read_world
+from engage_hri.services.commandline.sources import read_source, read_world, still
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import NO_SUCH_BLOCK
-from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 HIGHEST = 40
@@ -96,12 +94,7 @@ async def rehearsed(block: Block, world: World, config: Config) -> Plan:
     """Plan a block as a realizer does that has nothing else to perform, with the configured body at home."""
     from engage_hri.services.realizer.perform.planning import planned_alone
 
-    async with MemoryHub(config.robot, decodes=False) as hub:
-        hub.join("simulation").publish(keys.WORLD, world)
-        async with running(hub, {"control": roster.service("control", config, connects=False)}):
-            await asyncio.sleep(0.1)  # control has seen the world by then
-            try:
-                return await planned_alone(hub.join("plan"), block, config.realizer)
-            except InputRefused as error:
-                refused = error  # raised in there it would be one of a group
-    raise refused
+    services = {"simulation": still(world), "control": roster.service("control", config, connects=False)}
+    async with in_memory(config, services) as hub:
+        await asyncio.sleep(0.1)  # control has seen the world by then
+        return await planned_alone(hub.join("plan"), block, config.realizer)
