@@ -37,6 +37,7 @@ _NAMED = r"[^\s:+\x00-\x1f\x7f-\x9f-][^\s:+\x00-\x1f\x7f-\x9f]*"
 _PLAIN = re.compile(rf"({_NAMED}):([A-Za-z_]+)")
 """Form of most references, which are read faster so."""
 _NAME = re.compile(_NAMED)
+_IN_NO_NAME = re.compile(r"[\s:+\x00-\x1f\x7f-\x9f]")
 
 
 class SyncRef(Struct, frozen=True, omit_defaults=True):
@@ -67,7 +68,7 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
             raise _bad(text, "more than four parts")
         for head in heads:
             if not is_id(head):
-                raise _bad(text, f"{head!r} is not an id" if head else "an empty part")
+                raise _bad(text, f"{head!r} is not an id: {objection(head)}" if head else "an empty part")
         if len(heads) < 2 and (number := _signed(tail)) is not None:
             return cls(block=heads[0] if heads else "", offset=_finite(text, number))
         if not heads:
@@ -83,7 +84,8 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
             raise _bad(text, "the fourth part is the number of a repetition")
         *block, behavior, sync = parts
         if not is_sync_point(sync):
-            raise _bad(text, f"{sync!r} is not a sync point" if sync else "no sync point")
+            why = ": ".join(filter(None, (f"{sync!r} is not a sync point", objection(sync))))
+            raise _bad(text, why if sync else "no sync point")
         if behavior == BLOCK_ITSELF and sync not in ("start", "end"):
             raise _bad(text, "a block has only 'start' and 'end'")
         return cls(block[0] if block else "", behavior, sync, repetition, _finite(text, offset))
@@ -102,6 +104,18 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
 def is_id(text: str) -> bool:
     """Tell whether a text can be the id of a block or behavior."""
     return len(text) <= LONGEST_ID and _NAME.fullmatch(text) is not None and is_utf8(text)
+
+
+def objection(text: str) -> str:
+    """What keeps a text from being an id, for a message; empty: nothing."""
+    if is_id(text):
+        return ""
+    if (found := _IN_NO_NAME.search(text)) is not None:
+        held = "a space" if found[0] == " " else repr(found[0])
+        return f"it holds {held}"
+    if text.startswith("-"):
+        return "it begins with '-'"
+    return f"it is longer than {LONGEST_ID} characters" if len(text) > LONGEST_ID else "it is empty or no UTF-8"
 
 
 def is_sync_point(text: str) -> bool:

@@ -79,28 +79,39 @@ async def stream(
     await_answer: return only when the turn has been answered, or it is too late.
 
     Raises:
-        InputRefused: `pieces` cannot be followed. Nothing was said.
+        InputRefused: `pieces` cannot be followed, and nothing was said; or one of them is neither text nor a part,
+            and the turn is broken off there.
         ExceptionGroup: holds what `pieces` raised.
     """
     if not isinstance(pieces, AsyncIterable):
-        reason = f"{type(pieces).__name__!r} is no asynchronous iterable of pieces"
-        raise InputRefused(
-            Fault(reason=reason, where=id, advice="an `async def` that yields text; or `perform_call`")
-        )
+        raise InputRefused(_unreadable(f"{type(pieces).__name__!r} is no asynchronous iterable of pieces", id))
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
         async with asyncio.TaskGroup() as tasks:
             reading = tasks.create_task(_read(pieces, chunker or Chunker(), speaking), name=f"read {id}")
             speaking.begin(tasks, reading)
-    except BaseException:
+    except BaseException as error:
         speaking.break_off()
+        if isinstance(error, BaseExceptionGroup) and isinstance(error.exceptions[0], _NoPiece):
+            raise error.exceptions[0] from None
         raise
     await speaking.leave_no_turn_open()
     return speaking.outcomes
 
 
+class _NoPiece(InputRefused):
+    """A piece that cannot be spoken."""
+
+
+def _unreadable(reason: str, id: str) -> Fault:
+    shown = reason if len(reason) <= 200 else f"{reason[:197]}..."
+    return Fault(reason=shown, where=id, advice="an `async def` that yields text; or `perform_call`")
+
+
 async def _read(pieces: AsyncIterable[Piece], chunker: Chunker, speaking: "_Speaking") -> None:
     async for piece in pieces:
+        if not isinstance(piece, Piece):
+            raise _NoPiece(_unreadable(f"the piece {piece!r} is neither text nor a `Part`", speaking.id))
         for chunk in chunker.feed(piece):
             speaking.go_on(chunk)
     speaking.finish(chunker.rest())
@@ -111,7 +122,7 @@ class _Speaking:
 
     def __init__(self, robot: Robot, id: str, turn: ToolInput, await_answer: bool) -> None:
         self._robot = robot
-        self._id = id
+        self.id = id
         self._turn = turn
         self._await_answer = await_answer
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
@@ -159,7 +170,7 @@ class _Speaking:
         self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))
 
     def _fragment(self, chunk: Chunk, status: TurnStatus) -> TurnFragment:
-        id = f"{self._id}-{len(self._performing) + 1}"
+        id = f"{self.id}-{len(self._performing) + 1}"
         return fragment_of(chunk, replace(self._turn, turn_status=status), id)
 
     async def _perform(self, fragment: TurnFragment) -> FragmentOutcome:

@@ -125,7 +125,7 @@ def _services(facts: Facts) -> Iterator[Finding]:
             if name not in there:
                 yield Finding(
                     severity="wrong", where=name, what="nobody sees this service",
-                    do=f"start `engage run {name}` with the same --robot and --connect; what it prints tells why it ended",
+                    do=f"start `engage run {name}` with the same --robot and --connect; it prints why it ended",
                 )  # fmt: skip
     for version in facts.protocols:
         if version != facts.protocol:

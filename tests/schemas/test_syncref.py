@@ -1,5 +1,7 @@
 """References to sync points: every form of realizer.md, every bad one, and the round trip."""
 
+import re
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -116,3 +118,15 @@ def test_the_draft_spelling_is_the_systems_own() -> None:
 def test_feedback_in_bml_1_0_leaves_out_points_that_it_does_not_know() -> None:
     assert dialect_sync("stroke_start", "gaze", "bml-1.0") is None
     assert dialect_sync("ready", "gazeShift", "bml-1.0") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("g:m 1", "'m 1' is not a sync point: it holds a space"), ("g 1:end", "'g 1' is not an id: it holds a space"),
+        ("-g:end", "'-g' is not an id: it begins with '-'"),
+    ],
+)  # fmt: skip
+def test_a_refusal_says_what_keeps_a_name_from_being_one(text: str, why: str) -> None:
+    with pytest.raises(ValueError, match=f"{re.escape(why)}$"):
+        SyncRef.parse(text)

@@ -344,6 +344,9 @@ def test_no_phrase_at_all_is_refused() -> None:
         ('<bml id="b"><gaze id="g" target="t" start="x:end"/></bml>', "unknown behavior 'x'"),
         ('<bml id="b"><speech id="s">a <sync id="end"/></speech></bml>', "can't name a mark"),
         ('<bml id="b"><speech id="s">a <sync id="1"/></speech></bml>', "can't name a mark"),
+        ('<bml id="b"><speech id="s">a <sync id="m 1"/></speech></bml>', "'m 1' can't name a mark: it holds a space"),
+        ('<bml id="b"><speech id="s">a <sync id="a+b"/></speech></bml>', "'a+b' can't name a mark: it holds '+'"),
+        ('<bml id="b"><speech id="s">a <sync id="-m"/></speech></bml>', "can't name a mark: it begins with '-'"),
         ('<bml id="b"><speech id="s">a <sync id="m"/> b <sync id="m"/></speech></bml>', "same name"),
         (
             '<bml id="b"><constraint required="true"><during ref="1"/></constraint></bml>',
