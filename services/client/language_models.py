@@ -93,7 +93,7 @@ async def stream(
     except BaseException as error:
         speaking.break_off()
         if isinstance(error, BaseExceptionGroup) and isinstance(error.exceptions[0], _NoPiece):
-            raise error.exceptions[0] from None
+            raise InputRefused(error.exceptions[0].fault) from None
         raise
     await speaking.leave_no_turn_open()
     return speaking.outcomes
