@@ -174,6 +174,17 @@ class Forecast(LongestPaths):
             if self._arcs[other].target == transition:
                 self._end_at(node, other)
 
+    def shift(self, behavior: str, at: Seconds) -> None:
+        """Let what comes after the latest point of a behavior count as if it had passed that at `at`."""
+        if (node := self._node_of.get(behavior)) is None:
+            return
+        before, self.times[node] = self.times[node], at
+        for number in self._out[node] if at < before else ():
+            self._loosen(number)
+        self._touch(node)
+        for bound in self._in[node]:
+            self._touch(self._arcs[bound].source)
+
     def _stay_with(self, behavior: str, transition: int, at: Seconds) -> None:
         """Let no bound make the others of an instant later than this one has passed it; who is late is late.
 

@@ -5,7 +5,7 @@ what it is told waits until `update`.
 """
 
 import heapq
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from itertools import pairwise
 from math import inf
 from typing import Any
@@ -15,6 +15,7 @@ from engage_hri.services.realizer.foresee.experience import SHORT, Experience
 from engage_hri.services.realizer.foresee.forecast import Forecast
 from engage_hri.services.realizer.foresee.from_scratch import full_forecast, is_predictive
 from engage_hri.services.realizer.foresee.outlook import Outlook
+from engage_hri.services.realizer.foresee.utterances import Interval, Utterances
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
@@ -45,6 +46,7 @@ class Foresight(Observer):
 
     def __init__(self, plan: Plan, facts: Facts) -> None:
         self.experience = Experience(plan.estimates)
+        self.utterances = Utterances(self.experience)
         self.paces: dict[str, Pace] = {}
         self.may_be_slower: set[str] = set()
         """Behaviors that were told to pass a hold point before its instant."""
@@ -120,8 +122,12 @@ class Foresight(Observer):
 
     def go_on(self, behavior: str, now: Seconds) -> None:
         """Expect a behavior that was held, and is not any more, at its next point: later, if it may have stood."""
-        if (forecast := self.forecast) is not None and self._facts.next_number(behavior):
+        if (forecast := self.forecast) is None or not (number := self._facts.next_number(behavior)):
+            return
+        if not self.utterances.follows(behavior):
             self._news.append((forecast.overdue, *self._after_hold(behavior, now)))
+        elif self._stood_since(behavior, now) and not self._facts.holds(self.plan.chains[behavior].points[number]):
+            self.utterances.go_on(behavior, now)
 
     def recall_holds(self) -> None:
         """Take in what was held before there was this plan, as it was taken in when that went on."""
@@ -129,13 +135,14 @@ class Foresight(Observer):
             self.prolong()
             self.none_before(last)
             self._news += [(forecast.overdue, *each) for each in self._stood(last)]
+        self._news += [(forecast.shift, *each) for each in self.utterances.since.items()] if forecast else []
 
     def _stood(self, now: Seconds) -> Iterable[tuple[int, Seconds]]:
         """Next points of behaviors that were held on their way there, as of `_after_hold`."""
         facts = self._facts
         for behavior in facts.under_way:
-            points, number = self.plan.chains[behavior].points, facts.next_number(behavior)
-            if number and facts.held_between(facts.reached[points[number - 1]], now, behavior):
+            number = facts.next_number(behavior)
+            if number and facts.held_between(self._measured(behavior), now, behavior):
                 yield self._after_hold(behavior, now)
 
     def _after_hold(self, behavior: str, now: Seconds) -> tuple[int, Seconds]:
@@ -144,11 +151,25 @@ class Foresight(Observer):
         A voice may have stood between two words, a clock has stopped; a movement goes on to where it can wait.
         """
         number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
-        before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
-        stands = stands_soon(chain.behavior)
-        stood = self._facts.stood_between(before, now, behavior) if stands else 0.0
-        at = before + self._phase(behavior, number) + stood
+        point = chain.points[number]
+        stood = self._stood_since(behavior, now) if stands_soon(chain.behavior) else 0.0
+        at = self._since(behavior) + self._phase(behavior, number) + stood
         return self.plan.at[point], now if self._facts.holds(point) else max(now, at)
+
+    def _measured(self, behavior: str) -> Seconds:
+        """When the behavior was at the latest place of which it has told: a sync point, or a word."""
+        at = self.utterances.measured(behavior)
+        number = self._facts.next_number(behavior)
+        return self._facts.reached[self.plan.chains[behavior].points[number - 1]] if at is None else at
+
+    def _since(self, behavior: str) -> Seconds:
+        """When the behavior passed its latest point; of a speech, when it would have by the words since then."""
+        if (at := self.utterances.since.get(behavior)) is not None:
+            return at
+        return self._facts.reached[self.plan.chains[behavior].points[self._facts.next_number(behavior) - 1]]
+
+    def _stood_since(self, behavior: str, now: Seconds) -> Seconds:
+        return self._facts.stood_between(self._measured(behavior), now, behavior)
 
     @property
     def _prolonged(self) -> list[tuple[int, int, Seconds]]:
@@ -190,28 +211,64 @@ class Foresight(Observer):
     def learn(self, point: Point, at: Seconds) -> None:
         """Correct the estimates of the same parts by a phase that ends at `point`, unless it was hurried or held up.
 
-        The point is the next of its behavior, and not among the facts yet.
+        The point is the next of its behavior, and not among the facts yet. What words have taught is not taught again.
         """
         chain = self.plan.chains.get(point.behavior)
         number = self._facts.next_number(point.behavior)
         if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
             return
         before, natural = chain.points[number - 1], chain.segments[number - 1].natural
-        if natural >= SHORT and performer(chain.behavior) == "body":
+        if self.utterances.follows(point.behavior):
+            self._learn_words(point.behavior, self.utterances.interval(point.behavior, to_point=True), at)
+        elif natural >= SHORT and performer(chain.behavior) == "body":
             if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
                 return  # it was to be cut short
             since = self._facts.reached[before]
             is_beneath = chain.type in SHIFTS and at - since < natural  # perhaps: a look has begun over it
             if is_beneath or self._facts.held_between(since, at, point.behavior):
                 return  # how long it would have taken, nobody knows
-            changed = self.experience.learn(point.behavior, natural, at - since)
-            if self.forecast is not None and changed:
-                self._news.append((self.forecast.relearn, changed))
+            self._relearn(self.experience.learn(point.behavior, natural, at - since))
+
+    def hear(self, behavior: str, position: int, at: Seconds, now: Seconds) -> bool:
+        """Take a word of a speech; True if all that comes after it is expected at another time now.
+
+        position: characters of the text said so far. at: when the word was finished.
+        """
+        if not self.utterances.hear(behavior, position, at, now):
+            return False
+        is_news = False
+        if (interval := self.utterances.interval(behavior)) is not None:
+            is_news = self._learn_words(behavior, interval, at)
+            self.utterances.teach(behavior)
+        return self._shift(behavior, now) or is_news
+
+    def _learn_words(self, behavior: str, interval: Interval | None, at: Seconds) -> bool:
+        if interval is None or self._facts.held_between(interval.since, at, behavior):
+            return False
+        return self._relearn(self.experience.learn_words(behavior, interval.natural, at - interval.since))
+
+    def _relearn(self, changed: Collection[str]) -> bool:
+        if self.forecast is not None and changed:
+            self._news.append((self.forecast.relearn, changed))
+        return bool(changed)
+
+    def _shift(self, behavior: str, now: Seconds) -> bool:
+        """Let the forecast have what was heard of a speech by now, or was not heard; True if that changes something."""
+        if not (later := self.utterances.settle(behavior, now)):
+            return False
+        self.is_surprised = self.is_surprised or abs(later) > NOTICEABLE
+        if self.forecast is not None:
+            self._news.append((self.forecast.shift, behavior, self.utterances.since[behavior]))
+        return True
 
     def expect_next(self, behavior: str) -> None:
         """Note from when on the behavior is overdue at its next point."""
         number, chain = self._facts.next_number(behavior), self.plan.chains.get(behavior)
-        if self.forecast is not None and chain is not None and 0 < number < len(chain.points):
+        if self.forecast is None or chain is None or not number:
+            return
+        if (estimate := self.plan.estimates.get(behavior)) is not None and estimate.words:
+            self.utterances.pass_point(chain, estimate.words, number, self._facts.reached[chain.points[number - 1]])
+        if number < len(chain.points):
             self.not_before.pop(behavior, None)
             self._news.append((self._await, behavior, number))
 
@@ -234,12 +291,20 @@ class Foresight(Observer):
         """
         if self.forecast is None:
             return ()
-        self.catch_up()
         facts = self._facts
+        for behavior in tuple(self.utterances.since):
+            is_under_way = behavior in self.plan.chains and not facts.is_held(behavior)
+            if is_under_way and not facts.holds(self.plan.chains[behavior].points[facts.next_number(behavior)]):
+                self._shift(behavior, now)
+        self.catch_up()
         while self._arrivals and self._arrivals[0][0] < now - EPSILON:
             _, expected, behavior, number = heapq.heappop(self._arrivals)
             chain = self.plan.chains.get(behavior)
             if chain is None or facts.next_number(behavior) != number or facts.holds(chain.points[number]):
+                continue
+            if self.utterances.follows(behavior):  # `_shift` says when it is overdue.
+                due = self._since(behavior) + self._phase(behavior, number)
+                heapq.heappush(self._arrivals, (max(now, due), expected, behavior, number))
                 continue
             expected = max(expected, self.asked(chain.points[number], expected))
             until = due = expected + facts.held_between(facts.reached[chain.points[number - 1]], now, behavior)
@@ -257,7 +322,10 @@ class Foresight(Observer):
         """Next time to look for delays that only other blocks depend on; None: there is no need."""
         while self._arrivals and self._facts.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
             heapq.heappop(self._arrivals)  # The behavior has arrived there.
-        return self._arrivals[0][0] + OVERDUE if self.followed and self._arrivals else None
+        if not self.followed or not self._arrivals:
+            return None
+        word = self.utterances.next_check()
+        return min(self._arrivals[0][0], self._arrivals[0][0] if word is None else word) + OVERDUE
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
         """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.
@@ -278,7 +346,7 @@ class Foresight(Observer):
         points, number = self.plan.chains[member.behavior].points, self._facts.next_number(member.behavior)
         if not number:
             return None
-        at = self._facts.reached[points[number - 1]]
+        at = self._since(member.behavior)
         for each in range(number, points.index(member.point) + 1):
             at += self._phase(member.behavior, each)
             if each == number:
@@ -308,7 +376,7 @@ class Foresight(Observer):
             return ()  # No bound makes it hurry, for itself or for who comes after it, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
         number = facts.next_number(behavior)
-        at = facts.reached[points[number - 1]] if number else now
+        at = self._since(behavior) if number else now
         is_paced = is_hurried = forecast.is_hurried(behavior)
         stops = self._stops[behavior] = set()
         planned: list[tuple[str, Seconds]] = []
@@ -369,6 +437,8 @@ class Foresight(Observer):
                 is_passive = self._net.part_of[point].kind == "passive"
                 if point not in facts.reached and is_passive and at[before] != at[point]:
                     behavior, here, since = point.behavior, at[point], arrivals[before]
+                    if before in facts.reached:
+                        since = self._since(behavior)
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
                     is_given = point not in self.plan.constrained and behavior not in self.plan.natural
                     if is_given and self.plan.successors.get(behavior, "")[1:] == (point,):
@@ -384,7 +454,8 @@ class Foresight(Observer):
         """
         facts = self._facts
         known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
-        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged)
+        heard = self.utterances.since
+        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged, heard)
         if now is not None:
             for each in (*self._stood(now), *((here, now) for here in range(len(self.plan.members)))):
                 forecast.overdue(*each)
