@@ -21,7 +21,7 @@ REMEMBERED = 9
 FINE = 0.01
 """As `NOISE`, for a speech that tells its words: what it has shown itself is worth more than what its part has."""
 ALIKE = 0.25
-"""Difference from the median of words, as a share of it, from which on one says nothing: the voice stood before it."""
+"""Difference from the median of words, as a share of it, from which on one says nothing: the voice stood."""
 
 
 class Experience:

@@ -41,7 +41,6 @@ class Forecast(LongestPaths):
         self._moved: dict[tuple[int, int], list[int]] = {}
         """Those of them that count from the behavior's own time, by the transitions at their ends."""
         self._of_behavior: dict[str, list[int]] = {}
-        self._node_of: dict[str, int] = {}
         self._stopped: dict[int, Seconds] = {}
         """Seconds by which arcs are longer than planned; see `prolong`."""
         self._given_way: set[int] = set()
@@ -173,17 +172,6 @@ class Forecast(LongestPaths):
         for other in self._of_behavior[behavior]:
             if self._arcs[other].target == transition:
                 self._end_at(node, other)
-
-    def shift(self, behavior: str, at: Seconds) -> None:
-        """Let what comes after the latest point of a behavior count as if it had passed that at `at`."""
-        if (node := self._node_of.get(behavior)) is None:
-            return
-        before, self.times[node] = self.times[node], at
-        for number in self._out[node] if at < before else ():
-            self._loosen(number)
-        self._touch(node)
-        for bound in self._in[node]:
-            self._touch(self._arcs[bound].source)
 
     def _stay_with(self, behavior: str, transition: int, at: Seconds) -> None:
         """Let no bound make the others of an instant later than this one has passed it; who is late is late.
