@@ -17,16 +17,17 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
+from engage_hri.services.realizer.plan.comparison import compared
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.needs import falling, without
 from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
-from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import (
     BlockRefused,
     Equal,
@@ -36,7 +37,7 @@ from engage_hri.services.realizer.plan.relations import (
     as_dropped,
     at_line,
     relation_steps,
-)
+)  # fmt: skip
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, needless_turns, share, waits_elsewhere
@@ -100,15 +101,12 @@ class _Planner:
         self.estimates = estimates
         self.barred = barred
         self.dropped = dict.fromkeys(dropped)  # in the order in which they were dropped; the values mean nothing
-        self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
-        """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
+        self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}  # dropped; on time if a speech gives up a time
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
-        self.turns = frozenset[Turn]()
+        self.turns, self.parts = frozenset[Turn](), PartOrder()
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.pruned: set[Turn] = set()  # turns that were found to be needless, once
-        self.parts = PartOrder()
-        self.hands: dict[str, Hand] = {}
-        self.chains: dict[str, Chain] = {}
+        self.hands, self.chains = dict[str, Hand](), dict[str, Chain]()
 
     def read(self) -> Steps[None]:
         self.relations = yield from relation_steps(self.block, self.known.blocks)
@@ -118,6 +116,7 @@ class _Planner:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
+        self._let_fall()
         if begun := sorted(
             self.known.begun & self.chains.keys(), key=lambda id: self.known.natural_end(self.chains[id])
         ):
@@ -156,6 +155,14 @@ class _Planner:
             self.problems = [each for each in self.problems if each not in futile.values()]
         self.problems.append(Problem(kind, at_line(line or self.lines[id], as_dropped(reason, advice)), id))
 
+    def _let_fall(self) -> None:
+        """Drop what needs a behavior that is dropped."""
+        for id, needed in falling(self.chains, self.dropped, self.known.begun).items():
+            fallen = self.chains[id]
+            self._drop(id, "CANNOT_CREATE_BEHAVIOR", without(needed))
+            if needed in self.depending:
+                self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
+
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
 
@@ -170,7 +177,7 @@ class _Planner:
                 plan = yield from self._plan(present, classes)
                 if self.untied:
                     present, _ = yield from self._remaining(said)
-                return (yield from self._compared(plan, present))
+                return (yield from compared(plan, present, self.known))
             except Misordered:
                 continue
             except Losses as found:
@@ -198,20 +205,12 @@ class _Planner:
                         if given_up.isdisjoint(loss.among):
                             self._lose(loss)
                     yield len(part)
+                self._let_fall()
                 self.order.begin_anew(self.chains)
                 self.parts.begin_anew()
 
     def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
         return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
-
-    def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
-        """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
-        if not self.known.points:
-            return replace(plan, relations=replace(plan.relations))
-        times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
-        yield len(times) // 4
-        broken = yield from broken_by(said, times)
-        return replace(plan, relations=replace(said), broken=tuple(broken))
 
     def _lose(self, loss: Loss) -> None:
         id = loss.behavior
@@ -250,8 +249,7 @@ class _Planner:
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
-        tried: list[Arrangement] = []
-        """Arrangements since the last conflict."""
+        tried: list[Arrangement] = []  # since the last conflict
         while True:
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
