@@ -53,6 +53,8 @@ class Expectations(Observer):
         self.not_before: dict[str, Seconds] = {}
         self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
         self.is_surprised = False
+        self._updated = facts.began
+        """When it was last looked whether a word is overdue."""
         self._facts = facts
         self.followed: set[Point] = set()
         self._expected = {point: facts.began + plan.predicted(point) for point in plan.at}
@@ -287,7 +289,7 @@ class Expectations(Observer):
         """
         if self.forecast is None:
             return ()
-        facts = self._facts
+        facts, self._updated = self._facts, now
         for behavior in tuple(self.utterances.since):
             is_under_way = behavior in self.plan.chains and not facts.is_held(behavior)
             if is_under_way and not facts.holds(self.plan.chains[behavior].points[facts.next_number(behavior)]):
@@ -321,7 +323,9 @@ class Expectations(Observer):
         if not self.followed or not self._arrivals:
             return None
         word = self.utterances.next_check()
-        return min(self._arrivals[0][0], self._arrivals[0][0] if word is None else word) + OVERDUE
+        return (
+            self._arrivals[0][0] if word is None else min(self._arrivals[0][0], max(word, self._updated))
+        ) + OVERDUE
 
     def asked(self, point: Point, natural: Seconds) -> Seconds:
         """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.
