@@ -54,7 +54,7 @@ _NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|Hz|ms|s)?\s*$"
 
 
 class Markup(NamedTuple):
-    """What a voice can do of the markup of a speech.
+    """The part that a voice can do of the markup of a speech.
 
     spans: they do not overlap, and are in the order of the text. unread: what has no effect, in words.
     """
@@ -135,7 +135,7 @@ def _placed(found: Iterable[Prosody], places: Sequence[int], length: int) -> Ite
 
 
 def _unread(element: etree._Element, local: str) -> Iterator[str]:
-    """What of an element has no effect on a voice here."""
+    """Tell what of an element has no effect on a voice here."""
     if local not in READ and element.keys() != [f"{{{XML}}}lang"]:
         yield f"<{local}> has no effect: its words are said as they are written"
     for name in ("duration", "contour", "range") if local == "prosody" else ():

@@ -155,13 +155,13 @@ class Expectations(Observer):
         return self.plan.at[point], now if self._facts.holds(point) else max(now, at)
 
     def _measured(self, behavior: str) -> Seconds:
-        """When the behavior was at the latest place of which it has told: a sync point, or a word."""
+        """Time at which the behavior was at the latest place of which it has told: a sync point, or a word."""
         at = self.utterances.measured(behavior)
         number = self._facts.next_number(behavior)
         return self._facts.reached[self.plan.chains[behavior].points[number - 1]] if at is None else at
 
     def _since(self, behavior: str) -> Seconds:
-        """When the behavior passed its latest point; of a speech, when it would have by the words since then."""
+        """Time at which the behavior passed its latest point; a speech: at which it would have, by the words since."""
         if (at := self.utterances.since.get(behavior)) is not None:
             return at
         return self._facts.reached[self.plan.chains[behavior].points[self._facts.next_number(behavior) - 1]]

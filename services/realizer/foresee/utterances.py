@@ -1,4 +1,4 @@
-"""How far each speech is, by the words that were heard of it and the times that its voice has estimated for them.
+"""Progress of each speech, by the words that were heard of it and the times that its voice has estimated for them.
 
 A mark may be seconds after the last sync point. By that point alone a voice that speaks a third slower is found out
 at the mark, when what is tied to it has come too early. So a speech is followed from place to place: the sync point
@@ -24,7 +24,7 @@ compared, and an exact voice is to have an exact plan."""
 
 
 class Interval(NamedTuple):
-    """What a voice said between two places: since when, and the seconds that were estimated for it."""
+    """Words that a voice said between two places: since when, and the seconds that were estimated for it."""
 
     since: Seconds
     natural: Seconds
@@ -129,7 +129,7 @@ class Utterances:
         return True
 
     def interval(self, id: str, *, to_point: bool = False) -> Interval | None:
-        """What the speech has said since it taught its pace last, up to its latest place or to its next point.
+        """Words that the speech has said since it taught its pace last, up to its latest place or to its next point.
 
         None: it is not followed, or that is too short to say something.
         """
@@ -155,7 +155,7 @@ class Utterances:
         self.teach(id)
 
     def measured(self, id: str) -> Seconds | None:
-        """When the speech was at its latest place; None: it is not followed."""
+        """Time at which the speech was at its latest place; None: it is not followed."""
         return None if (speech := self._speeches.get(id)) is None else speech.at
 
     def follows(self, id: str) -> bool:
