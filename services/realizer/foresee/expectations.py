@@ -161,7 +161,7 @@ class Expectations(Observer):
         return self._facts.reached[self.plan.chains[behavior].points[number - 1]] if at is None else at
 
     def _since(self, behavior: str) -> Seconds:
-        """Time at which the behavior passed its latest point; a speech: at which it would have, by the words since."""
+        """Time at which the behavior passed its latest point; a speech: would have, by the words since."""
         if (at := self.utterances.since.get(behavior)) is not None:
             return at
         return self._facts.reached[self.plan.chains[behavior].points[self._facts.next_number(behavior) - 1]]
