@@ -140,7 +140,8 @@ class _Realizer:
         for performance in self.performing():
             if performance.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
-                performance.decisions.facts.say(word.behavior, self.bus.local(word.at))
+                if performance.decisions.say(word.behavior, word.position, self.bus.local(word.at), self.bus.now()):
+                    performance.take_in()
                 performance.held.tell()  # A voice that is held may stand now.
 
     async def _perform(self, live: Live) -> None:

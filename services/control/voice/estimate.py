@@ -5,7 +5,8 @@ from itertools import pairwise
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import Speech
-from engage_hri.schemas.body import BodyPose, Estimate, Phase
+from engage_hri.schemas.body import BodyPose, Estimate, Phase, WordTime
+from engage_hri.schemas.documents.prosody import unread
 from engage_hri.services.control.voice.timeline import Utterance
 
 
@@ -24,7 +25,8 @@ def speech_estimate(
         seconds = times[to] - times[since]
         longest = None if to in gaps or not seconds else seconds
         phases.append(Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=longest, hold=to in gaps))
+    words = tuple([WordTime(position=word.position, start=word.start, end=word.end) for word in utterance.words])
     return Estimate(
-        behavior=behavior.id, feasible=True, degraded="; ".join(dict.fromkeys(warnings)), parts=("voice",),
-        phases=tuple(phases), pose_after=pose, pose_end=pose,
+        behavior=behavior.id, feasible=True, degraded="; ".join(dict.fromkeys([*unread(behavior), *warnings])),
+        parts=("voice",), phases=tuple(phases), words=words, pose_after=pose, pose_end=pose,
     )  # fmt: skip
