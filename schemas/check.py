@@ -147,8 +147,19 @@ def _values(behavior: Behavior) -> Iterator[tuple[str, str, str]]:
 def _marks(speech: Speech) -> Iterator[tuple[str, str, str]]:
     ids = [mark.id for mark in speech.marks]
     for id in ids:
-        if not is_sync_point(id) or id in ("start", "end"):
-            yield f"{id!r} can't name a mark", "marks", "neither a number nor start nor end: the speech has those"
+        if id in ("start", "end"):
+            yield (
+                f"{id!r} can't name a mark",
+                "marks",
+                "the speech has a start and an end of its own: give another name",
+            )
+        elif not is_id(id):
+            why = (
+                "it holds a space"
+                if any(each.isspace() for each in id)
+                else "it may not hold ':' or '+', or begin with '-'"
+            )
+            yield f"{id!r} can't name a mark: {why}", "marks", "letters, digits and . _ - are safe"
     if len(set(ids)) < len(ids):
         yield "two marks have the same name", "marks", "give each mark of a speech its own name"
     positions = [0, *(mark.position for mark in speech.marks), len(speech.text)]
