@@ -19,6 +19,7 @@ from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Embodied, Strict, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
@@ -49,7 +50,7 @@ def main(options: Options) -> int:
     writers = {"text": _as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
-        for plan in generated(source.things, around, config, str(options.file)):
+        for plan in generated(source.things, around, config, str(source.path)):
             planned = run_virtual(rehearsed(plan.block, around, config))
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
@@ -58,13 +59,13 @@ def main(options: Options) -> int:
                 place = ":".join(filter(None, (block, problem.behavior)))
                 print(f"! {problem.kind} {place}: {problem.message}", file=sys.stderr)
             if any(NO_SUCH_BLOCK in problem.message for problem in planned.problems):
-                together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {options.file.name}`"
+                together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {source.path.name}`"
                 print(f"! it is planned alone; {together} plays both at full speed", file=sys.stderr)
             if nothing_is_left(plan.block, planned.dropped):
                 reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
-                print(readable(Fault(reason=reason, where=plan.block.id), options.file), file=sys.stderr)
+                print(readable(Fault(reason=reason, where=plan.block.id), source.path), file=sys.stderr)
                 code = FAILED
-    print("\n".join(text.rstrip("\n") for text in texts))
+    (print if options.format == "text" else print_format)("\n".join(text.rstrip("\n") for text in texts))
     if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
     return code
