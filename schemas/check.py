@@ -159,8 +159,12 @@ def _marks(speech: Speech) -> Iterator[tuple[str, str, str]]:
     for id in ids:
         if why := objection(id):
             yield f"{id!r} can't name a mark: {why}", "marks", "letters, digits, hyphens and the like, as in word-2"
-        elif not is_sync_point(id) or id in ("start", "end"):
-            yield f"{id!r} can't name a mark", "marks", "neither a number nor start nor end: the speech has those"
+        elif id in ("start", "end"):
+            yield (
+                f"{id!r} can't name a mark",
+                "marks",
+                "the speech has a start and an end of its own: give another name",
+            )
     if len(set(ids)) < len(ids):
         yield "two marks have the same name", "marks", "give each mark of a speech its own name"
     positions = [0, *(mark.position for mark in speech.marks), len(speech.text)]

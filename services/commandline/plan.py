@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
@@ -50,13 +49,16 @@ def main(options: Options) -> int:
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
         for plan in generated(source.things, around, config, str(source.path)):
-            planned = _planned(plan.block, around, config, source.path)
+            planned = run_virtual(rehearsed(plan.block, around, config))
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
                 block = plan.block.id if len(source.things) > 1 or not problem.behavior else ""
                 place = ":".join(filter(None, (block, problem.behavior)))
                 print(f"! {problem.kind} {place}: {problem.message}", file=sys.stderr)
+            if any(NO_SUCH_BLOCK in problem.message for problem in planned.problems):
+                together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {source.path.name}`"
+                print(f"! it is planned alone; {together} plays both at full speed", file=sys.stderr)
             if nothing_is_left(plan.block, planned.dropped):
                 reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
                 print(readable(Fault(reason=reason, where=plan.block.id), source.path), file=sys.stderr)
@@ -65,18 +67,6 @@ def main(options: Options) -> int:
     if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
     return code
-
-
-def _planned(block: Block, world: World, config: Config, file: Path) -> Plan:
-    """The plan of a block. Its refusal since it names another block says how to try the two together."""
-    try:
-        return run_virtual(rehearsed(block, world, config))
-    except InputRefused as error:
-        if NO_SUCH_BLOCK not in error.fault.reason:
-            raise
-        together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {file.name}`"
-        advice = f"a block that names another one cannot be planned alone; {together} plays both at full speed"
-        raise InputRefused(replace(error.fault, advice=advice), error.block) from error
 
 
 def _as_text(plan: Plan) -> str:

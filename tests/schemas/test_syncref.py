@@ -60,7 +60,7 @@ def test_a_reference_is_read(text: str, expected: SyncRef) -> None:
     "text",
     [
         "", " ", "a", ":a:b", "a::b", "a:", "a:b:", "a:relax:2", "a:stroke:0", "a:stroke:-1", "a:stroke:2:3", "+x",
-        "-x", "a:+x", "a:-x", "a:b+", "a:b+c", "a:b+1+2", "b:a:stroke:2:3", "a:b:c:d", "a b:c", "a:b c", "a:2+1",
+        "-x", "a:+x", "a:-x", "a:b+", "a:b+c", "a:b+1+2", "b:a:stroke:2:3", "a:b:c:d", "a b:c", "a:b c",
         "a:stroke:1.5", "bml:stroke", "1e3", "nan", "inf", "a:b - c", "a:b+1" + "0" * 400, "٣",
     ],
 )  # fmt: skip
@@ -130,3 +130,11 @@ def test_feedback_in_bml_1_0_leaves_out_points_that_it_does_not_know() -> None:
 def test_a_refusal_says_what_keeps_a_name_from_being_one(text: str, why: str) -> None:
     with pytest.raises(ValueError, match=f"{re.escape(why)}$"):
         SyncRef.parse(text)
+
+
+def test_a_mark_that_is_a_number_is_known_by_its_speech_or_its_offset() -> None:
+    assert SyncRef.parse("s:1") == SyncRef(block="s", offset=1.0)
+    assert SyncRef.parse("s:1", ["1"]) == SyncRef.parse("s:1+0") == SyncRef(behavior="s", sync="1")
+    assert SyncRef.parse("s:1-0.5") == SyncRef(behavior="s", sync="1", offset=-0.5)
+    assert SyncRef.parse("b:s:1") == SyncRef(block="b", behavior="s", sync="1")
+    assert [str(SyncRef.parse(each)) for each in ("s:1+0", "b:s:1", "s:1+2")] == ["s:1+0", "b:s:1", "s:1+2"]
