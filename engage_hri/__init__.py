@@ -9,13 +9,17 @@ Start robots with the command `engage`; drive and follow them from a program wit
         async for event in robot.connection_events():   # gaze, eye contact, adjacency pairs, backchannels
             print(event.kind, event.state)
 
+`embedded()` in place of `connect()` runs a simulated robot, or your own, in the program itself.
+
 What a name stands for is loaded when it is first used: a service that only drives motors loads no client.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False
+"""Checkers take it as true. `typing` itself takes milliseconds in which a Ctrl-C would be a traceback of `engage`."""
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from engage_hri.schemas.behaviors import Gaze as Gaze
     from engage_hri.schemas.behaviors import Head as Head
     from engage_hri.schemas.behaviors import Pointing as Pointing
@@ -47,6 +51,7 @@ if TYPE_CHECKING:
     from engage_hri.services.client.results import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
+    from engage_hri.services.commandline.embedding import embedded as embedded
     from engage_hri.services.control.body import Arrived as Arrived
     from engage_hri.services.control.body import BehaviorRefused as BehaviorRefused
     from engage_hri.services.control.body import Body as Body
@@ -69,6 +74,7 @@ _PLACES = {
     "engage_hri.services.client.perceived_person": ("PerceivedPerson",),
     "engage_hri.services.client.results": ("PerformFailed",),
     "engage_hri.services.client.robot": ("Robot", "connect"),
+    "engage_hri.services.commandline.embedding": ("embedded",),
     "engage_hri.services.control.body": ("Arrived", "MovementAuthority", "BehaviorRefused", "Body", "Reached"),
     "engage_hri.services.control.ordinary": ("OrdinaryBody",),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
@@ -108,6 +114,7 @@ __all__ = [
     "Utterance",
     "World",
     "connect",
+    "embedded",
     "perceive",
     "perform_call",
     "stream",
@@ -116,7 +123,9 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
+    from importlib import import_module
+
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_MODULES[name]), name)

@@ -15,16 +15,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from typing import Any
 
-from engage_hri.schemas.summary import Summary
-from engage_hri.schemas.world import World
-from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.language_models import perform_call
-from engage_hri.services.client.perceive import perceive
-from engage_hri.services.client.perceived_person import PerceivedPerson
-from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
-from engage_hri.services.runtime.service import running
+from engage_hri import PerceivedPerson, Robot, Summary, World, connect, embedded, perceive, perform_call
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 Call = dict[str, Any]
@@ -85,16 +76,9 @@ async def typed(person: PerceivedPerson) -> None:
 
 
 @asynccontextmanager
-async def embedded() -> AsyncIterator[Robot]:
+async def of_our_own() -> AsyncIterator[Robot]:
     """A robot, a table and a person of our own."""
-    config = load(settings=["simulation.human=none"])
-    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
-    async with (
-        MemoryHub() as hub,
-        running(hub, services),
-        connect(hub=hub) as robot,
-        perceive(PERSON, hub=hub) as person,
-    ):
+    async with embedded(human="none") as robot, perceive(PERSON, hub=robot.hub) as person:
         answering = asyncio.create_task(answer(robot, person))
         yield robot
         answering.cancel()
@@ -131,4 +115,4 @@ if __name__ == "__main__":
         suppress(KeyboardInterrupt),
         asyncio.Runner(loop_factory=VirtualTimeLoop if options.virtual_time else None) as runner,
     ):
-        runner.run(main(embedded() if options.embedded else joined(options.endpoint, types=options.type)))
+        runner.run(main(of_our_own() if options.embedded else joined(options.endpoint, types=options.type)))

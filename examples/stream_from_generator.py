@@ -13,16 +13,11 @@ import argparse
 import asyncio
 import re
 from collections.abc import AsyncIterator, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from contextlib import AbstractAsyncContextManager
 
+from engage_hri import Robot, connect, embedded, stream
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import ToolInput
-from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.language_models import stream
-from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
-from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 GREETING = (
@@ -70,15 +65,6 @@ async def converse(robot: Robot, at_most: int = 8) -> list[Summary]:
     return results
 
 
-@asynccontextmanager
-async def embedded() -> AsyncIterator[Robot]:
-    """A robot, a table and a person of our own."""
-    config = load(settings=["simulation.human=listening"])
-    services = {name: roster.service(name, config) for name in (*roster.ROBOT, "simulation")}
-    async with MemoryHub() as hub, running(hub, services), connect(hub=hub) as robot:
-        yield robot
-
-
 async def main(joining: AbstractAsyncContextManager[Robot]) -> None:
     async with joining as robot:
         await converse(robot)
@@ -93,4 +79,4 @@ if __name__ == "__main__":
     if options.virtual_time and not options.embedded:
         parser.error("--virtual-time needs --embedded")
     with asyncio.Runner(loop_factory=VirtualTimeLoop if options.virtual_time else None) as runner:
-        runner.run(main(embedded() if options.embedded else connect(connect=options.endpoint)))
+        runner.run(main(embedded(human="listening") if options.embedded else connect(connect=options.endpoint)))

@@ -118,8 +118,8 @@ _NO_PROGRAM = "of no program of ours: for those of others"
 TABLE: tuple[Row, ...] = (
     *_service(
         "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER, keys.STUDY_CONDITION,
-        heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.ANY_ACTION,
-               keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS),
+        heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.SYNC_POINT,
+               keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS),
     ),
     *_commands("generation", "block", "behavior", "turn"),
     Row("generation", "asks", keys.DESCRIBE),

@@ -182,6 +182,18 @@ class Phase(Struct, frozen=True, kw_only=True, omit_defaults=True, gc=False):
     hold: bool = False
 
 
+class WordTime(Struct, frozen=True, kw_only=True, omit_defaults=True, gc=False):
+    """Time of a word in a speech that waits nowhere.
+
+    position: characters of the text up to its end, as `WordSpoken` tells them.
+    start, end: seconds from the start of the speech.
+    """
+
+    position: int
+    start: Duration
+    end: Duration
+
+
 class Ray(Struct, frozen=True, kw_only=True, omit_defaults=True, gc=False):
     """A gaze axis or a forearm.
 
@@ -216,6 +228,10 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Phases from `start` to `end`, without gaps, in the drafts' spelling. Of a repeated movement also `stroke:2` and
     on, if the body reports them; strokes that it does not report are expected at equal distances up to
     `stroke_end`."""
+    words: tuple[WordTime, ...] = ()
+    """Of a speech, its words in the order of the text, each of which the body tells as `WordSpoken` when it is said.
+    From these the realizer sees how late the next mark will come. Empty: the voice does not know; then the marks
+    alone say how late it is."""
     head_degrees: Degrees = 0.0
     """Rotations of the head's joints on their way from the pose to the target, added up. Cg of thesis 3.3.2."""
     arm_degrees: Degrees = 0.0

@@ -17,7 +17,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import LONGEST_WITHIN, TurnFragment
 from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
 from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, is_sync_point
+from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, is_sync_point, objection
 
 MOST_NODS = 1000
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"
@@ -157,8 +157,14 @@ def _values(behavior: Behavior) -> Iterator[tuple[str, str, str]]:
 def _marks(speech: Speech) -> Iterator[tuple[str, str, str]]:
     ids = [mark.id for mark in speech.marks]
     for id in ids:
-        if not is_sync_point(id) or id in ("start", "end"):
-            yield f"{id!r} can't name a mark", "marks", "neither a number nor start nor end: the speech has those"
+        if why := objection(id):
+            yield f"{id!r} can't name a mark: {why}", "marks", "letters, digits, hyphens and the like, as in word-2"
+        elif id in ("start", "end"):
+            yield (
+                f"{id!r} can't name a mark",
+                "marks",
+                "the speech has a start and an end of its own: give another name",
+            )
     if len(set(ids)) < len(ids):
         yield "two marks have the same name", "marks", "give each mark of a speech its own name"
     positions = [0, *(mark.position for mark in speech.marks), len(speech.text)]

@@ -1,6 +1,6 @@
 """Sync references inside a block or turn fragment: find them all, and rewrite them all."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from typing import Literal, NamedTuple, TypeVar
 
 from msgspec.structs import replace
@@ -9,11 +9,15 @@ from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.behaviors import Behavior, Constraint, Event, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 
 Input = Block | TurnFragment
 AnyInput = TypeVar("AnyInput", Block, TurnFragment)
 AnyBehavior = TypeVar("AnyBehavior", bound=Behavior)
+
+
+_SYNC_NAMES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
+"""Sync points of behaviors in either spelling."""
 
 
 class Site(NamedTuple):
@@ -102,17 +106,35 @@ def with_names(block: Block, names: Mapping[str, str]) -> Block:
 
 
 def disambiguated(thing: AnyInput) -> AnyInput:
-    """Give an explicit offset to references to marks that look like an offset: `s:word-2` -> `s:word-2+0`."""
+    """Make plain what a reference means by what the document has.
+
+    A mark that looks like an offset or a number gets an explicit offset: `s:word-2` -> `s:word-2+0`, `s:1` ->
+    `s:1+0`.
+    A behavior's own point without its name gets that: `end="start+3"` of `g` is `g:start+3`.
+    """
     known = marks(thing)
+    owned = tuple(_with_own_names(behavior, known.get(behavior.id, frozenset())) for behavior in thing.behaviors)
+    thing = replace(thing, behaviors=owned) if owned != thing.behaviors else thing
     if not any(known.values()):
         return thing
     return rewritten(thing, lambda text: _explicit(text, known))
 
 
+def _with_own_names(behavior: AnyBehavior, marks: frozenset[str]) -> AnyBehavior:
+    own = {*_SYNC_NAMES, *marks}
+    timing = tuple([Timing(each.sync, _own(behavior.id, each.ref, own)) for each in behavior.timing])
+    return replace(behavior, timing=timing) if timing != behavior.timing else behavior
+
+
+def _own(behavior: str, text: str, own: Set[str]) -> str:
+    name = text.partition("+")[0].rpartition("-")[0] or text.partition("+")[0]
+    return f"{behavior}:{text}" if ":" not in text and name.strip() in own else text
+
+
 def _explicit(text: str, known: Mapping[str, frozenset[str]]) -> str:
     try:
         plain = SyncRef.parse(text)
-        meant = SyncRef.parse(text, known.get(plain.behavior, ()))
+        meant = SyncRef.parse(text, known.get(plain.behavior or plain.block, ()))
     except ValueError:
         return text  # schemas.check says what is wrong, and where
     return text if meant == plain else str(meant)

@@ -5,11 +5,11 @@
     bml:start, bml:end                      the block itself; `bml` is reserved
 
 Spaces around `:` and the sign mean nothing. Ids and names are case-sensitive and may hold hyphens, so only the end of
-a
-reference can be an offset: `gaze-1:stroke-2` is two seconds before `gaze-1:stroke`. The name of a mark may end in a
+a reference can be an offset: `gaze-1:stroke-2` is two seconds before `gaze-1:stroke`. The name of a mark may end in a
 hyphen and a number as well (`word-2`): it is read as an offset, unless `parse` is told that such a name exists. The
 codecs know the marks of their documents and write such a reference with an explicit offset (`speech-1:word-2+0`),
-which everyone reads alike.
+which everyone reads alike. So it is with a mark that is a number: `s:1` is a second after the start of block `s`,
+unless speech `s` is known to have a mark `1`; `s:1+0` is the mark, and so is `block:s:1`.
 """
 
 import math
@@ -37,6 +37,7 @@ _NAMED = r"[^\s:+\x00-\x1f\x7f-\x9f-][^\s:+\x00-\x1f\x7f-\x9f]*"
 _PLAIN = re.compile(rf"({_NAMED}):([A-Za-z_]+)")
 """Form of most references, which are read faster so."""
 _NAME = re.compile(_NAMED)
+_IN_NO_NAME = re.compile(r"[\s:+\x00-\x1f\x7f-\x9f]")
 
 
 class SyncRef(Struct, frozen=True, omit_defaults=True):
@@ -67,23 +68,26 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
             raise _bad(text, "more than four parts")
         for head in heads:
             if not is_id(head):
-                raise _bad(text, f"{head!r} is not an id" if head else "an empty part")
-        if len(heads) < 2 and (number := _signed(tail)) is not None:
+                raise _bad(text, f"{head!r} is not an id: {objection(head)}" if head else "an empty part")
+        if len(heads) < 2 and not (heads and tail in names) and (number := _signed(tail)) is not None:
             return cls(block=heads[0] if heads else "", offset=_finite(text, number))
         if not heads:
             raise _bad(text, "expected behavior:sync or a number of seconds")
         last, offset = _split_offset(tail, names)
         parts = [*heads, last]
         repetition = 0
-        if len(parts) > 2 and re.fullmatch("[0-9]+", last):
+        if len(parts) > 2 and re.fullmatch("[0-9]+", last) and (len(parts) > 3 or parts[-2] in SYNC_POINTS):
             repetition = int(parts.pop())
             if parts[-1] != "stroke" or repetition < 1:
                 raise _bad(text, "a repetition counts from 1 and is legal only after 'stroke'")
+        elif len(parts) > 2 and parts[-2] in SYNC_POINTS and _SIGNED.fullmatch(last):
+            raise _bad(text, "a repetition is a whole number")
         elif len(parts) == 4:
             raise _bad(text, "the fourth part is the number of a repetition")
         *block, behavior, sync = parts
         if not is_sync_point(sync):
-            raise _bad(text, f"{sync!r} is not a sync point" if sync else "no sync point")
+            why = ": ".join(filter(None, (f"{sync!r} is not a sync point", objection(sync))))
+            raise _bad(text, why if sync else "no sync point")
         if behavior == BLOCK_ITSELF and sync not in ("start", "end"):
             raise _bad(text, "a block has only 'start' and 'end'")
         return cls(block[0] if block else "", behavior, sync, repetition, _finite(text, offset))
@@ -94,7 +98,8 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         if not self.behavior:
             return f"{block}{_plain(self.offset)}"
         name = f"{self.sync}:{self.repetition}" if self.repetition else self.sync
-        needs_offset = self.offset != 0 or _WITH_OFFSET.fullmatch(name) is not None
+        is_number = not self.block and _SIGNED.fullmatch(name) is not None
+        needs_offset = self.offset != 0 or is_number or _WITH_OFFSET.fullmatch(name) is not None
         offset = f"{'-' if self.offset < 0 else '+'}{_plain(abs(self.offset))}" if needs_offset else ""
         return f"{block}{self.behavior}:{name}{offset}"
 
@@ -104,9 +109,21 @@ def is_id(text: str) -> bool:
     return len(text) <= LONGEST_ID and _NAME.fullmatch(text) is not None and is_utf8(text)
 
 
+def objection(text: str) -> str:
+    """Reason why a text is no id, for a message; empty: it is one."""
+    if is_id(text):
+        return ""
+    if (found := _IN_NO_NAME.search(text)) is not None:
+        held = "a space" if found[0] == " " else repr(found[0])
+        return f"it holds {held}"
+    if text.startswith("-"):
+        return "it begins with '-'"
+    return f"it is longer than {LONGEST_ID} characters" if len(text) > LONGEST_ID else "it is empty or no UTF-8"
+
+
 def is_sync_point(text: str) -> bool:
-    """Tell whether a text can name a sync point or mark. A number cannot: `s:2` is two seconds into block `s`."""
-    return is_id(text) and not _SIGNED.fullmatch(text)
+    """Tell whether a text can name a sync point or mark."""
+    return is_id(text)
 
 
 def _split_offset(tail: str, names: Collection[str]) -> tuple[str, float]:

@@ -1,17 +1,21 @@
-"""Entry of `engage` and `python -m engage_hri`. It sees to signals before it loads anything large."""
+"""Entry of `engage` and `python -m engage_hri`. It sees to signals before it loads anything at all."""
 
-import gc
 import os
-import signal
-import sys
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command of `services/commandline/app.py`."""
     # Loading takes half a second. A KeyboardInterrupt during it would be a traceback, or lost in a callback. Nothing
     # has begun yet, so leaving at once is orderly. `services/commandline/process.py` takes over when something runs.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, frame: os._exit(128 + number))
+    try:
+        import signal
+
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda number, frame: os._exit(128 + number))
+    except KeyboardInterrupt:
+        os._exit(130)
+    import gc
+
     # What is loaded stays: to search it for garbage would be a sixth of the time of loading.
     # `services/commandline/app.py` switches the search on again when the command has been loaded.
     gc.disable()
@@ -21,4 +25,4 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -29,7 +29,7 @@ async def test_a_streaming_model_learns_that_nobody_looked_and_makes_itself_clea
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     streaming = example("stream_from_generator")
-    async with streaming.embedded() as robot:
+    async with streaming.embedded(human="listening") as robot:
         greeting, repeated, request, goodbye = await streaming.converse(robot)
 
     assert greeting.said.startswith("Hello! I could use your help")
@@ -46,7 +46,7 @@ async def test_a_streaming_model_learns_that_nobody_looked_and_makes_itself_clea
 
 async def test_a_model_that_listens_acts_on_what_it_heard(capsys: pytest.CaptureFixture[str]) -> None:
     listening = example("listening_model")
-    async with listening.embedded() as robot:
+    async with listening.of_our_own() as robot:
         choice, corrected, agreed, last = await listening.converse(robot)
 
     assert [each.heard[0].text for each in (choice, corrected, agreed)] == list(listening.ANSWERS)

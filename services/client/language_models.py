@@ -33,8 +33,8 @@ from engage_hri.services.text.pieces import Ids
 
 Piece = str | Part
 """A bit of text, however short, in which `[id]` refers to an object; or a part by itself."""
-WORLD_PATIENCE: Seconds = 1.0
-"""Time to wait, at the first bracket, for a world that nobody has told yet: only it says what is a reference."""
+WORLD_PATIENCE: Seconds = 0.3
+"""Time from the start of a stream for which a bracket waits for the world: it alone says what a reference is."""
 PLAIN_TURN = ToolInput(turn_status="full", parts=())
 
 
@@ -85,31 +85,42 @@ async def stream(
     await_answer: return only when the turn has been answered, or it is too late.
 
     Raises:
-        InputRefused: `pieces` cannot be followed. Nothing was said.
+        InputRefused: `pieces` cannot be followed, and nothing was said; or one of them is neither text nor a part,
+            and the turn is broken off there.
         ExceptionGroup: holds what `pieces` raised.
     """
     if not isinstance(pieces, AsyncIterable):
-        reason = f"{type(pieces).__name__!r} is no asynchronous iterable of pieces"
-        raise InputRefused(
-            Fault(reason=reason, where=id, advice="an `async def` that yields text; or `perform_call`")
-        )
+        raise InputRefused(_unreadable(f"{type(pieces).__name__!r} is no asynchronous iterable of pieces", id))
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
         async with asyncio.TaskGroup() as tasks:
             read = _read(robot, pieces, chunker or Chunker(), speaking)
             reading = tasks.create_task(read, name=f"read {id}")
             speaking.begin(tasks, reading)
-    except BaseException:
+    except BaseException as error:
         speaking.break_off()
+        if isinstance(error, BaseExceptionGroup) and isinstance(error.exceptions[0], _NoPiece):
+            raise InputRefused(error.exceptions[0].fault) from None
         raise
     await speaking.leave_no_turn_open()
     return speaking.outcomes
+
+
+class _NoPiece(InputRefused):
+    """A piece that cannot be spoken."""
+
+
+def _unreadable(reason: str, id: str) -> Fault:
+    shown = reason if len(reason) <= 200 else f"{reason[:197]}..."
+    return Fault(reason=shown, where=id, advice="an `async def` that yields text; or `perform_call`")
 
 
 async def _read(robot: Robot, pieces: AsyncIterable[Piece], chunker: Chunker, speaking: "_Speaking") -> None:
     with robot.worlds() as worlds:
         objects = _Objects(worlds, robot.now)
         async for piece in pieces:
+            if not isinstance(piece, Piece):
+                raise _NoPiece(_unreadable(f"the piece {piece!r} is neither text nor a `Part`", speaking.id))
             ids = await objects.ids(is_needed=isinstance(piece, str) and "[" in piece)
             for chunk in chunker.feed(piece, ids):
                 speaking.go_on(chunk)
@@ -127,16 +138,14 @@ class _Objects:
         self._now = now
         self._objects = CoveredObjects(COVERED_FOR)
         self._ids = UNKNOWN
-        self._is_waiting = True
+        self._until = now() + WORLD_PATIENCE
 
     async def ids(self, *, is_needed: bool) -> Ids:
         """Return the ids, or `UNKNOWN`. is_needed: wait for a world that nobody has told yet."""
-        while (
-            world := await self._worlds.next(WORLD_PATIENCE if is_needed and self._is_waiting else 0.0)
-        ) is not None:
+        patience = max(0.0, self._until - self._now()) if is_needed and self._ids.is_unknown else 0.0
+        while (world := await self._worlds.next(patience)) is not None:
             self._objects.see(world, self._now())
-            is_needed = False
-        self._is_waiting = self._is_waiting and not is_needed
+            patience = 0.0
         if (known := self._objects.at(self._now())) is not None:
             found = frozenset(each.id for each in known.objects)
             self._ids = self._ids if not self._ids.is_unknown and found == self._ids.ids else Ids(found)
@@ -148,7 +157,7 @@ class _Speaking:
 
     def __init__(self, robot: Robot, id: str, turn: ToolInput, await_answer: bool) -> None:
         self._robot = robot
-        self._id = id
+        self.id = id
         self._turn = turn
         self._await_answer = await_answer
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
@@ -202,7 +211,7 @@ class _Speaking:
         self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))
 
     def _fragment(self, chunk: Chunk, status: TurnStatus) -> TurnFragment:
-        id = f"{self._id}-{len(self._performing) + 1}"
+        id = f"{self.id}-{len(self._performing) + 1}"
         return fragment_of(chunk, replace(self._turn, turn_status=status), id)
 
     async def _perform(self, fragment: TurnFragment) -> FragmentOutcome:

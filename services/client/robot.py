@@ -13,7 +13,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Collection, Iterable, Sequence
 from contextlib import asynccontextmanager
 from itertools import count
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Self, get_args
 
 from msgspec.structs import replace
 
@@ -60,7 +60,7 @@ class Robot(Hearing):
 
     @classmethod
     @asynccontextmanager
-    async def on(cls, bus: Bus) -> AsyncIterator["Robot"]:
+    async def on(cls, bus: Bus) -> AsyncIterator[Self]:
         """Make the client of a participant that has its own bus already.
 
         bus: its view of the bus. It stays open.

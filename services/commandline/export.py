@@ -11,6 +11,7 @@ import typer
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.process import DONE
+from engage_hri.services.commandline.sources import STDIN
 from engage_hri.services.runtime.installation import extra_command, packages_command
 
 if TYPE_CHECKING:
@@ -56,6 +57,9 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="nothing is to be made", advice=f"say what: {known}"))
     if options.out is not None and len(wanted) > 1:
         raise InputRefused(Fault(reason="is a name for one file", where="--out", advice="leave it out"))
+    if options.out == STDIN:
+        reason, advice = "`-` is no file, and standard output gets the names of the files", "--out FILE"
+        raise InputRefused(Fault(reason=reason, where="--out", advice=advice))
     paths = {name: _path(options, name) for name in wanted}
     for path in paths.values():
         if path.exists() and not options.overwrite:

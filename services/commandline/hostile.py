@@ -15,6 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.options import Embodied, Quiet
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import still
@@ -89,10 +90,10 @@ def attack(
 def whole_robot(config: Config | None = None, body: BodyMaker | None = None) -> Mapping[str, Service]:
     """Services of a robot with their configuration, and a still table with a person at it."""
     config = config or Config()
-    services = {name: roster.service(name, config) for name in roster.ROBOT}
+    robot = services(config, *roster.ROBOT)
     if body is not None:
-        services["control"] = partial(_embody, config=config, make=body)
-    return {"simulation": still(tangram_world()), **services}
+        robot["control"] = partial(_embody, config=config, make=body)
+    return {"simulation": still(tangram_world()), **robot}
 
 
 async def _embody(bus: Bus, ready: Ready, config: Config, make: BodyMaker) -> None:

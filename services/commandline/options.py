@@ -30,8 +30,6 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but er
 WorldFile = Annotated[
     Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
 ]
-HUMANS = {"appendix-b": "scripted"}
-"""Simulated humans with another name in the configuration."""
 
 
 def simulation_settings(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
@@ -39,7 +37,7 @@ def simulation_settings(seed: int | None, human: str | None, resolution: str | N
     chosen = {
         "control.variability.seed": seed,
         "simulation.seed": seed,
-        "simulation.human": HUMANS.get(human, human) if human else None,
+        "simulation.human": human,
         "recognition.gaze_resolution": resolution,
     }
     return tuple(f"{key}={value}" for key, value in chosen.items() if value is not None)

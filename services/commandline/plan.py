@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from msgspec.structs import replace
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Embodied, Strict, WorldFile
@@ -23,10 +21,9 @@ from engage_hri.services.commandline.outputs import Terminal
 from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
-from engage_hri.services.commandline.sources import read_source, read_world
+from engage_hri.services.commandline.sources import read_source, read_world, still
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import NO_SUCH_BLOCK
-from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 HIGHEST = 40
@@ -52,13 +49,16 @@ def main(options: Options) -> int:
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
         for plan in generated(source.things, around, config, str(source.path)):
-            planned = _planned(plan.block, around, config, source.path)
+            planned = run_virtual(rehearsed(plan.block, around, config))
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
                 block = plan.block.id if len(source.things) > 1 or not problem.behavior else ""
                 place = ":".join(filter(None, (block, problem.behavior)))
                 print(f"! {problem.kind} {place}: {problem.message}", file=sys.stderr)
+            if any(NO_SUCH_BLOCK in problem.message for problem in planned.problems):
+                together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {source.path.name}`"
+                print(f"! it is planned alone; {together} plays both at full speed", file=sys.stderr)
             if nothing_is_left(plan.block, planned.dropped):
                 reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
                 print(readable(Fault(reason=reason, where=plan.block.id), source.path), file=sys.stderr)
@@ -67,18 +67,6 @@ def main(options: Options) -> int:
     if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
     return code
-
-
-def _planned(block: Block, world: World, config: Config, file: Path) -> Plan:
-    """The plan of a block. Its refusal since it names another block says how to try the two together."""
-    try:
-        return run_virtual(rehearsed(block, world, config))
-    except InputRefused as error:
-        if NO_SUCH_BLOCK not in error.fault.reason:
-            raise
-        together = f"`engage play --embedded --virtual-time --at 0,1 FIRST.xml {file.name}`"
-        advice = f"a block that names another one cannot be planned alone; {together} plays both at full speed"
-        raise InputRefused(replace(error.fault, advice=advice), error.block) from error
 
 
 def _as_text(plan: Plan) -> str:
@@ -96,12 +84,7 @@ async def rehearsed(block: Block, world: World, config: Config) -> Plan:
     """Plan a block as a realizer does that has nothing else to perform, with the configured body at home."""
     from engage_hri.services.realizer.perform.planning import planned_alone
 
-    async with MemoryHub(config.robot, decodes=False) as hub:
-        hub.join("simulation").publish(keys.WORLD, world)
-        async with running(hub, {"control": roster.service("control", config, connects=False)}):
-            await asyncio.sleep(0.1)  # control has seen the world by then
-            try:
-                return await planned_alone(hub.join("plan"), block, config.realizer)
-            except InputRefused as error:
-                refused = error  # raised in there it would be one of a group
-    raise refused
+    services = {"simulation": still(world), "control": roster.service("control", config, connects=False)}
+    async with in_memory(config, services) as hub:
+        await asyncio.sleep(0.1)  # control has seen the world by then
+        return await planned_alone(hub.join("plan"), block, config.realizer)

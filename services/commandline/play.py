@@ -1,8 +1,8 @@
 """Command `engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -19,11 +19,11 @@ from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import checking, roster
+from engage_hri.services.commandline import checking
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.embedding import in_memory, services
 from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
 from engage_hri.services.commandline.outputs import FeedbackFormat, Outputs, Terminal
@@ -35,7 +35,6 @@ from engage_hri.services.commandline.sources import InputFile, Thing, read_world
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.live import Log
 from engage_hri.services.console.log import Telling
-from engage_hri.services.runtime.service import running
 
 NOTHING = World(entities=())
 PATIENCE: Seconds = 5.0
@@ -155,8 +154,7 @@ def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None
     return times
 
 
-@asynccontextmanager
-async def _private_system(job: Job, config: Config, world: World) -> AsyncIterator[Hub]:
+def _private_system(job: Job, config: Config, world: World) -> AbstractAsyncContextManager[Hub]:
     """Run a private system: simulated body and still world; generation only if there is a fragment.
 
     So without a fragment only the blocks themselves move the head.
@@ -164,10 +162,8 @@ async def _private_system(job: Job, config: Config, world: World) -> AsyncIterat
     names = ["realizer", "recognition", "control"]
     if job.has_fragments:
         names.append("generation")
-    services = {name: roster.service(name, config) for name in names}
     perception = still(world, is_attentive=job.options.human != "none")
-    async with MemoryHub(config.robot, decodes=False) as hub, running(hub, {"simulation": perception, **services}):
-        yield hub
+    return in_memory(config, {"simulation": perception, **services(config, *names)})
 
 
 async def _embedded(job: Job, config: Config, world: World) -> int:

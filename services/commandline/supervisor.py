@@ -178,7 +178,7 @@ class ChildRefused(RunFailed):
     """A child ended with exit code 2: its input is wrong, and would be wrong again."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(Fault(reason=f"{name} could not start", advice="its log says why"))
+        super().__init__(Fault(reason=f"{name} could not start", advice="its own message above says why"))
 
 
 async def _line(stream: asyncio.StreamReader) -> bytes:

@@ -10,6 +10,7 @@ from engage_hri.services.bus.interface import Bus, Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.record import recording
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.runtime.service import Ready, Service, running
@@ -24,7 +25,7 @@ async def play_tangram(
     """
     finished = asyncio.Event()
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
-        services = {name: roster.service(name, config) for name in roster.NAMES}
+        services = bound(config, *roster.NAMES)
         services["collaboration"] = ending(services["collaboration"], finished)
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
         async with kept, following(hub.join("console"), sinks), running(hub, services):

@@ -16,10 +16,10 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.claim import claiming
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.demo import DEFAULTS, Tallying, scene_view
+from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.options import Embodied, Listening, Simulated, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run_until_signal
@@ -60,7 +60,7 @@ def main(options: Options) -> int:
 
 async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
     # Loaded before there is a bus: messages would wait for that.
-    services = {name: roster.service(name, config) for name in _names(options)} if options.in_one else {}
+    services = bound(config, *_names(options)) if options.in_one else {}
     # Our own session comes first and stays, for children find one another through it, and may crash.
     async with await options.open(config.bus, "up", options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()

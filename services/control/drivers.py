@@ -45,6 +45,8 @@ BUILT_IN = {
     "espeak": "engage_hri.services.control.voice.sounding:EspeakVoice",
 }
 """Drivers of this package, each imported only when it is asked for."""
+VOICES = ("espeak", "silent")
+"""Those of them that are voices alone, and are offered where a voice is asked for."""
 EXTRAS = {"mujoco": "mujoco", "reachy_mini": "reachy-mini"}
 """The extra of this package that a driver needs."""
 FORMS = "NAME, FILE.py:CLASS or package.module:CLASS"
@@ -96,14 +98,14 @@ def check(config: ControlConfig) -> None:
     for each in _asked(config):
         if each.spec != "simulated":
             with _called(each):
-                _settings(each, load(each.spec), config)
+                _settings(each, load(each.spec, is_voice=each.is_voice), config)
 
 
 def with_settings_of_drivers(config: ControlConfig) -> ControlConfig:
     """The configuration with all settings of each driver that is asked for, those at their defaults too."""
     found = {}
     for each in _asked(config):
-        driver = load(each.spec)
+        driver = load(each.spec, is_voice=each.is_voice)
         settings = _settings(each, driver, config)
         if settings is not None:
             where = _given(each, driver, config)[1]
@@ -118,7 +120,7 @@ def _asked(config: ControlConfig) -> list[Named]:
 
 def make(asked: Named, config: ControlConfig) -> Body:
     """Make the body of one driver, with its settings. Raises InputRefused if it breaks, or is no body."""
-    driver = load(asked.spec)
+    driver = load(asked.spec, is_voice=asked.is_voice)
     settings = _settings(asked, driver, config)
     try:
         is_class = _is_configured(driver)
@@ -144,8 +146,8 @@ def _is_configured(driver: Driver) -> bool:
     return owner["configured"] is Body or issubclass(owner["configured"], owner["__init__"])
 
 
-def load(spec: str) -> Driver:
-    """Import a driver by its name. Raises InputRefused."""
+def load(spec: str, *, is_voice: bool = False) -> Driver:
+    """Import a driver by its name. is_voice: only voices are offered for a wrong one. Raises InputRefused."""
     where, colon, name = spec.rpartition(":")
     if spec in BUILT_IN:
         where, _, name = BUILT_IN[spec].partition(":")
@@ -162,7 +164,7 @@ def load(spec: str) -> Driver:
             return offered[spec].load()  # type: ignore[no-any-return]
         except Exception as error:
             raise _refusal(f"it cannot be imported: {words_of(error)}", spec, seen_at(error)) from error
-    known = sorted({*BUILT_IN, *offered})
+    known = sorted({*(VOICES if is_voice else BUILT_IN), *offered})
     close = get_close_matches(spec, known, n=1)
     advice = f"do you mean {close[0]}? " if close else ""
     raise _refusal(f"no body {spec!r}", spec, f"{advice}known are {', '.join(known)}; or {FORMS}")

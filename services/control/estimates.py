@@ -8,10 +8,13 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.warned import warn
 
 ADVICE = "phases lead from `start` to `end`, each from where the one before it ends (docs/control.md)"
+ROUNDING: Seconds = 1e-6
+"""Seconds by which words may end after the speech."""
 MOST_TOLD = 100
 """Most mistakes of a body that are told, each once: it may make a new one in each estimate."""
 
@@ -70,7 +73,17 @@ def flaw(behavior: BlockBehavior, estimate: Estimate) -> str:
     first, last = estimate.phases[0].since, estimate.phases[-1].to
     if (first, last) != ("start", "end"):
         return f"its phases lead from {first!r} to {last!r}"
-    return _out_of_order(behavior, [first, *(phase.to for phase in estimate.phases)])
+    return _out_of_order(behavior, [first, *(phase.to for phase in estimate.phases)]) or _words_out_of_order(estimate)
+
+
+def _words_out_of_order(estimate: Estimate) -> str:
+    position, at = 0, 0.0
+    for word in estimate.words:
+        if word.position <= position or word.start < at or word.end < word.start:
+            return f"its word at position {word.position} is not after the word before it"
+        position, at = word.position, word.end
+    seconds = sum(phase.natural for phase in estimate.phases)
+    return f"its words take {at:g} s, and its phases {seconds:g} s" if at > seconds + ROUNDING else ""
 
 
 def _out_of_order(behavior: BlockBehavior, syncs: Sequence[str]) -> str:

@@ -8,6 +8,7 @@ from msgspec import Struct
 from engage_hri.schemas.units import A_DAY, Seconds, span
 from engage_hri.services.doctor.facts import Facts, Known, Package
 from engage_hri.services.doctor.matrix import clock_of, matrix
+from engage_hri.services.runtime.installation import packages_command
 
 Severity = Literal["wrong", "doubtful", "note"]
 SOON = 30
@@ -69,7 +70,7 @@ def _packages(facts: Facts) -> Iterator[Finding]:
             what = f"version {package.version} is here" if package.version else "it is not installed"
             yield Finding(
                 severity="wrong", where=package.name, what=f"{what}; Engage needs {package.name}{package.wanted}",
-                do=f"python -m pip install '{package.name}{package.wanted}', in the environment of `engage`",
+                do=packages_command(f"{package.name}{package.wanted}"),
             )  # fmt: skip
 
 
@@ -124,7 +125,7 @@ def _services(facts: Facts) -> Iterator[Finding]:
             if name not in there:
                 yield Finding(
                     severity="wrong", where=name, what="nobody sees this service",
-                    do=f"start `engage run {name}` with the same --robot and --connect; its log tells why it ended",
+                    do=f"start `engage run {name}` with the same --robot and --connect; it prints why it ended",
                 )  # fmt: skip
     for version in facts.protocols:
         if version != facts.protocol:
@@ -237,7 +238,7 @@ def _losses(facts: Facts) -> Iterator[Finding]:
 
 
 _COUNTS: tuple[tuple[str, str, str, Severity, Severity], ...] = (
-    ("failures", "errors that are bugs", "its log has the tracebacks: please report them", "wrong", "wrong"),
+    ("failures", "errors that are bugs", "what it printed has the tracebacks: please report them", "wrong", "wrong"),
     ("lost", "messages lost for good", "look at the network between its machine and the others", "wrong", "doubtful"),
     (
         "refused", "messages that could not be read",
@@ -324,7 +325,7 @@ def _abilities(facts: Facts) -> Iterator[Finding]:
         if facts.body.problem:
             yield Finding(
                 severity="wrong", where="control", what=f"nothing is known of the body: {facts.body.problem}",
-                do="look at the log of control",
+                do="look at what control has printed",
             )  # fmt: skip
         elif "speech" not in facts.body.types:
             yield Finding(

@@ -290,18 +290,12 @@ class FragmentRunner:
                     continue  # what was inhibited meanwhile is not begun
                 performance.begin(made)
                 performance.world = world
-                try:
-                    pending = await self._send_block(performance, followed)
-                except RequestRefused:
-                    if not any(each.is_over for each in followed):
-                        raise
-                    # The block named others that ended while it was on its way: make it again without those.
-                else:
-                    named = [mention.object for mention in made.mentions]
-                    self._discourse = self._heard_in(turn).naming(fragment.id, named)
-                    performance.is_sent = True
-                    self._choosing.look_again(self._world)
-                    return pending
+                pending = await self._send_block(performance, followed)
+                named = [mention.object for mention in made.mentions]
+                self._discourse = self._heard_in(turn).naming(fragment.id, named)
+                performance.is_sent = True
+                self._choosing.look_again(self._world)
+                return pending
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())
         except EngageError as error:

@@ -1,8 +1,8 @@
 """References that cannot be made any more: their words are said, and nothing else of the fragment is lost. Pure.
 
-Between the writing of a fragment and its performance an object may leave, and a model may name what never was there. A
-speaker says the words all the same. Only a document of which nothing at all could be performed is refused; a piece of
-a turn never is, for that would cost the rest of the turn.
+Between the writing of a fragment and its performance an object may leave, and a model may name what never was there.
+A speaker says the words all the same. Only a document of which nothing at all could be performed is refused; a piece
+of a turn never is, for that would cost the rest of the turn.
 """
 
 from msgspec.structs import replace

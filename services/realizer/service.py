@@ -24,6 +24,7 @@ from engage_hri.schemas.body import (
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.references import disambiguated
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
@@ -37,6 +38,7 @@ from engage_hri.services.realizer.perform.shared_context import Moving, Presence
 from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.perform.waiting import WaitingBlock
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
+from engage_hri.services.realizer.plan.past import LASTING, Past
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
@@ -57,7 +59,9 @@ class _Realizer:
         """Blocks of `live` that are being performed, by the id of the request."""
         self.routes: dict[str, Moving] = {}
         self.peers = Presence()
-        self.live_blocks = LiveBlocks()
+        self.live_blocks = LiveBlocks(bus.now)
+        self.endings = Past[Ending](bus.now)
+        """How the blocks have ended that are over, by id."""
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
         self.planning = Planning(bus, config, self.live_blocks, self.performing)
@@ -92,7 +96,7 @@ class _Realizer:
                 if len(self.live) >= self.config.blocks:
                     self.desk.refuse(request.id, self._too_many(request.block.id))
                     return
-                live = self.live[request.id] = Live(request, tuple(self.live.values()))
+                live = self.live[request.id] = Live(request, tuple(self.live.values()), self.endings)
                 tasks.create_task(self._perform(live), name=f"block {request.block.id}")
             case InterruptBehavior():
                 tasks.create_task(self.interrupt(request), name=f"interruption {request.id}")
@@ -140,7 +144,8 @@ class _Realizer:
         for performance in self.performing():
             if performance.id == word.block:
                 performance.spoken.hear(word.behavior, word.position)
-                performance.decisions.facts.say(word.behavior, self.bus.local(word.at))
+                if performance.decisions.say(word.behavior, word.position, self.bus.local(word.at), self.bus.now()):
+                    performance.take_in()
                 performance.held.tell()  # A voice that is held may stand now.
 
     async def _perform(self, live: Live) -> None:
@@ -166,17 +171,18 @@ class _Realizer:
             fault = Fault(reason="a block of this id is still being performed", where=block.id, advice=advice)
             self._refuse(live, BlockRefused(fault))
             return
-        if absent := set(live.request.follows) - {each.id for each in live.leaders}:
-            fault = Fault(reason=f"it follows {', '.join(sorted(absent))}: no such live block", where=block.id)
-            self._refuse(live, BlockRefused(fault))
+        if live.unknown:
+            reason = f"it follows {', '.join(live.unknown)}: no block of that id is known"
+            advice = f"a block can be followed from its request until {LASTING:g} s after its end"
+            self._refuse(live, BlockRefused(Fault(reason=reason, where=block.id, advice=advice)))
             return
         if live.request.follows and block.composition == "REPLACE":
             advice = "leave out one of the two: REPLACE ends all that runs, and a block ends with those it follows"
             fault = Fault(reason="it follows blocks that it replaces", where=block.id, advice=advice)
             self._refuse(live, BlockRefused(fault))
             return
-        live.elsewhere = self.live_blocks.blocks
-        with self.live_blocks.opened(block) as live.block:
+        with self.live_blocks.opened(disambiguated(block)) as live.block:
+            live.elsewhere = self.live_blocks.named_by(live.block.id)
             try:
                 plan = await _result_or_stopped(live.ending, self.planning.plan(live))
             except EngageError as error:
@@ -275,6 +281,8 @@ class _Realizer:
         self.performances.pop(live.request.id, None)
         live.settle()
         live.ended.set_result(None)
+        if not any(each.id == live.id for each in self.live.values()):  # else it was refused for its id
+            self.endings.add(live.id, live.ending.result())
 
 
 async def _result_or_stopped(stopped: asyncio.Future[Ending], work: Coroutine[Any, Any, Result]) -> Result | None:

@@ -121,7 +121,8 @@ async def running(hub: Hub | Mapping[str, Hub], services: Mapping[str, Service])
             yield
         finally:
             for task in reversed(tasks):
-                task.cancel()
+                if not task.cancelling():  # the group has, if one has failed: a second one would break off its end
+                    task.cancel()
 
 
 async def _serve_for_ever(hub: Hub, name: str, service: Service, standing: asyncio.Event) -> None:

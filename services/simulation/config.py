@@ -8,7 +8,7 @@ from msgspec import Struct
 from engage_hri.schemas.ranges import not_negative, positive, shares
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds
 
-HumanKind = Literal["scripted", "misplacing", "listening", "stochastic", "attentive", "none"]
+HumanKind = Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive", "none"]
 
 
 class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -119,13 +119,13 @@ class Habits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings of the simulation.
 
-    human: `scripted` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
+    human: `appendix-b` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
     piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `stochastic` too, with
     the habits, pace and mistakes of `stochastic`; `attentive` looks where the robot looks, meets its eyes, and nods
     when it has spoken, says yes to a question, or does what it asks for; `none` leaves the table alone.
     """
 
-    human: HumanKind = "scripted"
+    human: HumanKind = "appendix-b"
     seed: int = 0
     """Seed of the person's reaction times and of the faults of perception."""
     jitter: Seconds = 0.03

@@ -89,7 +89,7 @@ def _human(config: SimulationConfig, robot: str, chance: random.Random) -> Human
         return chance.uniform(-config.jitter, config.jitter)
 
     match config.human:
-        case "scripted":
+        case "appendix-b":
             return Human(rules(), robot, vary)
         case "misplacing":
             return Human(misplacing_rules(), robot, vary)

@@ -3,6 +3,7 @@
 import re
 
 from engage_hri.schemas.speakable import UNSPACED
+from engage_hri.schemas.suggestion import suggestion
 from engage_hri.services.text import patterns as mark
 from engage_hri.services.text.acts import is_direction, may_be_direction
 from engage_hri.services.text.patterns import is_silent
@@ -214,7 +215,9 @@ class Brackets:
                 if not self._is_over and len(rest) <= mark.BRACKET and not any(each in "[]\n" for each in rest[1:]):
                     return None
         self._pop()
-        self._leave("bracket", f"[{opened.text.strip()}]")
+        words = opened.text.strip()
+        hint = suggestion(words, self._ids.ids) if self._ids.ids else ""
+        self._leave("bracket", f"[{words}]{f' ({hint})' if hint.startswith('did you mean') else ''}")
         if opened.is_index or after.isalnum():
             self._say(" ", at, 1)
         return 1

@@ -4,7 +4,9 @@ from bisect import bisect_left
 from functools import lru_cache
 
 from msgspec import Struct
+from msgspec.structs import replace
 
+from engage_hri.schemas.documents.prosody import Prosody
 from engage_hri.services.text.marks import NO_IDS, Reader
 from engage_hri.services.text.patterns import is_silent
 from engage_hri.services.text.pieces import problems
@@ -23,6 +25,10 @@ class Heard(Struct, frozen=True):
     def place(self, written: int) -> int:
         """Convert a place in the author's text to the one in this text."""
         return bisect_left(self.places, written)
+
+    def span(self, span: Prosody) -> Prosody:
+        """Convert a span of the author's text to one of this text."""
+        return replace(span, start=self.place(span.start), end=self.place(span.end))
 
 
 @lru_cache(256)

@@ -1,10 +1,10 @@
 """Reader of a text that comes bit by bit: it finds what is for the ear, and leaves out what is for the eye alone.
 
 The marks are those of CommonMark, with tables, footnotes and strikethrough as GitHub has them, and of HTML. A parser
-of CommonMark reads a document as a whole: whether `*` begins an emphasis depends on how the paragraph ends. A
-voice cannot wait for that, and need not know it: an asterisk beside a word is not said in either case. So what stands beside
-a mark decides it, and text is held back only where letters depend on what comes: in `[`, `<`, a code span, an
-address, and at the beginning of a line. tests/text compares the letters with those that a CommonMark parser finds.
+of CommonMark reads a document as a whole: whether `*` begins an emphasis depends on how the paragraph ends. For a
+voice that makes no difference, and it cannot wait: an asterisk beside a word is not said in either case. So what
+stands beside a mark decides it, and text is held back only where letters depend on what comes: in `[`, `<`, a code
+span, an address, and at the beginning of a line. tests/text compares the letters with those that a parser finds.
 
     reader = Reader()
     pieces = [*reader.feed("See [the d", ids), *reader.feed("ocs](https://example.org).", ids), *reader.finish(ids)]

@@ -1,4 +1,4 @@
-"""What marks look like: the patterns of CommonMark and HTML that the reader of `marks.py` looks for."""
+"""Patterns of marks: those of CommonMark and HTML that the reader of `marks.py` looks for."""
 
 import re
 import unicodedata

@@ -39,7 +39,7 @@ _TOLD: Mapping[Reason, str] = {
 }
 _MOST = 3
 """Examples in one line."""
-_LONGEST = 24
+_LONGEST = 48
 """Characters of one example."""
 
 

@@ -115,7 +115,7 @@ def test_a_wrong_body_is_not_the_fault_of_the_file(engage: Engage, tmp_path: Pat
 
     assert (body.code, voice.code) == (2, 2)
     assert body.err.startswith("body nosuch: no body 'nosuch' (known are ")
-    assert voice.err.startswith("voice nosuch: no voice 'nosuch' (known are ")
+    assert voice.err.startswith("voice nosuch: no voice 'nosuch' (known are espeak, silent; or ")
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,17 @@
 import re
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.config import BusConfig, Mode, mode_of
-from engage_hri.services.commandline import up
+from engage_hri.services.commandline import simulate, up
 from engage_hri.services.commandline.config import Config, load
 from engage_hri.services.commandline.roster import NAMES, service
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.runtime.configuration import read
+from engage_hri.services.simulation.config import HumanKind
 
 ROOT = Path(__file__).parents[2]
 
@@ -153,3 +155,13 @@ def test_who_connects_to_another_machine_is_a_client_unless_others_connect_to_it
     mode: Mode, connect: tuple[str, ...], listen: tuple[str, ...], found: str
 ) -> None:
     assert mode_of(mode, connect, listen) == found
+
+
+@pytest.mark.parametrize(("command", "more"), [(up.Options, set()), (simulate.Options, {"table-2-1"})])
+def test_a_simulated_human_is_called_the_same_on_the_command_line_and_in_the_configuration(
+    command: type, more: set[str]
+) -> None:
+    offered = set(re.findall(r"'([\w-]+)'", str(get_type_hints(command)["human"])))
+
+    assert len(offered) > 3
+    assert offered - more < set(get_args(HumanKind))

@@ -3,7 +3,9 @@
 import asyncio
 import io
 import json
+import shlex
 import socket
+import sys
 from pathlib import Path
 
 import msgspec
@@ -312,3 +314,11 @@ def test_what_cannot_be_is_refused(engage: Engage) -> None:
     told = engage("doctor", "--connect", "nowhere")
     assert (told.code, told.out) == (2, "")
     assert "'nowhere' is not an endpoint" in told.err
+
+
+def test_a_package_is_installed_by_the_python_that_runs() -> None:
+    (found,) = findings(well(packages=(Package(name="lxml", wanted=">=5.2"),)))
+
+    python, *arguments = shlex.split(found.do)
+    assert Path(python).absolute() == Path(sys.executable).absolute()
+    assert arguments == ["-m", "pip", "install", "lxml>=5.2"]

@@ -142,6 +142,7 @@ def test_exports_lie_beside_the_recording_and_are_not_overwritten(run: Engage, t
     twice = run("export", path, "--elan")
     named = run("export", path, "--elan", "--csv", "--out", tmp_path / "x.eaf")
     nothing = run("export", path)
+    dash = run("export", path, "--elan", "--out", "-")
 
     names = ["a.eaf", "a.TextGrid", "a.csv", "a.jsonl", "a.png"]
     assert sorted(made.out.split()) == sorted(str(tmp_path / name) for name in names)
@@ -150,6 +151,8 @@ def test_exports_lie_beside_the_recording_and_are_not_overwritten(run: Engage, t
     assert (twice.code, named.code, nothing.code) == (2, 2, 2)
     assert "there is such a file" in twice.err
     assert "nothing is to be made" in nothing.err
+    assert (dash.code, dash.out) == (2, "")
+    assert dash.err.startswith("--out: `-` is no file")
 
 
 def test_tables_of_a_folder_are_printed_and_written(run: Engage, tmp_path: Path) -> None:

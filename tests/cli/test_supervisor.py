@@ -102,7 +102,7 @@ async def test_a_refused_child_ends_everything() -> None:
         async with supervised({"a": child}):
             await child.ended.wait()
 
-    assert caught.group_contains(ChildRefused)
+    assert caught.group_contains(ChildRefused, match=r"a could not start \(its own message above says why\)")
 
 
 @pytest.mark.real_time

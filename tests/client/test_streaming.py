@@ -8,7 +8,7 @@ import pytest
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Reference, Speech
 from engage_hri.schemas.blocks import SpokenText
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.requests import Cancel
@@ -240,3 +240,13 @@ async def test_a_tool_call_comes_back_as_its_result_whatever_becomes_of_it(hub: 
     assert (wrong.status, wrong.problems[0][:11]) == ("refused", "$.parts[0]:")
     assert (broken.status, broken.problems) == ("failed", (f"{generation.heard[1][1].id}: it broke",))
     assert len({fragment.id for _, fragment in generation.heard}) == 2
+
+
+@pytest.mark.parametrize("piece", [3, None, b"bytes", {"say": "x"}, ["a"]])
+async def test_a_piece_that_is_no_text_is_refused_as_itself(hub: MemoryHub, piece: object) -> None:
+    generation = Generation()
+    async with running(hub, {"generation": generation.serve}), connect(hub=hub) as robot:
+        with pytest.raises(InputRefused, match=r"^t: the piece .* is neither text nor a `Part`"):
+            await stream(robot, writing("Hello there. ", "You", piece, " again."), id="t")
+
+    assert all("again" not in str(fragment) for _, fragment in generation.heard)

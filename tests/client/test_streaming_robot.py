@@ -79,16 +79,16 @@ async def test_who_takes_the_floor_stops_the_writer_and_the_model_learns_how_far
     assert ended < 6.0
 
 
-async def test_a_misspelled_object_ends_the_turn_with_a_proper_look_and_the_nearest_id() -> None:
+async def test_a_misspelled_object_is_said_as_words_and_the_nearest_id_is_told() -> None:
     async with stage() as here:
         with here.robot.turns() as turns:
             result = await told(here.robot, writing("Hello there. ", "See [blue-squere]? ", "Then go. "))
             closed = await turns.next()
 
-    assert (result.status, result.said) == ("failed", "Hello there.")
+    assert (result.status, result.said) == ("done", "Hello there. See blue-squere? Then go.")
     assert "did you mean 'blue-square'" in result.problems[0]
     assert closed is not None
-    assert (closed.status, closed.fragments) == ("done", ("t-1", "t-3"))
+    assert (closed.status, closed.fragments) == ("done", ("t-1", "t-2", "t-3", "t-4"))
 
 
 async def test_a_writer_who_is_silent_for_too_long_has_lost_the_turn() -> None:

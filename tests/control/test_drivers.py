@@ -209,7 +209,7 @@ async def test_wrong_settings_are_refused_by_their_key(name: str, settings: dict
 
 @pytest.mark.parametrize("does", [drivers.check, drivers.made])
 async def test_a_voice_is_refused_as_a_voice_and_a_body_of_the_same_name_as_a_body(does):
-    with pytest.raises(InputRefused, match=r"^voice nosuch: no voice 'nosuch' \(known are espeak"):
+    with pytest.raises(InputRefused, match=r"^voice nosuch: no voice 'nosuch' \(known are espeak, silent; or NAME"):
         does(ControlConfig(voice="nosuch"))
     with pytest.raises(InputRefused, match=r"^body nosuch: no body 'nosuch' \(known are espeak"):
         does(ControlConfig(body="nosuch"))

@@ -1,6 +1,7 @@
 """The voice without sound is held to the contract, alone and as the voice of a body; it speaks as the torso does."""
 
 import asyncio
+import re
 from collections.abc import Sequence
 
 import pytest
@@ -66,3 +67,33 @@ async def test_it_can_be_mute_without_knowing_and_voiceless_knowing_it() -> None
     assert not voice.estimate(SPEECH, BodyPose(), WORLD).feasible
     with pytest.raises(InputRefused, match="cannot play 'stall'"):
         voice.switch_faults([BodyFault(kind="stall")])
+
+
+MARKED_UP = {
+    'one two <break time="2s"/> three': 2.91,
+    'one two, <break time="2s"/> three': 2.91,
+    '<break time="2s"/>one two three': 2.91,
+    'one two three<break time="2s"/>': 2.91,
+    'one two <break strength="strong"/> three': 1.61,
+    '<prosody rate="200%">one two</prosody> three': 0.64,
+    '<prosody rate="50%">one <break time="1s"/> two</prosody> three': 2.45,
+}
+
+
+@pytest.mark.parametrize("markup", MARKED_UP)
+async def test_a_pause_and_a_rate_in_ssml_take_their_time_in_estimate_and_performance(markup: str) -> None:
+    text = " ".join(re.sub("<[^>]*>", "", markup).split())
+    voice, speech = SilentVoice(), Speech(id="s", text=text, markup=markup)
+    estimate = voice.estimate(speech, None, WORLD)
+
+    assert sum(phase.natural for phase in estimate.phases) == pytest.approx(MARKED_UP[markup])
+    said = told(await performed(voice, speech))
+    assert said[-1] == ("end", pytest.approx(MARKED_UP[markup]))
+    assert [at for _, at in said[1:-1]] == pytest.approx([word.end for word in estimate.words])
+    assert not estimate.degraded
+
+
+def test_markup_without_effect_is_told() -> None:
+    speech = Speech(id="s", text="one", markup='<say-as interpret-as="characters">one</say-as>')
+
+    assert "<say-as> has no effect" in SilentVoice().estimate(speech, None, WORLD).degraded

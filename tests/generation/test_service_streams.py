@@ -89,22 +89,6 @@ async def test_words_that_have_been_said_are_not_waited_for(hub: MemoryHub) -> N
         assert lines(await partners.fragment_block("b")) == ["turn-gaze:start = s:end"]
 
 
-async def test_a_block_that_comes_too_late_for_what_it_names_is_sent_again_without(hub: MemoryHub) -> None:
-    async with stage(hub) as partners:
-        partners.send(says("a", "beginning"))
-        await partners.fragment_block("a")
-        partners.refusal = Fault(reason="'a:s:end' is not a point of a live block")
-        pending = partners.send(says("b", "end"))
-        # The realizer ends `a` before it sees `b`, generation hears of it after it has sent `b`.
-        partners.end(partners.request("a"))
-        await asyncio.sleep(0)
-        partners.refusal = None
-        block = await partners.fragment_block("b")
-        await pending.accepted
-
-        assert not [line for line in lines(block) if "a:" in line]
-
-
 async def test_a_reference_costs_what_it_takes_from_where_the_fragments_before_it_leave_the_head(
     hub: MemoryHub,
 ) -> None:

@@ -46,7 +46,7 @@ HUNG_AFTER = 40.0
 """Calm seconds after which a request without an end is hung: more than the longest behavior, event or patience."""
 LONG = 60.0
 SETTINGS = (
-    "--set", "recognition.gaze_resolution=table", "--set", "simulation.human=scripted",
+    "--set", "recognition.gaze_resolution=table", "--set", "simulation.human=appendix-b",
     "--set", "collaboration.placement=4", "--set", "collaboration.arrival=1",
 )  # fmt: skip
 """More words in less time than with people: the manager soon asks again."""

@@ -52,7 +52,7 @@ class World:
     def __init__(self, late: Point | None = None) -> None:
         """late: the point that comes `LATE` seconds later than it is planned."""
         self.late = late
-        self.live, self._opened = LiveBlocks(), ExitStack()
+        self.live, self._opened = LiveBlocks(lambda: 0.0), ExitStack()
         self.blocks: dict[str, Block] = {}
         self.times: dict[Point, Seconds] = {}
         self.plans: dict[str, Plan] = {}

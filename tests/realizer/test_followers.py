@@ -162,7 +162,7 @@ async def test_who_comes_while_what_he_follows_is_on_its_way_home_never_begins()
 
 async def test_to_follow_what_is_not_there_is_refused() -> None:
     async with stage() as seen:
-        with pytest.raises(RequestRefused, match="follows one: no such live block"):
+        with pytest.raises(RequestRefused, match="follows one: no block of that id is known"):
             await seen.ask(fragment("two"), "one").outcome
 
 

@@ -151,7 +151,7 @@ class Link:
 
 
 def test_foresight_goes_through_a_chain_of_any_length() -> None:
-    live_blocks = LiveBlocks()
+    live_blocks = LiveBlocks(lambda: 0.0)
     links = [Link(f"b{number}", live_blocks) for number in range(2000)]
     with ExitStack() as live:
         for number, link in enumerate(links):
@@ -167,7 +167,7 @@ def test_foresight_goes_through_a_chain_of_any_length() -> None:
 def test_blocks_that_never_agree_on_a_time_are_told_twenty_times_and_go_on_with_what_is_measured() -> None:
     """Each expects its end a second after the other's. The next news from outside starts them anew."""
 
-    live_blocks = LiveBlocks()
+    live_blocks = LiveBlocks(lambda: 0.0)
     one, two = Link("one", live_blocks), Link("two", live_blocks)
     with ExitStack() as live:
         for rival in (one, two):

@@ -51,15 +51,16 @@ async def test_points_of_other_blocks_are_spelled_in_ones_own_dialect() -> None:
 
 
 @pytest.mark.parametrize("ref", ["one:s:stroke", "one:nobody:start", "zero:s:start", "one:s:m"])
-async def test_a_point_that_no_live_block_has_refuses_the_block(ref: str) -> None:
+async def test_a_point_that_no_block_has_costs_the_tie_and_no_words(ref: str) -> None:
     async with puppet() as body:
         first = body.ask(bml(SPEECH, id="one"))
         second = body.ask(bml(f'<speech id="t" start="{ref}"><text>so</text></speech>', id="two"))
-        await asyncio.wait([second.outcome])
         await body.do("s", "start", "end", every=1.0, block="one")
-        await first.outcome
+        await body.do("t", "start", "end", every=1.0, block="two")
+        await asyncio.gather(first.outcome, second.outcome)
 
-    assert body.warnings() == [("two", "PARSING_FAILURE")]
+    assert body.warnings() == [("two:t", "PARSING_FAILURE")]
+    assert body.outcomes["two"].status == "done"
 
 
 async def test_what_is_dropped_in_one_block_holds_nobody_in_another() -> None:
@@ -170,7 +171,7 @@ async def test_an_event_ends_half_a_second_after_its_limit_whenever_recognition_
     assert seen.times()["e:end"] == seen.times()["s:start"] == limit + 0.5
 
 
-def test_a_ledger_forgets_a_block_when_it_is_over() -> None:
+def test_a_block_that_is_over_is_past() -> None:
     class Ears:
         def __init__(self) -> None:
             self.heard: list[object] = []
@@ -181,7 +182,7 @@ def test_a_ledger_forgets_a_block_when_it_is_over() -> None:
         def miss(self, behaviors: object) -> None:
             self.heard.append(sorted(behaviors))  # type: ignore[call-overload]
 
-    live_blocks, early, late = LiveBlocks(), Ears(), Ears()
+    live_blocks, early, late = LiveBlocks(lambda: 0.0), Ears(), Ears()
     end, start = Point("one:s", "end"), Point("one:s", "start")
     one = block((Speech(id="s", text="so"),), id="one")
     with live_blocks.followed(late, [end]):
@@ -194,4 +195,9 @@ def test_a_ledger_forgets_a_block_when_it_is_over() -> None:
 
     assert late.heard == [["one:s"]]
     assert early.heard == [(start, 1.0), ["one:bml", "one:s"]]
-    assert live_blocks.blocks == {}
+    with live_blocks.opened(block((), id="two")):
+        # It is past: what was reached can be named, and who would follow it hears of the rest that it never comes.
+        assert live_blocks.named_by("two") == {"one": one}
+        assert (live_blocks.is_lost(start), live_blocks.is_lost(end)) == (False, True)
+        with live_blocks.followed(late, [end, start]):
+            assert late.heard[1:] == [["one:s"], (start, 1.0)]

@@ -21,6 +21,7 @@ from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, l
 from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.outcome import completed
 from engage_hri.services.realizer.perform.spoken import Spoken
+from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.plan.unsupported import kind_of
 from engage_hri.services.realizer.points import FINISH, Point
 from tests.realizer.planning import plan
@@ -231,7 +232,7 @@ def test_a_body_that_gives_no_kind_of_warning_cannot_create_the_behavior() -> No
 
 def live(id: str, *earlier: Live, follows: tuple[str, ...] = ()) -> Live:
     request = PerformBlock(id=f"r-{id}", requester="test", block=Block(id=id, behaviors=()), follows=follows)
-    return Live(request, earlier)
+    return Live(request, earlier, Past(lambda: 0.0))
 
 
 async def test_blocks_end_with_what_they_follow_unless_that_is_done() -> None:

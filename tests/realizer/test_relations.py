@@ -231,7 +231,7 @@ def test_what_needs_a_point_of_another_block_is_required_and_tied_to_it(case: Sa
     assert set(needing(case.block, OTHERS, points)) == expected
 
 
-LIVE = "only blocks that came earlier can be named, until they end; {}"
+LIVE = "a block is known from its request until 60 s after its end; {}"
 
 
 @pytest.mark.parametrize(
@@ -240,43 +240,86 @@ LIVE = "only blocks that came earlier can be named, until they end; {}"
         ("nobody:start", "unknown behavior 'nobody'", "known: g, h, s, u, w"),
         ("bml:end-1", "'bml:end-1': nothing in a block can wait for its own end", ""),
         ("x:strat", "unknown behavior 'x'", "known: g, h, s, u, w"),
-        (
-            "other:x:nowhere",
-            "'other:x:nowhere': gaze 'x' of block 'other' has no sync point 'nowhere'",
-            "known: end, ready, relax, start, stroke, stroke_end, stroke_start",
-        ),
-        (
-            "other:x:strok",
-            "'other:x:strok': gaze 'x' of block 'other' has no sync point 'strok'",
-            "did you mean 'stroke'?",
-        ),
-        ("other:t:kk", "'other:t:kk': speech 't' of block 'other' has no sync point 'kk'", "did you mean 'k'?"),
-        (
-            "other:n:stroke:2",
-            "'other:n:stroke:2': of head 'n' of block 'other' only the first stroke can be named here",
-            "leave out the number, or put both into one block",
-        ),
-        ("other:z:start", "'other:z:start': block 'other' has no behavior 'z'", "known: n, t, v, x"),
-        ("gone:z:start", "'gone:z:start': no live block is called 'gone'", LIVE.format("known: dark, other")),
-        ("gone:bml:end", "'gone:bml:end': no live block is called 'gone'", LIVE.format("known: dark, other")),
-        ("othr:bml:end", "'othr:bml:end': no live block is called 'othr'", LIVE.format("did you mean 'other'?")),
     ],
 )
 def test_a_reference_to_nothing_refuses_the_block_with_place_and_line(ref: str, reason: str, advice: str) -> None:
-    plain = Constraint(
-        operators=(After(ref="g:start", syncs=("h:start",)), After(ref=ref, syncs=("w:start",), line=9))
-    )
-    inline = replace(BEHAVIORS[3], timing=(Timing("start", ref),))
-    for block, where, line in (
-        (Block(id="b", behaviors=BEHAVIORS, constraints=(plain, replace(plain, id="c"))), "b: constraint 1", 9),
-        (Block(id="b", behaviors=(*BEHAVIORS[:3], inline, BEHAVIORS[4])), "b: w", 6),
-    ):
+    for block, where, line in naming(ref):
         with pytest.raises(BlockRefused) as refusal:
             finished(relation_steps(block, OTHERS))
         fault = refusal.value.fault
-        assert (fault.reason, fault.where, fault.line) == (reason, where, line)
+        assert (fault.reason, fault.where, fault.line) == (reason, f"b: {where}", line)
         assert fault.advice == advice
         assert refusal.value.kind == "PARSING_FAILURE"
+
+
+def naming(ref: str, *, required: bool = False) -> tuple[tuple[Block, str, int], ...]:
+    """Two blocks that name this point, in a constraint and in an attribute, each with its place."""
+    plain = Constraint(
+        operators=(After(ref="g:start", syncs=("h:start",)), After(ref=ref, syncs=("w:start",), line=9))
+    )
+    tied, named = BEHAVIORS[3], replace(BEHAVIORS[3], required=required)
+    inline = replace(tied, timing=(Timing("start", ref),), required=required)
+    before, last = BEHAVIORS[:3], BEHAVIORS[4]
+    return (
+        (
+            Block(id="b", behaviors=(*before, named, last), constraints=(plain, replace(plain, id="c"))),
+            "constraint 1",
+            9,
+        ),
+        (Block(id="b", behaviors=(*before, inline, last)), "w", 6),
+    )
+
+
+ABSENT = [
+    (
+        "other:x:nowhere",
+        "'other:x:nowhere': gaze 'x' of block 'other' has no sync point 'nowhere'",
+        "known: end, ready, relax, start, stroke, stroke_end, stroke_start",
+    ),
+    (
+        "other:x:strok",
+        "'other:x:strok': gaze 'x' of block 'other' has no sync point 'strok'",
+        "did you mean 'stroke'?",
+    ),
+    ("other:t:kk", "'other:t:kk': speech 't' of block 'other' has no sync point 'kk'", "did you mean 'k'?"),
+    (
+        "other:n:stroke:2",
+        "'other:n:stroke:2': of head 'n' of block 'other' only the first stroke can be named",
+        "leave out the number, or put both into one block",
+    ),
+    ("other:z:start", "'other:z:start': block 'other' has no behavior 'z'", "known: n, t, v, x"),
+    ("gone:z:start", "'gone:z:start': no block is known as 'gone'", LIVE.format("known: dark, other")),
+    ("gone:bml:end", "'gone:bml:end': no block is known as 'gone'", LIVE.format("known: dark, other")),
+    ("othr:bml:end", "'othr:bml:end': no block is known as 'othr'", LIVE.format("did you mean 'other'?")),
+]
+
+
+@pytest.mark.parametrize(("ref", "reason", "advice"), ABSENT)
+def test_what_another_block_does_not_have_costs_the_tie_and_is_told(ref: str, reason: str, advice: str) -> None:
+    for block, where, line in naming(ref):
+        without = replace(
+            block,
+            behaviors=tuple(replace(each, timing=()) if each.id == "w" else each for each in block.behaviors),
+            constraints=tuple(replace(each, operators=each.operators[:1]) for each in block.constraints),
+        )
+        found, expected = finished(relation_steps(block, OTHERS)), finished(relation_steps(without, OTHERS))
+        told = [each for each in found.problems if each not in expected.problems]
+
+        # That a wait has no end is the second thing that is told of it.
+        assert (found.equals, found.orders, found.unusable) == (expected.equals, expected.orders, frozenset())
+        assert {each.kind for each in told} == {"PARSING_FAILURE"}
+        assert told[0].message == f"line {line}: {where}: {reason} ({advice}); it is ignored"
+
+
+@pytest.mark.parametrize(("ref", "reason", "advice"), ABSENT)
+def test_what_another_block_does_not_have_refuses_what_is_required(ref: str, reason: str, advice: str) -> None:
+    for block, where, line in naming(ref, required=True):
+        with pytest.raises(BlockRefused) as refusal:
+            finished(relation_steps(block, OTHERS))
+
+        fault = refusal.value.fault
+        assert (fault.reason, fault.where, fault.line) == (reason, f"b: {where}", line)
+        assert fault.advice == f"what is required is tied to it; {advice}"
 
 
 def test_a_reference_in_a_block_without_behaviors_says_so() -> None:

@@ -23,7 +23,7 @@ class Anchor:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.told: list[tuple[Message, Seconds]] = []
-        config = Config(simulation=SimulationConfig(human="scripted"))
+        config = Config(simulation=SimulationConfig(human="appendix-b"))
         note: Callable[[Message, Seconds], None] = lambda message, at: self.told.append((message, at))  # noqa: E731
         with asyncio.Runner(loop_factory=virtual_loop) as runner:
             self.live: list[Received] = runner.run(tangram(path, config, note))

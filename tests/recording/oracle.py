@@ -4,7 +4,7 @@ Each thing that goes on is looked for its end among all that was told after it. 
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -105,8 +105,9 @@ class Oracle:
         """All annotations, in no order."""
         found = [*self.actions(), *self.present(), *self.words(), *self.spoken(), *self.events(), *self.heads()]
         found += self.performed()
-        clipped = ((*one[:2], max(0.0, one[2]), one[3], one[4]) for one in found if one[3] >= 0)
-        return sorted((*one[:3], max(one[3], one[2] + 0.001), one[4]) for one in clipped)
+        clipped = [(*one[:2], max(0.0, one[2]), one[3], one[4]) for one in found if one[3] >= 0]
+        names = dict.fromkeys(one[:2] for one in clipped)
+        return [one for name in names for one in drawn([one for one in clipped if one[:2] == name])]
 
     def actions(self) -> Iterator[Stretch]:
         for number, began, at in self._begun():
@@ -317,3 +318,30 @@ class Oracle:
 
     def _performed(self, tier: str, begun: Told, end: float, value: str) -> Stretch:
         return self.robot, tier, begun.at, self.until(begun.life, end), value
+
+
+def drawn(stretches: Sequence[Stretch]) -> Iterator[Stretch]:
+    """What is drawn of the stretches of one name, in whole milliseconds where they touch.
+
+    Each lies in the first tier in which none goes on when it begins. What is shorter is drawn a millisecond long.
+    What comes after that in its tier begins where it ends, if it had begun before.
+    """
+    tiers: list[list[tuple[Stretch, float, float]]] = []
+    for one in sorted(stretches, key=lambda one: one[2:4]):
+        free = [tier for tier in tiers if all(ms(other[3]) <= ms(one[2]) for other, _, _ in tier)]
+        if free:
+            tier = free[0]
+        else:
+            tiers.append(tier := [])
+        begin = one[2]
+        for other, other_began, other_ended in tier:
+            is_longer = other_ended > other[3]  # than it was
+            if max(ms(other_ended), ms(other_began) + 1) > ms(one[2]) or (is_longer and other_ended > begin):
+                begin = max(begin, other_ended, max(ms(other_ended), ms(other_began) + 1) / 1000)
+        end = max(one[3], begin + 0.001)
+        tier.append((one, begin, end))
+        yield (*one[:2], begin, end, one[4])
+
+
+def ms(at: float) -> int:
+    return round(1000 * at)

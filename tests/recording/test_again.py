@@ -39,7 +39,7 @@ def test_the_anchor_scenario_gives_the_same_events(task: Recording) -> None:
 
 
 async def test_raw_perception_gives_the_same_events(tmp_path: Path) -> None:
-    await tangram(tmp_path / "a.mcap", Config(simulation=SimulationConfig(human="scripted", perception="raw")))
+    await tangram(tmp_path / "a.mcap", Config(simulation=SimulationConfig(human="appendix-b", perception="raw")))
 
     [life] = again(read(tmp_path / "a.mcap"))
 

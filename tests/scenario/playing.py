@@ -60,7 +60,7 @@ class Record:
 
 
 async def play(
-    human: str = "scripted",
+    human: str = "appendix-b",
     resolution: str = "table",
     seed: int = 0,
     faults: Faults | None = None,

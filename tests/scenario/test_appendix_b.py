@@ -68,7 +68,7 @@ EXPECTED["object"] = EXPECTED["table"] | {
 }
 
 
-def played(human: str = "scripted", resolution: str = "table", seed: int = 0, **manager: Any) -> Record:
+def played(human: str = "appendix-b", resolution: str = "table", seed: int = 0, **manager: Any) -> Record:
     return _played(human, resolution, seed, **manager)
 
 

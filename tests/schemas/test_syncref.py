@@ -1,5 +1,7 @@
 """References to sync points: every form of realizer.md, every bad one, and the round trip."""
 
+import re
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -58,7 +60,7 @@ def test_a_reference_is_read(text: str, expected: SyncRef) -> None:
     "text",
     [
         "", " ", "a", ":a:b", "a::b", "a:", "a:b:", "a:relax:2", "a:stroke:0", "a:stroke:-1", "a:stroke:2:3", "+x",
-        "-x", "a:+x", "a:-x", "a:b+", "a:b+c", "a:b+1+2", "b:a:stroke:2:3", "a:b:c:d", "a b:c", "a:b c", "a:2+1",
+        "-x", "a:+x", "a:-x", "a:b+", "a:b+c", "a:b+1+2", "b:a:stroke:2:3", "a:b:c:d", "a b:c", "a:b c",
         "a:stroke:1.5", "bml:stroke", "1e3", "nan", "inf", "a:b - c", "a:b+1" + "0" * 400, "٣",
     ],
 )  # fmt: skip
@@ -116,3 +118,23 @@ def test_the_draft_spelling_is_the_systems_own() -> None:
 def test_feedback_in_bml_1_0_leaves_out_points_that_it_does_not_know() -> None:
     assert dialect_sync("stroke_start", "gaze", "bml-1.0") is None
     assert dialect_sync("ready", "gazeShift", "bml-1.0") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("g:m 1", "'m 1' is not a sync point: it holds a space"), ("g 1:end", "'g 1' is not an id: it holds a space"),
+        ("-g:end", "'-g' is not an id: it begins with '-'"),
+    ],
+)  # fmt: skip
+def test_a_refusal_says_what_keeps_a_name_from_being_one(text: str, why: str) -> None:
+    with pytest.raises(ValueError, match=f"{re.escape(why)}$"):
+        SyncRef.parse(text)
+
+
+def test_a_mark_that_is_a_number_is_known_by_its_speech_or_its_offset() -> None:
+    assert SyncRef.parse("s:1") == SyncRef(block="s", offset=1.0)
+    assert SyncRef.parse("s:1", ["1"]) == SyncRef.parse("s:1+0") == SyncRef(behavior="s", sync="1")
+    assert SyncRef.parse("s:1-0.5") == SyncRef(behavior="s", sync="1", offset=-0.5)
+    assert SyncRef.parse("b:s:1") == SyncRef(block="b", behavior="s", sync="1")
+    assert [str(SyncRef.parse(each)) for each in ("s:1+0", "b:s:1", "s:1+2")] == ["s:1+0", "b:s:1", "s:1+2"]

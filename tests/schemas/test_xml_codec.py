@@ -343,7 +343,9 @@ def test_no_phrase_at_all_is_refused() -> None:
         ('<bml id="b"><wait id="w" duration="-1"/></bml>', "negative"),
         ('<bml id="b"><gaze id="g" target="t" start="x:end"/></bml>', "unknown behavior 'x'"),
         ('<bml id="b"><speech id="s">a <sync id="end"/></speech></bml>', "can't name a mark"),
-        ('<bml id="b"><speech id="s">a <sync id="1"/></speech></bml>', "can't name a mark"),
+        ('<bml id="b"><speech id="s">a <sync id="m 1"/></speech></bml>', "'m 1' can't name a mark: it holds a space"),
+        ('<bml id="b"><speech id="s">a <sync id="a+b"/></speech></bml>', "'a+b' can't name a mark: it holds '+'"),
+        ('<bml id="b"><speech id="s">a <sync id="-m"/></speech></bml>', "can't name a mark: it begins with '-'"),
         ('<bml id="b"><speech id="s">a <sync id="m"/> b <sync id="m"/></speech></bml>', "same name"),
         (
             '<bml id="b"><constraint required="true"><during ref="1"/></constraint></bml>',
@@ -384,3 +386,18 @@ def test_a_long_utterance_is_read_in_linear_time() -> None:
 
     assert isinstance(speech, Speech)
     assert len(speech.text) == 100_000 * len("word ") - 1
+
+
+def test_a_number_and_an_own_point_mean_what_the_document_has() -> None:
+    block = decode_xml(
+        """<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0">
+        <speech id="s"><text>a <sync id="1"/>b</text></speech>
+        <gesture id="g" lexeme="BEAT" stroke="s:1" end="start+3"/>
+        <gesture id="h" lexeme="BEAT" start="s:2" end="strokeEnd+1"/></bml>"""
+    )
+    assert isinstance(block, Block)
+
+    timing = {each.id: [(one.sync, one.ref) for one in each.timing] for each in block.behaviors}
+    # Speech s has no mark 2: that is two seconds after the start of a block s.
+    assert timing["g"] == [("stroke", "s:1+0"), ("end", "g:start+3")]
+    assert timing["h"] == [("start", "s:2"), ("end", "h:strokeEnd+1")]

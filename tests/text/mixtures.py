@@ -95,7 +95,8 @@ class Maker:
         if pick < 0.40:
             return self.words()
         simple = [
-            ("5 * 3", "5 * 3"), ("a < b", "a < b"), ("5 - 3", "5 - 3"), ("3 > 2", "3 > 2"), ("2^3", "2^3"), ("~5", "~5"),
+            ("5 * 3", "5 * 3"), ("a < b", "a < b"), ("5 - 3", "5 - 3"), ("3 > 2", "3 > 2"), ("2^3", "2^3"),
+            ("~5", "~5"),
             ("[1]", ""), ("[^2]", ""), ("【1†source】", ""), ("[2, 3]", ""), ("[laughs]", ""), ("(sighs)", ""),
             ("[smiles warmly]", ""), ("😊", ""), ("👍🏽", ""), ("<think>so I think\n\nthat</think>", ""),
             ("https://www.example.com/a/b?c=d", "example.com"), ("ann@example.org", "ann@example.org"),

@@ -51,7 +51,7 @@ from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
-from engage_hri.services.control.voice.timeline import utter
+from engage_hri.services.control.voice.timeline import uttered
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.runtime.steps import Steps, finished
 
@@ -112,8 +112,8 @@ class SimulatedBody(Body):
         match behavior:
             case Speech() if self._deviations.of("voiceless"):
                 return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak"))
-            case Speech(text=text):
-                return speech_estimate(behavior, utter(text), torso.pose(world, pose))
+            case Speech():
+                return speech_estimate(behavior, uttered(behavior), torso.pose(world, pose))
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
         estimate = torso.estimate(behavior, pose, world)
@@ -372,7 +372,7 @@ class SimulatedBody(Body):
             raise BehaviorRefused(_fault(behavior, "the voice cannot speak"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        lips = LipSync(behavior, utter(behavior.text, pace), authority, self._loop.time, self.on_lips)
+        lips = LipSync(behavior, uttered(behavior, pace), authority, self._loop.time, self.on_lips)
         with lips.following():
             async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
                 async for progress in utterance:

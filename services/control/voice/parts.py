@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.refusals import infeasible
 from engage_hri.services.control.voice.clauses import Clause
 from engage_hri.services.control.voice.phrases import Piece
-from engage_hri.services.control.voice.timeline import Utterance, Word, as_written, modelled, utter
+from engage_hri.services.control.voice.timeline import Utterance, Word, as_written, modelled, uttered
 from engage_hri.services.control.voice.visemes import Lips
 
 
@@ -34,9 +34,9 @@ class Part(Struct, frozen=True):
     rate: int = 0
 
 
-def silent(text: str, pace: float = 1.0) -> Part:
-    """The one part of a text that is said in silence. pace: 2 takes twice as long."""
-    return Part(utter(text, pace), len(text))
+def silent(speech: Speech, pace: float = 1.0) -> Part:
+    """The one part of a speech that is said in silence. pace: 2 takes twice as long."""
+    return Part(uttered(speech, pace), len(speech.text))
 
 
 def sounding(piece: Piece, clause: Clause) -> Part:
@@ -47,7 +47,7 @@ def sounding(piece: Piece, clause: Clause) -> Part:
 
 def expected(piece: Piece, pace: float) -> Part:
     """The part that a phrase will be, for as long as it is not synthesized. pace: 2 takes twice as long."""
-    model = modelled(piece.phrase.text, pace)
+    model = modelled(piece.phrase.text, pace, piece.phrase.prosody)
     return Part(Utterance(_as_written(piece, model.words), model.seconds), piece.end, piece.pause)
 
 

@@ -44,7 +44,7 @@ def pieces(speech: Speech, language: str = "") -> list[Piece]:
     ear = heard(speech.text)
     if not has_words(ear.text):
         return []
-    prosody = [replace(span, start=ear.place(span.start), end=ear.place(span.end)) for span in spans(speech)]
+    prosody = [ear.span(span) for span in spans(speech)]
     cuts = list(_cuts(ear.text))
     found = []
     for first, last in zip([0, *cuts], [*cuts, len(ear.text)], strict=True):

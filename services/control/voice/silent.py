@@ -17,7 +17,7 @@ from engage_hri.services.control.refusals import unsupported
 from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.parts import unspeakable
 from engage_hri.services.control.voice.speaker import FAULTS, Speaker, speech, voiceless
-from engage_hri.services.control.voice.timeline import utter
+from engage_hri.services.control.voice.timeline import uttered
 
 
 class SilentVoice(Speaker):
@@ -32,7 +32,7 @@ class SilentVoice(Speaker):
             return unsupported(behavior)
         if self._is_voiceless:
             return unspeakable(behavior, voiceless(behavior))
-        return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
+        return speech_estimate(behavior, uttered(behavior), pose or BodyPose())
 
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         behavior = speech(behavior)

@@ -39,7 +39,7 @@ from engage_hri.services.control.voice.speaker import FAULTS, Speaker, speech, v
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
 from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
-from engage_hri.services.control.voice.timeline import modelled, utter
+from engage_hri.services.control.voice.timeline import modelled, uttered
 from engage_hri.services.control.voice.wav import WavFile
 from engage_hri.services.control.waiting import Bell
 
@@ -139,7 +139,7 @@ class SoundingVoice(Speaker):
             return unspeakable(behavior, voiceless(behavior))
         found = pieces(behavior, self._settings.language)
         if not found:
-            return speech_estimate(behavior, utter(behavior.text), pose or BodyPose())
+            return speech_estimate(behavior, uttered(behavior), pose or BodyPose())
         self._studio.ask([piece.phrase for piece in found], self._wait)
         try:
             parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
@@ -153,7 +153,7 @@ class SoundingVoice(Speaker):
         clause = self._studio.known(piece.phrase)
         if clause is None:
             return None
-        model = modelled(piece.phrase.text).seconds
+        model = modelled(piece.phrase.text, prosody=piece.phrase.prosody).seconds
         if model > 0.5:
             self._pace += 0.1 * (clause.seconds / model - self._pace)
         return sounding(piece, clause)
@@ -210,7 +210,7 @@ class _Phrases(Parts):
 
     def part(self, number: int) -> Part | None:
         if not self._pieces:
-            return silent(self._behavior.text)
+            return silent(self._behavior)
         voice, piece = self._voice, self._pieces[number]
         try:
             if (part := voice._part(piece)) is None:

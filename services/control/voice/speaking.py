@@ -60,7 +60,7 @@ class OnePart:
 async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
     """Say a text in silence, word by word. pace: 2 takes twice as long. Like `utter_parts`."""
     bell = Bell()
-    parts = OnePart(silent(behavior.text, pace))
+    parts = OnePart(silent(behavior, pace))
     async with aclosing(utter_parts(behavior, authority, parts, Nowhere(bell.now))) as progress:
         async for each in progress:
             yield each

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.documents.prosody import Prosody, spans
 from engage_hri.schemas.speakable import Script, Token, tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.text.ear import heard
@@ -58,10 +60,15 @@ class Utterance(Struct, frozen=True):
         )
 
 
-def utter(text: str, pace: float = 1.0) -> Utterance:
-    """Lay a text out in time, as its author wrote it; prosody is ignored. pace: 2 takes twice as long."""
+def uttered(speech: Speech, pace: float = 1.0) -> Utterance:
+    """Lay the text of a speech out in time, with what its markup says of rate and pauses. pace: as of `utter`."""
+    return utter(speech.text, pace, spans(speech))
+
+
+def utter(text: str, pace: float = 1.0, prosody: Sequence[Prosody] = ()) -> Utterance:
+    """Lay a text out in time, with its words as the author wrote them. Arguments as of `modelled`."""
     ear = heard(text)
-    model = modelled(ear.text, pace)
+    model = modelled(ear.text, pace, [ear.span(each) for each in prosody])
     return Utterance(as_written(text, ear.places, model.words), model.seconds) if model.words else model
 
 
@@ -82,20 +89,36 @@ def as_written(text: str, places: Sequence[int], said: Sequence[Word], start: in
     return tuple(words)
 
 
-def modelled(text: str, pace: float = 1.0) -> Utterance:
-    """Lay a text for the ear out in time; prosody is ignored. pace: 2 takes twice as long."""
+def modelled(text: str, pace: float = 1.0, prosody: Sequence[Prosody] = ()) -> Utterance:
+    """Lay a text for the ear out in time. pace: 2 takes twice as long. prosody: spans of the text, in order.
+
+    Of a pause of punctuation and one of a span at the same place the longer counts, as eSpeak NG has it; silence of
+    punctuation is as fast as the words before it.
+    """
     words: list[Word] = []
-    now = pause = 0.0
+    now = silence = pause = 0.0
     is_speaking = False
+    ahead = list(reversed(prosody))
+    rate, until = 1.0, 0
     for token in tokens(text):
-        seconds = natural(token)
-        start = now + pause if is_speaking and seconds else now
-        now = start + seconds * pace
+        while ahead and ahead[-1].start < token.end:
+            span = ahead.pop()
+            pause = max(pause, span.pause * pace)
+            rate, until = (span.rate, span.end) if span.end > span.start else (rate, until)
+        if token.end - len(token.text) >= until:
+            rate = 1.0
+        seconds = natural(token) * pace / rate
+        start = now + max(silence, pause) if seconds else now
+        now = start + seconds
         words.append(Word(token.text, start, now, token.end))
-        silence = max((PAUSE.get(each, 0.0) for each in token.closing), default=0.0) * pace
-        pause = silence if seconds else max(pause, silence)
         is_speaking = is_speaking or seconds > 0
-    return Utterance(tuple(words), now) if is_speaking else Utterance((), 0.0)
+        if seconds:
+            silence = pause = 0.0
+        if is_speaking:
+            closing = max((PAUSE.get(each, 0.0) for each in token.closing), default=0.0)
+            silence = max(silence, closing * pace / rate)
+    last = max((span.pause * pace for span in ahead), default=pause)
+    return Utterance(tuple(words), now + last) if is_speaking else Utterance((), 0.0)
 
 
 def natural(token: Token) -> Seconds:

@@ -102,6 +102,17 @@ class Decisions:
         self.foresight.expect_next(point.behavior)
         return news
 
+    def say(self, behavior: str, position: int, at: Seconds, now: Seconds) -> bool:
+        """Note that a voice has finished a word; True if that changes what is expected.
+
+        position: characters of the text said so far. A report that cannot be true is ignored.
+        """
+        if behavior not in self.facts.begun or not isfinite(at):
+            return False
+        at = min(at, now)
+        self.facts.say(behavior, at)
+        return self.foresight.hear(behavior, position, at, now)
+
     def can_wait(self, behavior: str) -> bool:
         """True if a behavior of the plan can still be made to wait; a voice always can, between two words."""
         chain, facts = self.plan.chains[behavior], self.facts

@@ -3,7 +3,7 @@
 from msgspec import Struct
 
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
-from engage_hri.services.realizer.foresee.foresight import Pace
+from engage_hri.services.realizer.foresee.expectations import Pace
 
 
 class Begin(Struct, frozen=True):

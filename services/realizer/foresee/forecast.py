@@ -41,7 +41,6 @@ class Forecast(LongestPaths):
         self._moved: dict[tuple[int, int], list[int]] = {}
         """Those of them that count from the behavior's own time, by the transitions at their ends."""
         self._of_behavior: dict[str, list[int]] = {}
-        self._node_of: dict[str, int] = {}
         self._stopped: dict[int, Seconds] = {}
         """Seconds by which arcs are longer than planned; see `prolong`."""
         self._given_way: set[int] = set()

@@ -1,273 +1,21 @@
-"""Foresight: expected times of a running block, from what was measured and what other blocks expect.
+"""Foresight: expected times of a running block, and at what pace its behaviors are to move for them."""
 
-It observes the net and says "not before"; who is released by a measured event need not ask it. So it may fall behind:
-what it is told waits until `update`.
-"""
-
-import heapq
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from itertools import pairwise
 from math import inf
-from typing import Any
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.foresee.experience import SHORT, Experience
+from engage_hri.services.realizer.foresee.expectations import NOTICEABLE, Expectations, Pace
 from engage_hri.services.realizer.foresee.forecast import Forecast
-from engage_hri.services.realizer.foresee.from_scratch import full_forecast, is_predictive
+from engage_hri.services.realizer.foresee.from_scratch import full_forecast
 from engage_hri.services.realizer.foresee.outlook import Outlook
-from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
-from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import slack
-from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer, stands_soon
-
-SURPRISE: Seconds = 0.008
-"""Difference from the expected time, in seconds, from which predictions are computed again."""
-OVERDUE: Seconds = 0.1
-"""Seconds after which it is looked whether a behavior is overdue, if only other blocks want to know."""
-NOTICEABLE: Seconds = 0.02
-"""Seconds; planned instants that differ by less are not worth a message."""
-Pace = tuple[tuple[str, Seconds], ...]
-"""Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point
 
 
-class Foresight(Observer):
-    """Expectations of a block.
-
-    paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
-    call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
-    times of points of other blocks that this one is tied to. followed: points that others are tied to. forecast:
-    None if nothing in the block needs one.
-    """
-
-    forecast: Forecast | None
-
-    def __init__(self, plan: Plan, facts: Facts) -> None:
-        self.experience = Experience(plan.estimates)
-        self.paces: dict[str, Pace] = {}
-        self.may_be_slower: set[str] = set()
-        """Behaviors that were told to pass a hold point before its instant."""
-        self._missed: dict[Point, Seconds] = {}
-        """Times at which behaviors were expected that were overdue then, as the next report of each."""
-        self._stops: dict[str, set[str]] = {}
-        """Hold points within the pace of each behavior at which it has to wait for leave."""
-        self.not_before: dict[str, Seconds] = {}
-        self.foreseen = {point: facts.began + plan.predicted(point) for point in plan.foreign}
-        self.is_surprised = False
-        self._facts = facts
-        self.followed: set[Point] = set()
-        self._expected = {point: facts.began + plan.predicted(point) for point in plan.at}
-
-    def look_ahead(self, plan: Plan, net: RunningNet) -> None:
-        """Begin a forecast of the plan, if it needs one. The net has yet to run."""
-        self.plan = plan
-        self._net = net
-        self.is_surprised = True
-        self._news: list[tuple[Any, ...]] = []
-        """What the forecast has yet to be told: a function, and its arguments."""
-        self._arrivals: list[tuple[Seconds, Seconds, str, int]] = []
-        """Behaviors and numbers of their next points: until when, and since when, each is expected there."""
-        self._minded: frozenset[str] = frozen()
-        self.forecast = None
-        if is_predictive(plan) or self.followed:
-            self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
-            for transition in self._transitions_followed():
-                forecast.require(transition)
-            bounded = forecast.bounded
-            self._minded = frozen(member.behavior for transition in bounded for member in plan.members[transition])
-
-    def minds(self, transition: int) -> bool:
-        """True if it takes a forecast to say when `transition` is due: some behavior there may be held back."""
-        return bool(self._minded) and any(member.behavior in self._minded for member in self.plan.members[transition])
-
-    # -- what happens (see `Observer`) ---------------------------------------------------------------------------
-
-    def on_began(self, behavior: str, at: Seconds) -> None:
-        """Expect the points of a behavior that begins from now on."""
-        if (forecast := self.forecast) is not None and (chain := self.plan.chains.get(behavior)) is not None:
-            self._news.append((forecast.overdue, self.plan.at[chain.points[0]], at))
-            self._news += [(forecast.require, self.plan.at[point]) for point in chain.points]
-
-    def on_arrived(self, point: Point, at: Seconds) -> None:
-        if (forecast := self.forecast) is not None:
-            self._news.append((forecast.come, point.behavior, self.plan.at[point], at))
-
-    def on_reached(self, point: Point, at: Seconds) -> None:
-        if (forecast := self.forecast) is not None:
-            self._news.append((forecast.passed, point.behavior, self.plan.at[point], at))
-        if not self.is_surprised and point.behavior in self.plan.chains:
-            self.is_surprised = abs(at - self._expected.get(point, at)) > SURPRISE
-
-    def on_opened(self, transition: int) -> None:
-        if (forecast := self.forecast) is not None:
-            self._news.append((forecast.require, transition))
-
-    def on_fired(self, transition: int, at: Seconds) -> None:
-        if (forecast := self.forecast) is not None:
-            self._news.append((forecast.fix, transition, at))
-
-    def prolong(self) -> None:
-        """Take in for how long clocks of the net were stopped: what they lead to is later by that."""
-        if (forecast := self.forecast) is not None:
-            self._news += [(forecast.prolong, *each) for each in self._prolonged]
-
-    def none_before(self, now: Seconds) -> None:
-        """Expect nothing that has not happened before now: what was held has not come in the meantime."""
-        if (forecast := self.forecast) is not None:
-            coming = [each for each in range(len(self.plan.members)) if each not in self._net.instants]
-            self._news += [(forecast.overdue, each, now) for each in coming]
-
-    def go_on(self, behavior: str, now: Seconds) -> None:
-        """Expect a behavior that was held, and is not any more, at its next point: later, if it may have stood."""
-        if (forecast := self.forecast) is not None and self._facts.next_number(behavior):
-            self._news.append((forecast.overdue, *self._after_hold(behavior, now)))
-
-    def recall_holds(self) -> None:
-        """Take in what was held before there was this plan, as it was taken in when that went on."""
-        if (forecast := self.forecast) is not None and (last := self._facts.last_hold) is not None:
-            self.prolong()
-            self.none_before(last)
-            self._news += [(forecast.overdue, *each) for each in self._stood(last)]
-
-    def _stood(self, now: Seconds) -> Iterable[tuple[int, Seconds]]:
-        """Next points of behaviors that were held on their way there, as of `_after_hold`."""
-        facts = self._facts
-        for behavior in facts.under_way:
-            points, number = self.plan.chains[behavior].points, facts.next_number(behavior)
-            if number and facts.held_between(facts.reached[points[number - 1]], now, behavior):
-                yield self._after_hold(behavior, now)
-
-    def _after_hold(self, behavior: str, now: Seconds) -> tuple[int, Seconds]:
-        """The instant of the next point of a behavior under way, and when it comes there if it was held since.
-
-        A voice may have stood between two words, a clock has stopped; a movement goes on to where it can wait.
-        """
-        number, chain = self._facts.next_number(behavior), self.plan.chains[behavior]
-        before, point = self._facts.reached[chain.points[number - 1]], chain.points[number]
-        stands = stands_soon(chain.behavior)
-        stood = self._facts.stood_between(before, now, behavior) if stands else 0.0
-        at = before + self._phase(behavior, number) + stood
-        return self.plan.at[point], now if self._facts.holds(point) else max(now, at)
-
-    @property
-    def _prolonged(self) -> list[tuple[int, int, Seconds]]:
-        places = self._net.net.places
-        return [(places[each].source, places[each].target, by) for each, by in self._net.prolonged.items()]
-
-    # -- other blocks --------------------------------------------------------------------------------------------
-
-    def foresee(self, point: Point, at: Seconds) -> None:
-        """Note that the other block that has `point` expects it at `at` now."""
-        if point in self.plan.at and point not in self._facts.reached:
-            self.is_surprised = self.is_surprised or abs(at - self.foreseen.get(point, self._facts.began)) > SURPRISE
-            self.foreseen[point] = at
-            if (forecast := self.forecast) is not None:
-                self._news.append((forecast.foresee, self.plan.at[point], at))
-
-    def follow(self, points: Iterable[Point]) -> bool:
-        """Expect these points from now on, for other blocks (see `ahead`). False: look ahead again for that."""
-        self.followed.update(points)
-        if (forecast := self.forecast) is None:
-            return not self.followed
-        self._news += [(forecast.require, transition) for transition in self._transitions_followed()]
-        return True
-
-    @property
-    def ahead(self) -> Mapping[Point, Seconds]:
-        """Expected times of the points that other blocks are tied to and that are still to come."""
-        if not self.followed or self.forecast is None:
-            return {}
-        times, reached = self.forecast.times, self._facts.reached
-        coming = {point: self.plan.transition(point) for point in self.followed if point not in reached}
-        return {point: times[transition] for point, transition in coming.items() if transition is not None}
-
-    def _transitions_followed(self) -> list[int]:
-        return [each for each in map(self.plan.transition, self.followed) if each is not None]
-
-    # -- behaviors under way -------------------------------------------------------------------------------------
-
-    def learn(self, point: Point, at: Seconds) -> None:
-        """Correct the estimates of the same parts by a phase that ends at `point`, unless it was hurried or held up.
-
-        The point is the next of its behavior, and not among the facts yet.
-        """
-        chain = self.plan.chains.get(point.behavior)
-        number = self._facts.next_number(point.behavior)
-        if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
-            return
-        before, natural = chain.points[number - 1], chain.segments[number - 1].natural
-        if natural >= SHORT and performer(chain.behavior) == "body":
-            if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
-                return  # it was to be cut short
-            since = self._facts.reached[before]
-            is_beneath = chain.type in SHIFTS and at - since < natural  # perhaps: a look has begun over it
-            if is_beneath or self._facts.held_between(since, at, point.behavior):
-                return  # how long it would have taken, nobody knows
-            changed = self.experience.learn(point.behavior, natural, at - since)
-            if self.forecast is not None and changed:
-                self._news.append((self.forecast.relearn, changed))
-
-    def expect_next(self, behavior: str) -> None:
-        """Note from when on the behavior is overdue at its next point."""
-        number, chain = self._facts.next_number(behavior), self.plan.chains.get(behavior)
-        if self.forecast is not None and chain is not None and 0 < number < len(chain.points):
-            self.not_before.pop(behavior, None)
-            self._news.append((self._await, behavior, number))
-
-    def _await(self, behavior: str, number: int) -> None:
-        if (before := self._facts.reached.get(self.plan.chains[behavior].points[number - 1])) is not None:
-            expected = before + self._phase(behavior, number)
-            heapq.heappush(self._arrivals, (expected, expected, behavior, number))
-
-    def catch_up(self) -> None:
-        """Tell the forecast what has happened."""
-        for function, *arguments in self._news:
-            function(*arguments)
-        self._news.clear()
-
-    def update(self, now: Seconds) -> Iterable[int]:
-        """Draw the conclusions of all that happened; returns the instants that are expected at another time now.
-
-        A behavior that is overdue by a second is expected a second from now; the time for which it is held does not
-        count.
-        """
-        if self.forecast is None:
-            return ()
-        self.catch_up()
-        facts = self._facts
-        while self._arrivals and self._arrivals[0][0] < now - EPSILON:
-            _, expected, behavior, number = heapq.heappop(self._arrivals)
-            chain = self.plan.chains.get(behavior)
-            if chain is None or facts.next_number(behavior) != number or facts.holds(chain.points[number]):
-                continue
-            expected = max(expected, self.asked(chain.points[number], expected))
-            until = due = expected + facts.held_between(facts.reached[chain.points[number - 1]], now, behavior)
-            if facts.is_held(behavior):
-                until = max(now, due)
-            elif due < now - EPSILON:  # and not slower on purpose
-                self._missed.setdefault(chain.points[number], expected)
-                until = self.not_before[behavior] = now + (now - due)
-                self.forecast.overdue(self.plan.at[chain.points[number]], until)
-            heapq.heappush(self._arrivals, (until, expected, behavior, number))
-        return self.forecast.update()
-
-    @property
-    def next_check(self) -> Seconds | None:
-        """Next time to look for delays that only other blocks depend on; None: there is no need."""
-        while self._arrivals and self._facts.next_number(self._arrivals[0][2]) != self._arrivals[0][3]:
-            heapq.heappop(self._arrivals)  # The behavior has arrived there.
-        return self._arrivals[0][0] + OVERDUE if self.followed and self._arrivals else None
-
-    def asked(self, point: Point, natural: Seconds) -> Seconds:
-        """Time at which the behavior was told to be at `point`; `natural` if it was told none, or waits there.
-
-        What it is told once it is overdue there is no excuse: that may be late because it is itself.
-        """
-        if point.sync in self._stops.get(point.behavior, ()):
-            return natural
-        told = dict(self.paces.get(point.behavior, ())).get(point.sync, natural)
-        return min(told, self._missed.get(point, inf))
+class Foresight(Expectations):
+    """Answers from what is expected of a block."""
 
     def due(self, transition: int, ripe: Seconds) -> Seconds:
         """Time at which an instant is due, no earlier than all that it waits for is `ripe`."""
@@ -278,20 +26,12 @@ class Foresight(Observer):
         points, number = self.plan.chains[member.behavior].points, self._facts.next_number(member.behavior)
         if not number:
             return None
-        at = self._facts.reached[points[number - 1]]
+        at = self._since(member.behavior)
         for each in range(number, points.index(member.point) + 1):
             at += self._phase(member.behavior, each)
             if each == number:
                 at = max(at, self.not_before.get(member.behavior, at))
         return at
-
-    def _phase(self, behavior: str, number: int) -> Seconds:
-        """Expected seconds from the point before to the point of that number."""
-        chain = self.plan.chains[behavior]
-        if self.forecast is None:
-            return chain.segments[number - 1].natural * self.experience.factor(behavior)
-        before, here = (self.plan.at[point] for point in chain.points[number - 1 : number + 1])
-        return 0.0 if before == here else self.forecast.phase(behavior, here)
 
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
         """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway.
@@ -308,7 +48,7 @@ class Foresight(Observer):
             return ()  # No bound makes it hurry, for itself or for who comes after it, or wait on its way.
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
         number = facts.next_number(behavior)
-        at = facts.reached[points[number - 1]] if number else now
+        at = self._since(behavior) if number else now
         is_paced = is_hurried = forecast.is_hurried(behavior)
         stops = self._stops[behavior] = set()
         planned: list[tuple[str, Seconds]] = []
@@ -369,6 +109,8 @@ class Foresight(Observer):
                 is_passive = self._net.part_of[point].kind == "passive"
                 if point not in facts.reached and is_passive and at[before] != at[point]:
                     behavior, here, since = point.behavior, at[point], arrivals[before]
+                    if before in facts.reached:
+                        since = self._since(behavior)
                     least, most = forecast.phase(behavior, here), forecast.longest(behavior, here)
                     is_given = point not in self.plan.constrained and behavior not in self.plan.natural
                     if is_given and self.plan.successors.get(behavior, "")[1:] == (point,):
@@ -384,7 +126,8 @@ class Foresight(Observer):
         """
         facts = self._facts
         known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
-        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged)
+        heard = self.utterances.since
+        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged, heard)
         if now is not None:
             for each in (*self._stood(now), *((here, now) for here in range(len(self.plan.members)))):
                 forecast.overdue(*each)

@@ -17,8 +17,10 @@ def full_forecast(
     arrived: Mapping[Point, Seconds],
     instants: Mapping[int, Seconds],
     prolonged: Iterable[tuple[int, int, Seconds]] = (),
+    heard: Mapping[str, Seconds] = {},
 ) -> Forecast:
-    """Forecast of every instant, from scratch. instants: those that are over. prolonged: see `Forecast.prolong`."""
+    """Forecast of every instant, from scratch. instants: those that are over. prolonged, heard: see `prolong` and
+    `shift` of `Forecast`."""
     forecast = Forecast(plan, began, factor, foreseen)
     for source, target, seconds in prolonged:
         forecast.prolong(source, target, seconds)
@@ -28,6 +30,8 @@ def full_forecast(
     for point in arrived.keys() - reached.keys():
         if point in plan.at:
             forecast.come(point.behavior, plan.at[point], arrived[point])
+    for behavior, at in heard.items():
+        forecast.shift(behavior, at)
     for transition, at in instants.items():
         forecast.fix(transition, at)
     for transition in range(len(plan.members)):

@@ -60,7 +60,20 @@ class LongestPaths:
         self._rank = [0] * size
         """Order in which nodes are looked at."""
         self._old: dict[int, Seconds] = {}
+        self._node_of: dict[str, int] = {}
+        """For each behavior under way, the node for the time at which it passed its latest point."""
         self._todo: list[tuple[int, int]] = []
+
+    def shift(self, behavior: str, at: Seconds) -> None:
+        """Let what comes after the latest point of a behavior count as if it had passed that at `at`."""
+        if (node := self._node_of.get(behavior)) is None:
+            return
+        before, self.times[node] = self.times[node], at
+        for number in self._out[node] if at < before else ():
+            self._loosen(number)
+        self._touch(node)
+        for bound in self._in[node]:
+            self._touch(self._arcs[bound].source)
 
     def require(self, transition: int) -> None:
         """Keep the time of this node, and of all that it depends on, from now on."""

@@ -12,6 +12,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.services.realizer.perform.live_blocks import as_told
+from engage_hri.services.realizer.plan.past import Past
 
 Status = Literal["done", "failed", "interrupted"]
 
@@ -51,7 +52,8 @@ class Live:
     is to end.
     """
 
-    def __init__(self, request: PerformBlock, earlier: Sequence["Live"]) -> None:
+    def __init__(self, request: PerformBlock, earlier: Sequence["Live"], past: Past[Ending]) -> None:
+        """past: how the blocks have ended that are over, by id."""
         loop = asyncio.get_running_loop()
         self.request = request
         self.block = request.block
@@ -65,7 +67,10 @@ class Live:
         """True while it is planned, with those in mind that are being performed: no other is to begin meanwhile."""
         there = {each.id: each for each in reversed(earlier)}  # a second one with an id is refused
         self.leaders = tuple([there[id] for id in request.follows if id in there])
-        """Blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
+        """Live blocks that it continues (`follows`): it ends with any of them that ends otherwise than done."""
+        over = {id: past.get(id) for id in request.follows if id not in there}
+        self.unknown = tuple([id for id, ending in over.items() if ending is None])
+        """Ids of blocks that it continues and of which nothing is known."""
         self.ended_by: Live | None = None
         """The leader that it ends with."""
         self.taken_out: dict[str, str] = {}
@@ -75,6 +80,9 @@ class Live:
             leader._followers.append(self)
             if leader.ending.done():
                 self._end_with(leader)
+        for id, ending in over.items() if not self.unknown else ():
+            if ending is not None:
+                self._end_after(id, ending)
 
     def has_yet(self, behavior: str) -> bool:
         """True if a behavior is to be performed when it begins."""
@@ -103,13 +111,18 @@ class Live:
 
     def _end_with(self, leader: "Live") -> bool:
         """End it because its leader ends; False if that is no reason, or it ends already."""
-        ending = leader.ending.result()
+        if not self._end_after(leader.id, leader.ending.result()):
+            return False
+        self.ended_by = leader
+        return True
+
+    def _end_after(self, leader: str, ending: Ending) -> bool:
+        """End it because a block that it continues has ended so; False if that is no reason, or it ends already."""
         if ending.status == "done" or self.ending.done():
             return False
         verb = "failed" if ending.status == "failed" else "was interrupted"
         why = f": {ending.fault.reason}" if ending.fault else ""
-        fault = Fault(reason=f"{leader.id}, which it follows, {verb}{why}", where=self.id)
-        self.ended_by = leader
+        fault = Fault(reason=f"{leader}, which it follows, {verb}{why}", where=self.id)
         self.ending.set_result(Ending("interrupted", fault, ending.replaced_by))
         return True
 

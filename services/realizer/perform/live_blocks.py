@@ -1,4 +1,4 @@
-"""Sync points of live blocks that other live blocks refer to: expected, reached or lost."""
+"""Sync points of live blocks that other live blocks refer to: expected, reached or lost; and those of the past."""
 
 import re
 from collections import Counter, deque
@@ -12,7 +12,9 @@ from engage_hri.schemas.references import with_names
 from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import at_home, block_of, qualified
+from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.relations import extent
 from engage_hri.services.realizer.points import EPSILON, Point, frozen
 
 MOST_TELLINGS = 20
@@ -85,9 +87,9 @@ class FollowedBlock(Protocol):
 
 
 class _Tracked:
-    """Points of one live block that others may be tied to.
+    """Points of one block that others may be tied to.
 
-    others: blocks that were live when it came, and that it may name. number: of blocks that had come by then. lost:
+    others: blocks that were known when it came, and that it may name. number: of blocks that had come by then. lost:
     behaviors that were dropped. named: points that others are tied to. expected: the last expected time of each of
     these points that was told.
     """
@@ -105,19 +107,25 @@ class _Tracked:
         self.lost: frozenset[str] = frozen()
         self.followers: list[TiedBlock] = []
 
+    def end(self) -> None:
+        """Forget all that only a live block needs: what it referred to, and who asked for its times."""
+        self.others, self.performance, self.followers = {}, None, []
+
 
 class LiveBlocks:
-    """All live blocks, from their request to their end.
+    """All live blocks, from their request to their end; and for a while those that have ended (`Past`).
 
-    Ids are free again after that. But blocks that have lived beside it may still think of the one that has ended:
-    of its points, of the parts that it had. So another of its id has another name here, as long as they live.
+    Ids are free again after the end. But blocks that live may still think of the one that has ended: of its points,
+    of the parts that it had. So another of its id has another name here, as long as they live.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, now: Callable[[], Seconds]) -> None:
         self._tracked: dict[str, _Tracked] = {}
+        self._past = Past[_Tracked](now)
+        """Blocks that have ended, by name: a point of theirs that was reached is past, any other is lost."""
         self._names: dict[str, str] = {}
-        """Name of each live block, by its id."""
-        self._ended: dict[str, int] = {}
+        """Name of each block that is live or of the past, by its id."""
+        self._forgotten: dict[str, int] = {}
         """For each name that is not free yet, in the order of their ends, how many blocks had come by then."""
         self._count = 0
         self._untold: deque[tuple[_Tracked, Point, Seconds]] = deque()
@@ -130,36 +138,44 @@ class LiveBlocks:
     @contextmanager
     def opened(self, block: Block) -> Iterator[Block]:
         """Keep the block as live inside the `with`. Gives it with names for ids: its own, and those it refers to."""
-        id, name = block.id, self._free_name(block.id)
-        self._names[id] = name
+        id = block.id
+        self._forget(self._past.take_out(self._names.get(id, "")))
+        name = self._names[id] = self._free_name(id)
         if changed := {each: other for each, other in self._names.items() if each != other}:
             block = with_names(block, changed)
         self._count += 1
-        tracked = self._tracked[name] = _Tracked(block, dict(self._tracked), self._count)
+        tracked = self._tracked[name] = _Tracked(block, {**self._past.all(), **self._tracked}, self._count)
         try:
             yield block
         finally:
-            del self._tracked[name], self._names[id]
-            tracked.others = {}  # Nobody asks any more what it referred to.
-            self._ended[name] = self._count
-            self._free_names()
+            del self._tracked[name]
+            self._forget(*self._past.add(name, tracked, 1 + extent(block)))
             ends = (BLOCK_ITSELF, *(behavior.id for behavior in block.behaviors))
-            for follower in list(tracked.followers):
+            followers = tracked.followers
+            tracked.end()
+            for follower in followers:
                 follower.miss(f"{name}:{id}" for id in ends)
 
-    def _free_name(self, id: str) -> str:
-        is_free = id not in self._tracked and id not in self._ended
-        return id if is_free else f"{id[: LONGEST_ID - 16]}{LIFE}{self._count}"
-
-    def _free_names(self) -> None:
-        """Free the names of blocks that have ended before any of the live ones came."""
+    def _forget(self, *past: _Tracked | None) -> None:
+        """Forget blocks of the past; their names are not free before all that live have ended."""
+        gone = {each.block.id for each in past if each is not None}
+        self._names = {id: name for id, name in self._names.items() if name not in gone} if gone else self._names
+        self._forgotten |= dict.fromkeys(gone, self._count)
         oldest = next(iter(self._tracked.values())).number if self._tracked else inf
-        while self._ended and (first := next(iter(self._ended.items())))[1] < oldest:
-            del self._ended[first[0]]
+        while self._forgotten and (first := next(iter(self._forgotten.items())))[1] < oldest:
+            del self._forgotten[first[0]]
+
+    def _free_name(self, id: str) -> str:
+        is_free = id not in self._tracked and id not in self._forgotten
+        return id if is_free else f"{id[: LONGEST_ID - 16]}{LIFE}{self._count}"
 
     def is_live(self, id: str) -> bool:
         """True if a block of this id is live."""
-        return id in self._names
+        return self._names.get(id) in self._tracked
+
+    def named_by(self, name: str) -> Mapping[str, Block]:
+        """The blocks that a live one may name, live or of the past, by name."""
+        return {id: tracked.block for id, tracked in self._tracked[name].others.items()}
 
     @property
     def blocks(self) -> Mapping[str, Block]:
@@ -171,7 +187,7 @@ class LiveBlocks:
         return self._tracked[block].named
 
     def reached(self, block: str) -> Mapping[Point, Seconds]:
-        """Points that a block has reached, by loop time, as long as blocks live that name it."""
+        """Points that a block has reached, by loop time; none if it is not known any more."""
         tracked = self._find(block)
         return tracked.reached if tracked is not None else {}
 
@@ -200,9 +216,10 @@ class LiveBlocks:
         return [(each.newest_plan, each.leaders) for each in performances if each is not None]
 
     def _find(self, name: str) -> _Tracked | None:
-        """A live block, or one that has ended while blocks lived that name it."""
-        known = (tracked.get(name) for tracked in (self._tracked, *(each.others for each in self._tracked.values())))
-        return next((each for each in known if each is not None), None)
+        """A live block, or one that has ended, as long as it is of the past or blocks live that name it."""
+        if (known := self._tracked.get(name) or self._past.get(name)) is not None:
+            return known
+        return next((each.others[name] for each in self._tracked.values() if name in each.others), None)
 
     def reach(self, block: str, point: Point, at: Seconds) -> None:
         """Tell followers that a point of a live block is reached. The block itself is the behavior `bml`."""
@@ -306,8 +323,8 @@ class LiveBlocks:
         wanted = sorted(points)
         found = {name: self._find(name) for name in map(block_of, wanted)}
         homes = {id: tracked for id, tracked in found.items() if tracked is not None}
-        for tracked in homes.values():
-            if follower not in tracked.followers:
+        for name, tracked in homes.items():
+            if name in self._tracked and follower not in tracked.followers:
                 tracked.followers.append(follower)
         for point in wanted:
             block = block_of(point)

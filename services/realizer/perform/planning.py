@@ -20,6 +20,7 @@ from engage_hri.services.realizer.perform.questions import is_crowd, meanwhile, 
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
+from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_steps
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
@@ -174,4 +175,5 @@ class Planning:
 
 async def planned_alone(bus: Bus, block: Block, config: RealizerConfig) -> Plan:
     """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
-    return await Planning(bus, config, LiveBlocks(), list).plan(Live(PerformBlock(id="plan", block=block), ()))
+    live = Live(PerformBlock(id="plan", block=block), (), Past(bus.now))
+    return await Planning(bus, config, LiveBlocks(bus.now), list).plan(live)

@@ -29,6 +29,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.plan.past import LASTING
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.steps import PORTION, Steps, finished, portions
 
@@ -42,7 +43,8 @@ class BlockRefused(InputRefused):
 
 
 Elsewhere = Mapping[str, Block | None]
-"""Other live blocks, by id. None: the content of the block is not known, so any point may be in it."""
+"""Other blocks that are known, live or of the past, by id. None: the content of the block is not known, so any point
+may be in it."""
 
 
 class Term(Struct, frozen=True, gc=False):
@@ -73,8 +75,10 @@ class Order(Struct, frozen=True, gc=False):
     placed: str = ""
 
 
-NO_SUCH_BLOCK = "no live block is called"
-"""Part of the reason why a block is refused that names another one."""
+NO_SUCH_BLOCK = "no block is known as"
+"""Part of what is told of a tie to a block that is not there."""
+IGNORED = "it is ignored"
+"""What becomes of a time or a tie that cannot be read."""
 EMPTY = "has nothing in it that says what to show; it moves nothing"
 """What is told of a face or posture that names nothing."""
 DROPPED = "; the behavior is dropped"
@@ -148,9 +152,17 @@ class Relations(Struct, frozen=True, dict=True):
         return frozenset(shared | {order.later.point for order in self.orders})
 
 
+class _Absent(Problem, frozen=True, kw_only=True):
+    """A tie to what another block does not have. refusal: to be raised if a required behavior has it."""
+
+    refusal: BlockRefused
+
+
 class _Reader:
     def __init__(self, block: Block, elsewhere: Elsewhere) -> None:
         self.block = block
+        self.untied: list[tuple[Collection[str], BlockRefused]] = []
+        """Behaviors that were tied to what another block does not have, and the refusal if one is required."""
         self.elsewhere = elsewhere
         self.theirs: dict[str, Mapping[str, Behavior]] = {}
         """Behaviors of other blocks that are named, by block and id."""
@@ -162,11 +174,11 @@ class _Reader:
         self.unusable: set[str] = set()
         self.required = {behavior.id for behavior in block.behaviors if behavior.required}
 
-    def term(self, text: str, where: str, line: int) -> Term | Problem:
+    def term(self, text: str, where: str, line: int) -> "Term | Problem | _Absent":
         """The point and offset of a reference; a Problem if its behavior has no such sync point."""
         try:
             ref = SyncRef.parse(text)
-            if isinstance(speech := self.behaviors.get(ref.behavior), Speech) and speech.marks:
+            if isinstance(speech := self.behaviors.get(ref.behavior or ref.block), Speech) and speech.marks:
                 ref = SyncRef.parse(text, [mark.id for mark in speech.marks])
         except ValueError as error:
             raise self.refusal(str(error), where, line) from error
@@ -202,12 +214,16 @@ class _Reader:
         advice = suggestion(sync, [each for each in spelled if each is not None])
         return f"{kind} has no sync point {text!r} ({advice})"
 
-    def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> Term:
-        """The term for a point of another block, spelled as in this one."""
+    def _elsewhere(self, ref: SyncRef, text: str, where: str, line: int) -> "Term | _Absent":
+        """The term for a point of another block, spelled as in this one.
+
+        What is not there costs the tie, and not the words: whether a block is still known, and which of two that had
+        one id, may be a matter of milliseconds.
+        """
         if ref.block not in self.elsewhere:
-            advice = suggestion(ref.block, self.elsewhere, "none is live")
-            advice = f"only blocks that came earlier can be named, until they end; {advice}"
-            raise self.refusal(f"{text!r}: {NO_SUCH_BLOCK} {ref.block!r}", where, line, advice)
+            advice = suggestion(ref.block, self.elsewhere, "none is")
+            advice = f"a block is known from its request until {LASTING:g} s after its end; {advice}"
+            return self._absent(f"{text!r}: {NO_SUCH_BLOCK} {ref.block!r}", where, line, advice)
         other = self.elsewhere[ref.block]
         if ref.block not in self.theirs:
             self.theirs[ref.block] = {each.id: each for each in other.behaviors} if other is not None else {}
@@ -219,21 +235,24 @@ class _Reader:
             if behavior is None:
                 advice = suggestion(ref.behavior, known, "it has no behaviors")
                 reason = f"{text!r}: block {ref.block!r} has no behavior {ref.behavior!r}"
-                raise self.refusal(reason, where, line, advice)
-            if not isinstance(behavior, Unknown):  # Which is dropped there, and the tie with it.
-                self._check_point(ref, sync, behavior, text, where, line)
+                return self._absent(reason, where, line, advice)
+            of = f"{type_name(behavior)} {ref.behavior!r} of block {ref.block!r}"
+            if isinstance(behavior, Unknown):
+                pass  # It is dropped there, and the tie with it.
+            elif sync not in sync_points(behavior):
+                spelled = (
+                    dialect_sync(each, type_name(behavior), self.block.dialect) for each in sync_points(behavior)
+                )
+                advice = suggestion(ref.sync, [each for each in spelled if each is not None])
+                return self._absent(f"{text!r}: {of} has no sync point {ref.sync!r}", where, line, advice)
+            elif ref.repetition > 1:
+                advice = "leave out the number, or put both into one block"
+                return self._absent(f"{text!r}: of {of} only the first stroke can be named", where, line, advice)
         return Term(Point(f"{ref.block}:{ref.behavior or BLOCK_ITSELF}", sync or "start"), ref.offset, text, line)
 
-    def _check_point(self, ref: SyncRef, sync: str, behavior: Behavior, text: str, where: str, line: int) -> None:
-        """Refuse a sync point that a behavior of another block does not have."""
-        of = f"{type_name(behavior)} {ref.behavior!r} of block {ref.block!r}"
-        if sync not in sync_points(behavior):
-            spelled = (dialect_sync(each, type_name(behavior), self.block.dialect) for each in sync_points(behavior))
-            advice = suggestion(ref.sync, [each for each in spelled if each is not None])
-            raise self.refusal(f"{text!r}: {of} has no sync point {ref.sync!r}", where, line, advice)
-        if ref.repetition > 1:
-            reason = f"{text!r}: of {of} only the first stroke can be named here"
-            raise self.refusal(reason, where, line, "leave out the number, or put both into one block")
+    def _absent(self, reason: str, where: str, line: int, advice: str) -> "_Absent":
+        refusal = self.refusal(reason, where, line, f"what is required is tied to it; {advice}")
+        return _Absent("PARSING_FAILURE", f"{where}: {reason} ({advice})", refusal=refusal)
 
     def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
         return BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
@@ -255,16 +274,21 @@ class _Reader:
         yield done
 
     def _terms(self, texts: tuple[str, ...], where: str, line: int, *, required: bool) -> dict[str, Term]:
-        terms = {}
+        terms: dict[str, Term] = {}
+        absent = list[BlockRefused]()
         for text in texts:
             match self.term(text, where, line):
                 case Term() as term:
                     terms[text] = term
+                case _Absent(refusal=refusal) if required:
+                    raise refusal
                 case Problem(message=message) if required:
                     raise self.refusal(message.removeprefix(f"{where}: "), where, line, "the constraint is required")
-                case Problem(message=message):
-                    told = at_line(line, f"{message}; it is ignored")
+                case Problem(message=message) as problem:
+                    told = at_line(line, f"{message}; {IGNORED}")
                     self.problems.append(Problem("PARSING_FAILURE", told))
+                    absent += [problem.refusal] if isinstance(problem, _Absent) else []
+        self.untied += [({term.point.behavior for term in terms.values()}, each) for each in absent]
         return terms
 
     def _relate(self, operator: Synchronize | Before | After, terms: dict[str, Term]) -> None:
@@ -292,8 +316,12 @@ class _Reader:
                 other = self.term(timing.ref, behavior.id, behavior.line)
             else:
                 other = Problem("PARSING_FAILURE", self._lacks(behavior, timing.sync, timing.sync))
-            if isinstance(other, Problem) and isinstance(behavior, Speech) and behavior.id not in self.required:
-                message = at_line(behavior.line, f"{other.message}; it is ignored")
+            is_kept = isinstance(behavior, Speech) and behavior.id not in self.required
+            if isinstance(other, _Absent):
+                self.untied.append(({behavior.id}, other.refusal))
+                is_kept = True
+            if isinstance(other, Problem) and is_kept:
+                message = at_line(behavior.line, f"{other.message}; {IGNORED}")
                 self.problems.append(Problem("PARSING_FAILURE", message, behavior.id))
                 continue  # Its words are not lost for the sake of a time.
             if isinstance(other, Problem):
@@ -306,6 +334,9 @@ class _Reader:
         self.equals += equals
 
     def result(self) -> Relations:
+        for tied, refusal in self.untied:
+            if not self.required.isdisjoint(tied):
+                raise refusal
         found = Relations(
             tuple(self.equals),
             tuple(self.orders),

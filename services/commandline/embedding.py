@@ -1,0 +1,79 @@
+"""A robot with all its services in this process, over a bus in memory: for programs, and for commands.
+
+async with embedded(human="listening") as robot:
+    outcome = await robot.perform({"turn_status": "full", "parts": [{"say": "Hello!"}]})
+    async with perceive("ben", hub=robot.hub) as ben:
+        await ben.say("Hello, robot.")
+"""
+
+from collections.abc import AsyncIterator, Iterable, Mapping
+from contextlib import asynccontextmanager
+
+from engage_hri.services.bus.interface import Hub
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import Robot
+from engage_hri.services.commandline import roster
+from engage_hri.services.commandline.config import Config, load
+from engage_hri.services.control.body import Body
+from engage_hri.services.control.guarded import GuardedBody
+from engage_hri.services.runtime.service import Service, running
+from engage_hri.services.simulation.config import HumanKind
+
+
+class EmbeddedRobot(Robot):
+    """The client of a robot in this process. hub: its bus, for `perceive(..., hub=)` and `connect(hub=)`."""
+
+    hub: Hub
+
+
+@asynccontextmanager
+async def embedded(
+    *, human: HumanKind = "attentive", body: Body | None = None, settings: Iterable[str] = ()
+) -> AsyncIterator[EmbeddedRobot]:
+    """Run a robot and what is around it in this process, until the end of `async with`. Nobody else sees its bus.
+
+    Nothing is read from files and environment. The robot is before the tangram table.
+
+    human: who sits at the table: `attentive` looks where the robot looks, and answers; `none` is nobody, for people
+        that `perceive` brings; docs/commands.md tells of the others.
+    body: what moves, with the voice that it has; None: that of the settings, which simulate one.
+    settings: `key=value` of docs/configuration.md, as `engage up --set` takes them; they are stronger than `human`.
+
+    Raises:
+        InputRefused: there is no such setting or body.
+        RunFailed: the body cannot be had.
+    """
+    config = load(settings=settings, defaults=(f"simulation.human={human}",))
+    async with in_memory(config, services(config, *roster.ROBOT, "simulation", body=body)) as hub:
+        bus = hub.join("program")
+        try:
+            async with EmbeddedRobot.on(bus) as robot:
+                robot.hub = hub
+                bus.declare_alive()
+                yield robot
+        finally:
+            await bus.leave()
+
+
+def services(config: Config, *names: str, body: Body | None = None) -> dict[str, Service]:
+    """Bind these services to the configuration. body: that of control instead of the configured one.
+
+    Raises InputRefused.
+    """
+    own = {} if body is None else {"control": {"body": GuardedBody(type(body).__name__, body)}}
+    return {name: roster.service(name, config, **own.get(name, {})) for name in names}
+
+
+@asynccontextmanager
+async def in_memory(config: Config, services: Mapping[str, Service]) -> AsyncIterator[Hub]:
+    """Run services in this process on a bus of their own, until the end of `async with`.
+
+    An error in there is raised as it is, and so is that of a service which ends all; of several: an ExceptionGroup.
+    """
+    try:
+        async with MemoryHub(config.robot, decodes=False) as hub, running(hub, services):
+            yield hub
+    except ExceptionGroup as group:
+        if len(group.exceptions) > 1:
+            raise
+        raise group.exceptions[0] from None
