@@ -13,7 +13,7 @@ jur inż mgr lek Sn sn Av Doç Yrd Dl dl Dna dna D-na D-l dlui ddl dra Bp Tn Ny 
 пр пер д кв обл просп им тов св пан вул κ Κ κα Δρ д-р vs cf viz approx ca cca circa e.g i.e eg z.B d.h u.a o.ä
 i.d.R z.T u.U m.E s.o s.u v.a p.ex p.ej ej bzw ggf evtl inkl exkl zzgl abzgl vgl sog bes insb allg jew d.i lt
 bspw resp entspr bijv bv o.a m.a.w d.w.z i.p.v t.o.v t.ex bl.a d.v.s s.k f.eks esim ns mm mt np tzn tj m.in wg
-ul pl św nr red tzv popř např apod mj zvl vč napr pld kb ún de.ex mis dll yg örn bkz vb.g yakl напр см ср т.е
+ul pl św nr tzv popř např apod mj zvl vč napr pld kb ún de.ex mis dll yg örn bkz vb.g yakl напр см ср т.е
 т.н т.к т.наз π.χ πχ δηλ βλ د أ م ص डॉ श्री श्रीमती पं Fa fa Abt Abb abb Str Hauptstr str av avda Avda blvd Blvd
 Bd bd bld boul Pl ctra urb env
 """
@@ -29,6 +29,7 @@ BEFORE_A_NUMBER = frozenset(_WORDS_BEFORE_A_NUMBER.split())
 """A number follows; without one the sentence is over: `No. 5`, but `No. I will not`."""
 
 _WORDS_BEFORE_EITHER = """
+ex
 etc usw usf et al ecc enz itd itp atd apod m.m osv osb dst dsb vb vs.b u.s.w u.v.m u.ä о.б т.д т.п др пр руб коп
 млн млрд тыс г гг в вв ч мин сек кг км см мм a.m p.m am pm Inc inc Corp corp Ltd ltd Co co Bros LLC Jr jr Sr Esq
 Ph.D M.D B.A M.A D.C U.S U.K U.S.A U.N E.U EE.UU EEUU tbsp tsp oz lb lbs ft yd hr hrs dept Dept est Est assn

@@ -34,7 +34,8 @@ lacht lächelt seufzt nickt winkt hustet gähnt kichert grinst zwinkert räusper
 lächelnd seufzend nickend flüsternd rit rires soupire sourit hoche tousse chuchote bâille ríe ríen risas suspira
 sonríe asiente tose susurra bosteza guiña ride risate sospira sorride annuisce tossisce sussurra ri risos sorri
 acena tosse glimlacht zucht knikt hoest fluistert смеётся смеется улыбается вздыхает кивает кашляет шепчет
-śmieje wzdycha kiwa uśmiecha skrattar ler suckar nickar griner smiler sukker nikker 笑 大笑 微笑 叹气 点头 咳嗽 笑い 苦笑 ため息
+śmieje wzdycha kiwa uśmiecha skrattar ler suckar nickar griner smiler sukker nikker
+笑 大笑 微笑 叹气 点头 咳嗽 笑い 苦笑 ため息
 拍手
 """
 _OTHERS = _OTHERS_WORDS.split()

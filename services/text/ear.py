@@ -44,7 +44,7 @@ def heard(text: str) -> Heard:
     """Characters up to the last one that is no white space."""
     for each in pieces:
         if each.kind == "break" and last:
-            _pause(said, last)
+            last += _pause(said, places, last)
         elif each.kind == "say":
             said += each.text
             places += range(each.place, each.end)
@@ -71,7 +71,7 @@ def said(text: str, written: int) -> str:
 def _as_written(character: str, author: str) -> str:
     if is_silent(author):
         return author
-    return " " if author.isspace() else character
+    return ("" if character == "," else " ") if author.isspace() else character
 
 
 def is_spoken(text: str) -> bool:
@@ -79,7 +79,9 @@ def is_spoken(text: str) -> bool:
     return any(map(str.isalnum, heard(text).text))
 
 
-def _pause(said: list[str], last: int) -> None:
-    """Let a line without punctuation end in a pause: the white space behind its last letter becomes a comma."""
-    if last < len(said) and said[last - 1].isalnum():
-        said[last] = ","
+def _pause(said: list[str], places: list[int], last: int) -> bool:
+    """Let a line without punctuation end in a pause: a comma stands before the white space behind its last letter."""
+    if is_bare := last < len(said) and said[last - 1].isalnum():
+        said.insert(last, ",")
+        places.insert(last, places[last])
+    return is_bare

@@ -161,13 +161,14 @@ class Reader(Brackets):
         return None if may_be and not self._is_over else 0
 
     def _newline(self, text: str, at: int) -> int:
-        if self._is_heading or self._is_row or self._is_line_start:
+        is_blank = self._is_line_start
+        self._say(" ", at, 1)
+        if self._is_heading or self._is_row or is_blank:
             self._break(at)
-        if self._is_line_start:  # a blank line
+        if is_blank:
             self._is_list = self._has_paragraph = False
             self._open.clear()
             self._dead = 0
-        self._say(" ", at, 1)
         self._is_heading = self._is_row = self._is_item = False
         self._is_line_start = True
         return 1
@@ -397,6 +398,7 @@ class Reader(Brackets):
     def _take_tag(self, tag: "re.Match[str]", at: int) -> None:
         name = (tag["name"] or tag["closed"]).rpartition(":")[2].lower()
         if name in mark.BLOCKS:
+            self._say(" ", at, len(tag[0]))
             self._break(at)
         if name in mark.THOUGHTS or (tag["name"] and name in mark.UNSAID):
             if tag["name"] and not tag[0].endswith("/>"):
