@@ -38,6 +38,8 @@ class Reader(Brackets):
         self._fence = ""
         """The fence that began a block of code; empty: there is none."""
         self._is_heading = self._is_list = False
+        self._has_stars = False
+        """True within a list with the bullet `*`."""
         self._steps: dict[str, Callable[[str, int], int | None]] = {
             "\n": self._newline, "\\": self._backslash, "&": self._entity, "`": self._code, "*": self._star,
             "_": self._star, "~": self._tilde, "<": self._tag, "[": self._opens, "]": self._closes, "(": self._paren,
@@ -148,6 +150,7 @@ class Reader(Brackets):
             if found["number"] is None:
                 self._break(at)
                 self._is_list = self._is_item = True
+                self._has_stars = found[0] == "*"
                 return found.end() - at
             if found["number"] == "1" or self._is_list or not self._has_paragraph:
                 self._break(at)
@@ -166,7 +169,7 @@ class Reader(Brackets):
         if self._is_heading or self._is_row or is_blank:
             self._break(at)
         if is_blank:
-            self._is_list = self._has_paragraph = False
+            self._is_list = self._has_paragraph = self._has_stars = False
             self._open.clear()
             self._dead = 0
         self._is_heading = self._is_row = self._is_item = False
@@ -306,6 +309,10 @@ class Reader(Brackets):
             is_calculated = size <= 2 and (before.isdigit() or after.isdigit() or self._is_operand)
             is_sign = (before.isspace() and after.isspace() and size <= 2) or (is_word and is_calculated)
             is_sign = is_sign or (before == ")" and after == "(" and size <= 2)
+        if is_sign and self._has_stars and size == 1 and before.isspace() and not self._last.isdigit():
+            # XML makes one line of a list: `* star * moon`.
+            self._break(at)
+            return size
         if is_sign:
             self._say(text[at:end], at, size)
             return size

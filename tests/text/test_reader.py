@@ -48,6 +48,8 @@ def test_letters_are_those_of_a_parser_of_commonmark_in_whatever_bits_a_text_com
     [
         ("**Bold** words and `code` here", "Bold words and code here"),
         ("* star\n* moon", "star, moon"),
+        ("* star * moon", "star, moon"),
+        ("* 5 * 3 * star", "5 * 3, star"),
         ("# Heading\ntext", "Heading, text"),
         ("***very*** _good_ ~~old~~", "very good old"),
         ("See the [docs](https://example.com) now", "See the docs now"),
