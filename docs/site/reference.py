@@ -25,7 +25,7 @@ the bus, and stands on the page of [messages](messages.md).
 ```
 """
 SECTIONS = {
-    "Driving a robot": ("connect", "Robot"),
+    "Driving a robot": ("connect", "embedded", "Robot"),
     "What you give it": ("TurnFragment", "Reference", "SpeechOption", "Speech", "Gaze", "Pointing", "Head", "Block"),
     "Telling of people": ("perceive", "PerceivedPerson", "Utterance"),
     "What comes back": ("FragmentOutcome", "ConnectionEvent", "Statistics", "World", "Entity"),

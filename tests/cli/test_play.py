@@ -294,15 +294,15 @@ def test_a_block_may_wait_for_a_point_of_another_file(engage: Engage, files: dic
     assert looked["at"] == pytest.approx(said["at"])
 
 
-def test_a_point_of_a_block_that_is_not_there_is_refused(engage: Engage, tmp_path: Path) -> None:
+def test_a_point_of_a_block_that_is_not_there_costs_the_tie_and_is_told(engage: Engage, tmp_path: Path) -> None:
     path = tmp_path / "after.xml"
     path.write_text('<bml id="after">\n<gaze id="g" target="trapezoid" start="long:s:end"/>\n</bml>')
 
     result = engage(*PLAY, path)
 
-    assert result.code == 2
-    assert result.err.startswith(f"{path}:2: ")
-    assert "long:s:end" in result.err
+    assert result.code == 0
+    assert "PARSING_FAILURE after:g: line 2: " in result.err
+    assert "'long:s:end': no block is known as 'long'" in result.err
 
 
 def test_both_kinds_of_lines_may_share_a_file(engage: Engage, files: dict[str, Path], tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """What "it" can mean: the one thing that was referred to, across fragments and turns, if it was said at all."""
 
 import asyncio
-from unittest.mock import patch
 
 from msgspec.structs import replace
 
@@ -16,7 +15,6 @@ from engage_hri.services.commandline.generating import generated
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.partners import Partners, stage
-from tests.generation.test_service_streams import says
 
 WORLD = tangram_world()
 
@@ -150,27 +148,6 @@ async def test_what_a_refused_fragment_was_to_name_is_not_named(hub: MemoryHub) 
             partners.end(partners.request(id))
 
         assert await its(partners, last)
-
-
-async def test_what_is_sent_again_is_not_its_own_topic(hub: MemoryHub) -> None:
-    async with stage(hub) as partners:
-        partners.send(says("a", "beginning"))
-        await partners.fragment_block("a")
-        refuse = partners.desk.refuse
-
-        def refuse_too_late(id: str, fault: Fault) -> None:
-            partners.end(partners.request("a"))
-            refuse(id, fault)
-            partners.refusal = None
-
-        partners.refusal = Fault(reason="'a:s:end' is not a point of a live block")
-        with patch.object(partners.desk, "refuse", refuse_too_late):
-            again = partners.send(refers("b", "end", "left"))
-            await partners.fragment_block("b")
-        partners.end(partners.request("b"))
-
-        assert partners.request("b").id == "ask-b.block-2"
-        assert not await its(partners, again)
 
 
 async def test_a_refused_turn_leaves_the_one_before_it_the_last(hub: MemoryHub) -> None:
