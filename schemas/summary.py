@@ -114,8 +114,8 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         ),
         eye_contact=_decision(contact),
         answer=_answer(pair, is_over=status != "done"),
-        answer_delay=_rounded(pair.delay) if pair and _decision(pair) else None,
-        answered_by=pair.responder if pair and _decision(pair) else "",
+        answer_delay=_rounded(pair.delay) if pair and pair.response else None,
+        answered_by=pair.responder if pair and pair.response else "",
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
         problems=_problems(
             text
@@ -164,7 +164,7 @@ def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal[
         return None
     if pair.state == "started":
         return "pending"
-    return (pair.response if _decision(pair) else None) or "none"
+    return pair.response or "none"
 
 
 def _heard(texts: Iterable[HeardText]) -> tuple[HeardWords, ...]:
