@@ -169,7 +169,7 @@ def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal[
 
 def _heard(texts: Iterable[HeardText]) -> tuple[HeardWords, ...]:
     """Words in order; fragments of one turn tell some of them again."""
-    newest = {(each.actor, each.id): each for each in texts}
+    newest = {(each.actor, each.id, each.began): each for each in texts}
     said = sorted(newest.values(), key=lambda each: (each.began.seconds, each.actor, each.id))
     return tuple(HeardWords(who=each.actor, text=each.text, to=each.to) for each in said[-MOST_HEARD:])
 

@@ -165,6 +165,6 @@ _POSITIVE = (
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
-    "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", 
+    "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness",
     "mtbce_events", "body_patience", "words_between", "words_patience", "report_grace",
 )  # fmt: skip

@@ -75,7 +75,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Time limit from the end of the turn, for an answer in words or gestures. In a public study of turn-taking 96 of
     100 people answered a product robot within it, and half of them within 1.5 s."""
     third_turn_limit: Seconds = 1.5
-    """Time after an answer of the robot in which the person may close the exchange; what comes later is a new turn."""
+    """Time after an answer of the robot in which the person may close the exchange; later is a new turn."""
     manipulation_limit: Seconds = 8.0
     """Time limit from the end of the turn, when the manipulation of an object is accepted as the answer."""
     accept: tuple[Action, ...] = ("speak", "nod", "shake", "point")
@@ -131,7 +131,8 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     def __post_init__(self) -> None:
         positive(self, (
-            "directed_gaze_limit", "mutual_facial_gaze_limit", "adjacency_pair_limit", "third_turn_limit", "manipulation_limit",
+            "directed_gaze_limit", "mutual_facial_gaze_limit", "adjacency_pair_limit", "third_turn_limit",
+            "manipulation_limit",
             "turn_patience", "backchannel_limit", "direct_by_look", "window", "reference_mtbce",
             "longest_speech", "longest_gesture", "longest_manipulation",
         ))  # fmt: skip

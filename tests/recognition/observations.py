@@ -40,7 +40,9 @@ class Log:
     """
 
     def __init__(self, *people: str, **config: Any) -> None:
-        self.session = Session(ROBOT, RecognitionConfig(**{"adjacency_pair_limit": 1.5, "lost_face_grace": 0.5, **config}))
+        self.session = Session(
+            ROBOT, RecognitionConfig(**{"adjacency_pair_limit": 1.5, "lost_face_grace": 0.5, **config})
+        )
         self.effects: list[Effect] = []
         self.requests = 0
         self.feed(world(*people), 0.0)

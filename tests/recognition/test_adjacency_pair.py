@@ -174,5 +174,3 @@ def test_the_initiator_speaking_again_at_once_is_the_third_turn(at, pairs):
     log.begins(HUMAN, "speak", at)
 
     assert {event.id for event in log.events} == pairs
-
-

@@ -13,8 +13,8 @@ ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
 
 LATEST_ANSWER: Seconds = 10.0
-"""Time from the end of the robot's turn after which what a person does is no late answer, but a turn of its own. People
-who answered a product robot after its limit did so within 6 s, but for one of 70."""
+"""Time from the end of the robot's turn after which what a person does is no late answer, but a turn of its own.
+People who answered a product robot after its limit did so within 6 s, but for one of 70."""
 
 TABLE = table(
     Row(IDLE, "robot_asks", ROBOT_WAITING, ("started",)),

@@ -14,6 +14,9 @@ from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
 
+WORDS_KNOWN: Seconds = 2.0
+"""Time after a short speech in which its words may show that it took the floor: a "stop" cuts the turn off."""
+
 
 class Conversation:
     """Conversation of one person with the robot."""
@@ -30,6 +33,9 @@ class Conversation:
         self.own_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.robot_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self._speech_confidence: Probability = 1.0
+        self._brief_since: Seconds = 0.0
+        self._brief_until: Seconds | None = None
+        """End of the person's last speech, if that was short and within the robot's turn."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -89,6 +95,7 @@ class Conversation:
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
             event = self._backchannel(self._scene.robot, self.id, at, confidence)
             event.spoken = (at,)
+            self._brief_until = None
             self.own_backchannel.speaks(event)
         else:
             self._human_turn(at, "speak", confidence)
@@ -98,6 +105,8 @@ class Conversation:
             return
         self.speaks_since, self.silent_since = None, at
         self._scene.falls_silent(self.id, at)
+        self._brief_until = at if self.own_backchannel.state == UNDECIDED else None
+        self._brief_since = self.own_backchannel.undecided_since or at
         self._backchannel_speech_ends(self.own_backchannel, at)
         self._floor_is_free(at)
         self._ends("speak", at, by_robot=False)
@@ -243,6 +252,11 @@ class Conversation:
         """
         if self.pair.is_turn(turn):
             self._keep_floor(at)
+            # Its words may have been known only after the short speech was over, and told as a backchannel.
+            asked, until = self.pair.event, self._brief_until
+            if asked and until is not None and self._brief_since >= asked.started and at <= until + WORDS_KNOWN:
+                self.pair.human_begins("speak", self._brief_since, self._speech_confidence)
+                self.pair.ends("speak", until, by_robot=False)
             self.pair.abort(at)
             self._floor_is_free(at)
 
