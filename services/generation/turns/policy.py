@@ -222,7 +222,7 @@ class TurnPolicy:
         """Note words of a person who speaks into the robot's turn: they decide before the seconds of voice do.
 
         Final words that are more than a listener's take the floor at once, also where nobody tells of a voice; so
-        does a line that was typed, whatever it says. As long as the words are a listener's, partial ones included, nobody
+        does a line that was typed, whatever it says. While the words are a listener's, partial ones included, nobody
         takes it. Partial words of any other kind leave it to the voice, for they may be wrong.
         """
         current = self._current
