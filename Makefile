@@ -1,13 +1,17 @@
 # `make demo` shows it and `make test` checks it; `make docs` builds the site. They need Python >= 3.11, make and a
 # package index; the first run makes .venv, later ones reuse it until pyproject.toml or constraints.txt change.
+# `make demo` installs a third of what `make test` does: who only wants to look does not wait for Sphinx and MuJoCo.
 
 BIN := .venv/bin
+DEMO := .venv/.demo
 READY := .venv/.ready
+PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 \
+	$(BIN)/python -m pip install -qq
 PROFILE := same
 
 .PHONY: demo test test-long lint style docs generate coverage bench reachy-mini clean
 
-demo: $(READY)
+demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
 
 # mypy keeps one processor busy for as long as others would wait for it: it runs beside the tests.
@@ -29,7 +33,7 @@ style: $(READY)
 
 # Twice as long as the tests alone. The tracer does not see what Zenoh calls on threads of its own (services/bus/zenoh).
 coverage: $(READY)
-	@PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install -qq -e '.[coverage]'
+	@$(PIP) -e '.[coverage]'
 	@$(BIN)/coverage erase
 	@$(BIN)/coverage run -m pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=long $(ARGS)
 	@$(BIN)/coverage combine -q
@@ -66,13 +70,17 @@ clean:
 	@rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*
 
 # Which `python3.x` works is found by running it: a name on PATH may be a shim, or lack venv.
-$(READY): pyproject.toml constraints.txt
+$(DEMO): pyproject.toml constraints.txt
 	@python=$$(for name in "$$PYTHON" python3 python3.14 python3.13 python3.12 python3.11 python; do \
 		"$$name" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 \
 		&& { echo "$$name"; break; }; done); \
 	test -n "$$python" || { echo "engage needs Python >= 3.11 with venv (Debian: apt install python3-venv)" >&2; exit 1; }; \
 	$(BIN)/python -m pip --version >/dev/null 2>&1 \
 		|| { echo "making .venv (once, about a minute)"; "$$python" -m venv --clear .venv; }
-	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 \
-		$(BIN)/python -m pip install -qq -e '.[test]'
+	@$(PIP) -e '.[check,console,record,speed,voice]'
+	@touch $@
+
+$(READY): $(DEMO)
+	@test -e $@ || echo "installing what the tests need (once, about two minutes)"
+	@$(PIP) -e '.[test]'
 	@touch $@

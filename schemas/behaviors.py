@@ -31,12 +31,16 @@ class Behavior(Struct, frozen=True, kw_only=True, tag_field="type", omit_default
     id: unique in its block or fragment; sync references name it.
     required: if it cannot be performed, the whole block fails instead of going on without it.
     timing: sync references written at the behavior itself.
+    needs: ids of behaviors of the same block without which this one means nothing: once one of these is dropped,
+    interrupted or refused by the body, this one is dropped, too. One that has begun is finished all the same;
+    a connection event is withdrawn even then, as long as it is undecided.
     line: of its XML source, from 1; 0 when there is none.
     """
 
     id: str
     required: bool = False
     timing: tuple[Timing, ...] = ()
+    needs: tuple[str, ...] = ()
     line: int = 0
 
 
@@ -262,6 +266,7 @@ class Emit(Behavior, frozen=True, kw_only=True, tag="emit", omit_defaults=True):
 class Event(Behavior, frozen=True, kw_only=True, tag="event", omit_defaults=True):
     """A connection event that the robot begins; recognition performs it. Start: its request; end: its decision.
 
+    `needs` names the behaviors that it is about. It begins no earlier than the first of these really does.
     responder: actor id of the person.
     objects: ids of what it is about.
     cause: what the robot begins it for. optional: its failure does not count.

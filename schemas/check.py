@@ -79,7 +79,17 @@ def problems(thing: Input) -> Iterator[Problem]:
         yield Problem(f"within is {thing.within:g}", "$.within", "", thing.line, advice)
     for index, behavior in enumerate(thing.behaviors):
         yield from _behavior(behavior, f"$.behaviors[{index}]")
+    yield from _needs(thing)
     yield from _references(thing)
+
+
+def _needs(thing: Input) -> Iterator[Problem]:
+    known = {behavior.id: None for behavior in thing.behaviors}
+    for index, behavior in enumerate(thing.behaviors):
+        for number, needed in enumerate(behavior.needs):
+            if needed not in known:
+                reason, path = f"unknown behavior {needed!r} in needs", f"$.behaviors[{index}].needs[{number}]"
+                yield Problem(reason, path, behavior.id, behavior.line, suggestion(needed, known))
 
 
 def _ids(thing: Input) -> Iterator[Problem]:

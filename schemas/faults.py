@@ -76,9 +76,13 @@ class RequestRefused(EngageError):
     """The server refused; nothing of the request was done."""
 
 
-class ServerRestarted(RunFailed):
+class OutcomeUnknown(RunFailed):
+    """Failure of a request whose server is gone, or silent: nobody knows what was done of it."""
+
+
+class ServerRestarted(OutcomeUnknown):
     """The server that had accepted the request has started again and knows nothing of it."""
 
 
-class NeverEnded(RunFailed):
+class NeverEnded(OutcomeUnknown):
     """The server was asked to end the request, and has not."""

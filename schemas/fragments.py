@@ -99,6 +99,25 @@ class ReferenceChoice(Struct, frozen=True, kw_only=True, omit_defaults=True):
     pairs: tuple[PairConsidered, ...] = ()
 
 
+class ReferenceMade(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A reference as it really was made, whatever was chosen: from the sync points and the words that came.
+
+    reference: id of the behavior. object: id of the object.
+    by: `pointing` if the stroke of a point came, else `look` if a gaze came to the object, else `words` if words of
+    the phrase were said, else `nothing`.
+    phrase: the words of it that were said.
+    looked: the person looked there; None: nothing was shown, or the robot did not wait for that, or it is undecided.
+    delay: seconds until the person did.
+    """
+
+    reference: str
+    object: str
+    by: Literal["pointing", "look", "words", "nothing"]
+    phrase: str = ""
+    looked: bool | None = None
+    delay: Seconds | None = None
+
+
 class HeardText(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Words of a person, as they were understood for good.
 
@@ -116,16 +135,22 @@ class HeardText(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
     """evt: generation -> requester: the end of a fragment: its block has ended and its gazes are decided.
 
-    fragment: its id. status: `interrupted`: it was ended by another, or on request.
-    spoken: the words that were really said.
+    fragment: its id. status: `interrupted`: it was ended by another, or on request; `unknown`: what performed it is
+    gone, and nobody knows what became of the rest; `refused`: nothing was said or done (only clients tell that, of a
+    fragment within a stream).
+    spoken: the words that were really said, as far as is known.
     replaced_by: the block whose `REPLACE` ended it, if it was interrupted for that reason.
-    choices: how each reference was made. warnings: what was done otherwise than asked.
-    fault: why it failed.
+    choices: what was chosen for each reference, the last time. warnings: what was done otherwise than asked.
+    fault: why it failed, or why nothing more is known.
     """
 
     fragment: str
-    status: Literal["done", "failed", "interrupted"]
+    status: Literal["done", "failed", "interrupted", "unknown", "refused"]
     spoken: tuple[SpokenText, ...] = ()
+    references: tuple[ReferenceMade, ...] = ()
+    """How each reference really was made, in order."""
+    eye_contact: bool | None = None
+    """The person returned the robot's look at the end of the turn; None: it did not come, or nobody has decided."""
     replaced_by: str = ""
     events: tuple[ConnectionEvent, ...] = ()
     """Each connection event of the turn in its last known state, by start."""

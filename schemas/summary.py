@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, HeardText, ReferenceChoice
+from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
@@ -20,22 +20,25 @@ MOST_HEARD = 16
 """Utterances that are told, the newest."""
 ROUNDING = 2
 """Decimals of seconds."""
-_BY: dict[GestureChoice, str] = {
-    "none": "words alone", "gaze": "a look", "directed_gaze": "a look", "directed_gaze_with_pointing": "pointing",
-}  # fmt: skip
+_BY = {"words": "words alone", "look": "a look", "pointing": "pointing"}
 
 
+Status = Literal["done", "interrupted", "failed", "unknown", "refused"]
+_WORST_FIRST: tuple[Status, ...] = (
+    "unknown", "failed", "interrupted", "refused",
+)  # fmt: skip
 _STOPS = tuple(".!?…।؟۔။。！？｡")
 _CLOSING = "\"'”’»)]」』）】》〉］｝〕"
 
 
 class Referred(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A reference as it was made. looked: the person looked there; absent: the robot did not wait for that."""
+    """A reference as it really was made. looked: the person looked there; absent: the robot did not wait for that."""
 
     object: str
     phrase: str
+    """The words of it that were said."""
     by: str
-    """`words alone`, `a look` or `pointing`."""
+    """`pointing` if the robot pointed, else `a look` if it looked there, else `words alone`."""
     looked: bool | None = None
     delay: Seconds | None = None
     """Time until the person looked there."""
@@ -52,9 +55,12 @@ class HeardWords(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Result of a fragment or a turn, short enough for a language model.
 
-    status: the worst of all fragments. said: the words that were really spoken.
+    status: the worst of all fragments; `unknown`: a part of the robot has gone, so that more may have been said and
+    done than is told here; `refused`: nothing was said or done.
+    said: the words that were really spoken.
     references: each object that was referred to, in order.
-    eye_contact: the person returned the look at the end of the turn; absent: the turn goes on.
+    eye_contact: the person returned the look at the end of the turn; absent: the turn goes on, or the robot
+    did not look.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
     absent: the turn expects none.
     answered_by: id of the person who answered.
@@ -62,7 +68,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     problems: what went wrong, in words.
     """
 
-    status: Literal["done", "interrupted", "failed", "refused"]
+    status: Status
     said: str = ""
     cut_short: bool = False
     """True if words were left unsaid."""
@@ -94,25 +100,27 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     spoken = [each for outcome in outcomes for each in outcome.spoken]
     statuses = {outcome.status for outcome in outcomes}
     events = {event.id: event for outcome in outcomes for event in outcome.events}
-    fragments = {outcome.fragment for outcome in outcomes}
     pair = _last(event for event in events.values() if event.kind == "adjacency_pair")
-    contact = _last(
-        event for event in events.values() if event.kind == "mutual_facial_gaze" and event.block in fragments
-    )
-    status: Literal["failed", "interrupted", "done"] = (
-        "failed" if "failed" in statuses else "interrupted" if "interrupted" in statuses else "done"
-    )
+    status: Status = next((each for each in _WORST_FIRST if each in statuses), "done")
+    if status == "refused" and statuses != {"refused"}:
+        status = "failed"  # something was said or done before
     return Summary(
         status=status,
         said=joined(each.text for each in spoken),
-        cut_short=bool(statuses - {"done"}) or not all(each.complete for each in spoken),
+        cut_short=bool(statuses - {"done", "refused"}) or not all(each.complete for each in spoken),
         references=tuple(
-            _referred(outcome, choice, events.values())
+            Referred(
+                object=each.object,
+                phrase=each.phrase,
+                by=_BY[each.by],
+                looked=each.looked,
+                delay=_rounded(each.delay),
+            )
             for outcome in outcomes
-            for choice in outcome.choices
-            if _was_made(outcome, choice)
+            for each in outcome.references
+            if each.by != "nothing"
         ),
-        eye_contact=_decision(contact),
+        eye_contact=next((each.eye_contact for each in reversed(outcomes) if each.eye_contact is not None), None),
         answer=_answer(pair, is_over=status != "done"),
         answer_delay=_rounded(pair.delay) if pair and pair.response else None,
         answered_by=pair.responder if pair and pair.response else "",
@@ -130,21 +138,9 @@ def refusal(fault: Fault) -> Summary:
     return Summary(status="refused", problems=_problems([str(fault)]))
 
 
-def _was_made(outcome: FragmentOutcome, choice: ReferenceChoice) -> bool:
-    """Tell whether a reference was made: all are in a fragment that is done, else those with a phrase partly said."""
-    phrase = f"{choice.reference}-phrase"
-    return outcome.status == "done" or any(each.behavior.startswith(phrase) for each in outcome.spoken)
-
-
-def _referred(outcome: FragmentOutcome, choice: ReferenceChoice, events: Iterable[ConnectionEvent]) -> Referred:
-    event = _last(
-        each
-        for each in events
-        if each.block == outcome.fragment and each.behavior.startswith(f"{choice.reference}-event")
-    )
-    looked = _decision(event)
-    delay = _rounded(event.delay) if event and looked else None
-    return Referred(object=choice.target, phrase=choice.phrase, by=_BY[choice.gesture], looked=looked, delay=delay)
+def unknown(fault: Fault) -> Summary:
+    """Summary of a fragment of which nobody knows what became of it: it may have been said and done."""
+    return Summary(status="unknown", problems=_problems([str(fault)]))
 
 
 def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
@@ -191,12 +187,14 @@ def _rounded(seconds: Seconds | None) -> Seconds | None:
 def _sentences(it: Summary) -> Iterable[str]:
     if it.status == "refused":
         yield "Refused, nothing was said or done."
+    elif it.status == "unknown":
+        yield "A part of the robot has gone: it is unknown what became of the fragment."
     elif it.status != "done":
         yield f"The fragment {'failed' if it.status == 'failed' else 'was interrupted'}."
     if it.said:
         stop = "" if it.said.rstrip(_CLOSING).endswith(_STOPS) else "."
         yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"{stop}'
-    elif it.status != "refused":
+    elif it.status not in ("refused", "unknown"):
         yield "Nothing was said."
     for each in it.references:
         yield f"{each.object}: {each.phrase or 'no words'}, by {each.by}; {_look(each)}."

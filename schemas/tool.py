@@ -7,6 +7,7 @@ below and uses only what both APIs constrain sampling by: closed objects, no `$r
 alternatives of a part that differ in their first key.
 """
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
 
 import msgspec
@@ -130,6 +131,11 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
 
 Schema = dict[str, Any]
 
+MOST_VALUES = 1000
+"""Values that all lists of a schema may have together, by the documentation of OpenAI's strict functions."""
+MANY, MOST_LETTERS = 250, 15_000
+"""A list of more values than that may have so many letters in all, by the same."""
+
 
 def tool_definition(format: Format = "anthropic", world: World | None = None) -> Schema:
     """Make the tool as an entry of the API's `tools`.
@@ -138,8 +144,14 @@ def tool_definition(format: Format = "anthropic", world: World | None = None) ->
     `"strict": true`.
 
     format: for Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API of many others.
-    world: only the ids of its objects and people are allowed; None: any.
+    world: only the ids of its objects and people are allowed; None: any. Of a world with more ids than the APIs take
+        as values, some fields take any text (`unlisted` says which), and Engage refuses what is no id.
+
+    Raises:
+        ValueError: there is no such format.
     """
+    if format not in get_args(Format):
+        raise ValueError(f"no format {format!r}: there are {', '.join(get_args(Format))}")
     if format == "anthropic":
         return {"name": NAME, "description": DESCRIPTION, "input_schema": input_schema(world)}
     function = {
@@ -155,11 +167,58 @@ def input_schema(world: World | None = None) -> Schema:
     whole["properties"]["parts"]["items"] = {"anyOf": parts}
     if world is not None:
         _, refer, look, _ = parts
-        people = [person.id for person in world.people]
-        _only(refer["properties"]["refer"], [thing.id for thing in world.objects], _inventory(world))
-        _only(look["properties"]["look"], [each.id for each in world.entities if each.kind != "hand"])
-        _only(whole["properties"]["addressee"], ["", *people] if people else [])
+        places = {
+            "refer": refer["properties"]["refer"],
+            "look": look["properties"]["look"],
+            "addressee": whole["properties"]["addressee"],
+        }
+        for field, ids in _listed(world, MOST_VALUES - sum(map(len, _lists(whole)))).items():
+            if ids:
+                places[field]["enum"] = ids
+        if told := _inventory(world):
+            places["refer"]["description"] += f" There are: {told}."
     return whole
+
+
+def unlisted(world: World) -> tuple[str, ...]:
+    """Fields whose ids the tool of this world does not list, since its readers would not take as many."""
+    return tuple(field for field, ids in _ids(world).items() if ids and not _listed(world, _left())[field])
+
+
+def _left() -> int:
+    """Number of values that the lists without ids leave of those that are allowed."""
+    return MOST_VALUES - sum(map(len, _lists(input_schema())))
+
+
+def _ids(world: World) -> dict[str, list[str]]:
+    """Ids of each field that takes some, the most useful list first."""
+    people = [person.id for person in world.people]
+    return {
+        "addressee": ["", *people] if people else [],
+        "refer": [thing.id for thing in world.objects],
+        "look": [each.id for each in world.entities if each.kind != "hand"],
+    }
+
+
+def _listed(world: World, left: int) -> dict[str, list[str]]:
+    """Ids of each field as far as they fit, whole lists only: an id that a list lacks could not be written at all."""
+    listed = {}
+    for field, ids in _ids(world).items():
+        fits = len(ids) <= left and (len(ids) <= MANY or sum(map(len, ids)) <= MOST_LETTERS)
+        listed[field] = ids if fits else []
+        left -= len(listed[field])
+    return listed
+
+
+def _lists(schema: Any) -> Iterator[list[Any]]:
+    """All lists of values in a schema."""
+    if isinstance(schema, dict):
+        if "enum" in schema:
+            yield schema["enum"]
+        schema = [*schema.values()]
+    if isinstance(schema, list):
+        for each in schema:
+            yield from _lists(each)
 
 
 def _schema_of(kind: type[Struct]) -> Schema:
@@ -181,13 +240,6 @@ def _stripped(schema: Schema) -> Schema:
         numbers = all(isinstance(value, int) for value in stripped["enum"])
         stripped = {"type": "integer" if numbers else "string", **stripped}
     return stripped
-
-
-def _only(schema: Schema, ids: list[str], told: str = "") -> None:
-    if ids:
-        schema["enum"] = ids
-    if told:
-        schema["description"] += f" There are: {told}."
 
 
 def _inventory(world: World) -> str:

@@ -36,12 +36,19 @@ DEMONSTRATIVES = ("this", "that")
 """First words of phrases that need a pointing gesture."""
 
 _BEHAVIOR = re.compile(r"\$\.behaviors\[(?P<index>\d+)\](?:\.options\[(?P<option>\d+)\])?[\w.\[\]]*")
+CALL = 'for example {"turn_status": "full", "parts": [{"say": "Hello."}]}'
+"""Advice for a call that is none."""
 _KINDS = {kind.__struct_fields__[0]: kind for kind in PARTS}
+_OF_CALLS = {*_KINDS, *ToolInput.__struct_fields__} - {*TurnFragment.__struct_fields__}
+"""Keys by which a call, or a part of one, is known: a fragment has none of them."""
 
 
 def is_tool_input(parsed: dict[str, Any]) -> bool:
     """Tell whether decoded JSON is a tool input, and no turn fragment or block."""
-    return "parts" in parsed and "behaviors" not in parsed
+    if "behaviors" in parsed:
+        return False
+    is_named = "id" in parsed or "type" in parsed
+    return "parts" in parsed or (not is_named and not parsed.keys().isdisjoint(_OF_CALLS))
 
 
 def from_tool(parsed: dict[str, Any], id: str, source: str = "", path: str = "$") -> TurnFragment:
@@ -142,7 +149,7 @@ def _converted(raw: dict[str, Any], kind: type[Any], source: str, path: str) -> 
 def _allowed(field: str, kind: type[Any]) -> str:
     """Advice that lists the values of a field, if it has only a few."""
     values = [str(value) for value in get_args(get_type_hints(kind).get(field)) if isinstance(value, str | int)]
-    return f"one of {', '.join(values)}" if values else "see `engage tool`"
+    return f"one of {', '.join(values)}" if values else CALL
 
 
 def _place(source: str, path: str) -> str:

@@ -22,6 +22,7 @@ SHELLS = {
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
+    "services/generation/reconsideration.py",  # waits for what changes, and asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/ordinary.py",  # a body that moves on the loop's clock
@@ -37,6 +38,7 @@ SHELLS = {
     "services/control/voice/pipe.py",  # runs the process of a player
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/waiting.py",  # waits for a moment or a change of authority
+    "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
     "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once

@@ -27,7 +27,7 @@ def core(block: Block) -> Block:
         return named.block not in ("", block.id) or named.behavior not in removed
 
     behaviors = tuple(
-        replace(behavior, timing=tuple(each for each in behavior.timing if stays(each.ref)))
+        replace(behavior, timing=tuple(each for each in behavior.timing if stays(each.ref)), needs=())
         for behavior in block.behaviors
         if behavior.id not in removed
     )

@@ -6,11 +6,13 @@ Unknown keys are refused: a misspelled `turn_status` must not silently become a 
 """
 
 import json
+import re
 from collections import Counter
 from typing import Any, TypeVar
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas import allowed
 from engage_hri.schemas.blocks import Block
@@ -20,14 +22,16 @@ from engage_hri.schemas.documents.xml_grammar import snake
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.limits import LARGEST
-from engage_hri.schemas.tool_call import from_tool, is_tool_input
-from engage_hri.schemas.utf8 import BYTE_ORDER_MARK, is_utf8, utf8
+from engage_hri.schemas.tool_call import CALL, from_tool, is_tool_input
+from engage_hri.schemas.utf8 import begins_with, is_utf8, utf8
 
 T = TypeVar("T", Block, TurnFragment)
 
 UNNAMED = "fragment"
+ENCODED = 3
+"""Times that a call may be encoded as a string."""
+_FENCE = re.compile(r"\s*```\w*\s*\n(?P<text>.*?)\n?\s*```\s*", re.DOTALL)
 _FRAGMENT_ONLY = frozenset(TurnFragment.__struct_fields__) - frozenset(Block.__struct_fields__)
-_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 def encode_json(thing: Block | TurnFragment) -> bytes:
@@ -48,16 +52,46 @@ def read(data: bytes, source: str = "", unnamed: str = UNNAMED) -> tuple[Block |
 
     unnamed: the id for a language model's tool call, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
     """
-    start = data[:64].removeprefix(BYTE_ORDER_MARK).lstrip()
-    if start.startswith((b"<", b"\0<", *_UTF_16)):
+    start = begins_with(data)
+    if start == "<":
         return (decode_xml(data, source),)
-    if not start.startswith((b"{", b"[")):
+    if start not in ("{", "["):
         advice = "BML or EBML (XML), or the same as JSON"
         raise InputRefused(Fault(reason="neither XML nor JSON" if start else "empty", where=source, advice=advice))
     parsed = _parsed(data, source)
     if not isinstance(parsed, list):
         return (_thing(parsed, source, "$", unnamed),)
     return tuple(_thing(item, source, f"$[{index}]", f"{unnamed}-{index + 1}") for index, item in enumerate(parsed))
+
+
+def read_call(data: bytes | str, id: str) -> TurnFragment:
+    """Read a language model's tool call, as models write it. Raises InputRefused in words of the tool.
+
+    A text in a fence of Markdown is the text, and a JSON string in place of an object or of the parts is the JSON
+    that it holds: neither can mean anything else.
+    """
+    try:
+        call = _parsed(_unfenced(data), "")
+        for _ in range(ENCODED):
+            call = _parsed(_unfenced(call), "") if isinstance(call, str) else call
+        if isinstance(call, dict) and isinstance(parts := call.get("parts"), str) and parts.lstrip().startswith("["):
+            call = {**call, "parts": _parsed(parts, "")}
+    except InputRefused as error:
+        fault = error.fault
+        if "truncated" in fault.reason:
+            empty = not data.strip()
+            reason = "an empty call" if empty else "the call is truncated: its JSON ends before it is complete"
+            raise InputRefused(replace(fault, reason=reason, advice=CALL)) from error
+        raise InputRefused(replace(fault, advice=CALL)) from error
+    if not isinstance(call, dict):
+        raise _refusal(f"a call is an object, and this is {type(call).__name__}", "$", "", CALL)
+    return from_tool(call, id)
+
+
+def _unfenced(text: bytes | str) -> bytes | str:
+    """The text within a fence of Markdown; without one, all of it."""
+    decoded = utf8(text) if isinstance(text, bytes) else text
+    return found["text"] if (found := _FENCE.fullmatch(decoded)) else decoded
 
 
 def _parsed(data: bytes | str, source: str) -> Any:

@@ -66,6 +66,8 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
         tag, plain = f"{{{DRAFT}}}gesture", plain | {"type": "POINT"}
     element = etree.SubElement(root, tag, plain)
     _set_fields(element, behavior, EBML)
+    if behavior.needs and TYPES[local].is_standard:  # BML has no such attribute
+        element.set(f"{{{EBML}}}needs", element.attrib.pop("needs"))
     tied = ties(behavior, namespace) if isinstance(behavior, of.Speech) else {}
     _set_timing(element, [timing for timing in behavior.timing if timing.sync not in tied])
     match behavior:

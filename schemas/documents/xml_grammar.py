@@ -210,6 +210,7 @@ _HANDS = {"LEFT": "LEFT_HAND", "RIGHT": "RIGHT_HAND", "BOTH": "BOTH_HANDS", "": 
 _SPELLED: Mapping[str, Callable[[str], Any]] = {
     "accept": str.split,
     "composition": lambda text: text.strip().upper(),
+    "needs": str.split,
     "mode": lambda text: _HANDS.get(text.upper(), text.upper()),
     "side": str.upper,
 }

@@ -7,11 +7,12 @@ from typing import Any, TypeVar
 import msgspec
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.json_codec import read
+from engage_hri.schemas.documents.json_codec import read, read_call
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import decode, published
 from engage_hri.schemas.requests import Request
+from engage_hri.schemas.tool_call import CALL
 
 FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 """A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
@@ -59,7 +60,24 @@ def _things(source: str | bytes | Path | dict[str, Any], unnamed: str) -> tuple[
             data, place = source, ""
         case dict():
             data, place = _encoded(lambda: msgspec.json.encode(source)), ""
+        case _:
+            reason = f"{type(source).__name__!r} is nothing that can be read"
+            raise InputRefused(
+                Fault(reason=reason, advice="a fragment or block, its text, a Path, or JSON as a dict")
+            )
+    if isinstance(source, str) and not source.lstrip("\ufeff \t\r\n").startswith(("<", "{", "[")):
+        is_path = source.endswith((".xml", ".json", ".bml", ".ebml"))
+        advice = (
+            f"the content of a file is read from Path({source!r})" if is_path else f"words are said by {CALL[12:]}"
+        )
+        raise InputRefused(Fault(reason="neither XML nor JSON", where=source[:80], advice=advice))
     return read(data, place, unnamed), place
+
+
+def call_in(call: Any, unnamed: str) -> TurnFragment:
+    """Read a language model's tool call, decoded or not. Raises InputRefused with the JSON path."""
+    data = call if isinstance(call, str | bytes) else _encoded(lambda: msgspec.json.encode(call))
+    return read_call(data, unnamed)
 
 
 R = TypeVar("R", bound=Request)
@@ -72,6 +90,14 @@ def checked(request: R) -> R:
     except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
         raise InputRefused(Fault(reason=str(error), where=str(request.id))) from error
     return request
+
+
+def taken(value: Any, kind: Any, where: str) -> Any:
+    """Return a value as readers of messages take it: of this type, and within its bounds. Raises InputRefused."""
+    try:
+        return msgspec.json.decode(msgspec.json.encode(value), type=kind)
+    except (UnicodeEncodeError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputRefused(Fault(reason=f"{value!r:.60} is refused: {error}", where=where)) from error
 
 
 def _encoded(encode: Callable[[], bytes]) -> bytes:

@@ -16,13 +16,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.faults import EngageError, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
-from engage_hri.schemas.summary import Summary, refusal, summary
+from engage_hri.schemas.summary import Summary, refusal, summary, unknown
 from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.chunking import Chunk, Chunker
+from engage_hri.services.client.inputs import call_in
 from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot
 
@@ -37,12 +38,13 @@ async def perform_call(
     """Perform a model's tool call; returns the tool's result, also where the call is refused or fails.
 
     robot: as `connect` gives it.
-    call: the input of the tool, as its API gives it, decoded or as JSON.
+    call: the input of the tool, as its API gives it, decoded or as JSON; also in a fence, or encoded once more.
     await_answer: if it ends a turn, return only when that has been answered, or it is too late.
     timeout: seconds to wait for it to be accepted; None: for ever.
     """
     try:
-        return summary(await robot.perform(call, await_answer=await_answer, timeout=timeout))
+        fragment = call_in(call, robot._unnamed())
+        return summary(await robot.perform(fragment, await_answer=await_answer, timeout=timeout))
     except EngageError as error:
         return summary_of(error)
 
@@ -51,7 +53,7 @@ def summary_of(error: EngageError) -> Summary:
     """Summary of a fragment for which `Robot.perform` raised `error`."""
     if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
         return summary(error.outcome)
-    return refusal(error.fault)
+    return unknown(error.fault) if isinstance(error, OutcomeUnknown) else refusal(error.fault)
 
 
 async def stream(
@@ -77,8 +79,14 @@ async def stream(
     await_answer: return only when the turn has been answered, or it is too late.
 
     Raises:
+        InputRefused: `pieces` cannot be followed. Nothing was said.
         ExceptionGroup: holds what `pieces` raised.
     """
+    if not isinstance(pieces, AsyncIterable):
+        reason = f"{type(pieces).__name__!r} is no asynchronous iterable of pieces"
+        raise InputRefused(
+            Fault(reason=reason, where=id, advice="an `async def` that yields text; or `perform_call`")
+        )
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
         async with asyncio.TaskGroup() as tasks:
@@ -167,6 +175,12 @@ class _Speaking:
     def _as_outcome(self, id: str, error: EngageError) -> FragmentOutcome:
         if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
             return error.outcome
-        if isinstance(error, InputRefused):
+        if is_refused := isinstance(error, InputRefused):
             self._refused.add(id)
-        return FragmentOutcome(id=id, fragment=id, status="failed", fault=error.fault)
+        is_unknown = isinstance(error, OutcomeUnknown)
+        return FragmentOutcome(
+            id=id,
+            fragment=id,
+            status="refused" if is_refused else "unknown" if is_unknown else "failed",
+            fault=error.fault,
+        )

@@ -5,7 +5,9 @@ import math
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import count, islice
+from typing import Annotated
 
+from msgspec import Meta
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -13,16 +15,19 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, Utterance
 from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.units import Seconds, Stamp, Vector
+from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector
 from engage_hri.schemas.utf8 import is_utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.client.inputs import taken
 from engage_hri.services.client.perceived_actions import PerceivedActions
 from engage_hri.services.client.person_actions import PersonActions
 from engage_hri.services.client.shared_world import SharedWorld
 from engage_hri.services.client.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 
+Duration = Annotated[float, Meta(ge=0.0, le=A_DAY)]
+"""Seconds that something takes."""
 GESTURE: Seconds = 0.5
 MANIPULATION: Seconds = 1.5
 FRAME: Seconds = 0.1
@@ -81,16 +86,23 @@ class PerceivedPerson:
         """Move the face to another place.
 
         position: metres, in the robot's frame.
+
+        Raises:
+            InputRefused: `position` is not a place.
         """
         self._check()
-        self.bring(replace(self._body, position=position))
+        self.bring(replace(self._body, position=taken(position, Vector, f"{self.id}: position")))
 
     def bring(self, *entities: Entity) -> None:
         """Put entities into the world, or change them there: things, hands, the person.
 
         entities: as they are now; each replaces what has its id.
+
+        Raises:
+            InputRefused: an entity is not one that a world can hold.
         """
         self._check()
+        taken(World(entities=entities), World, f"{self.id}: entities")
         self._own.update((entity.id, entity) for entity in entities)
         self._show()
 
@@ -135,14 +147,19 @@ class PerceivedPerson:
         target: its id.
         to: place where it is laid, in a straight line, metres; None: it stays where it is.
         seconds: how many it takes.
+
+        Raises:
+            InputRefused: `seconds` is not a duration, or `to` not a place.
         """
+        taken(seconds, Duration, f"{self.id}: seconds")
+        place = None if to is None else taken(to, Vector, f"{self.id}: to")
         thing = self._entity(target)
         try:
             with self._doing("act", target):
-                if to is None or thing is None:
+                if place is None or thing is None:
                     await asyncio.sleep(seconds)
                 else:
-                    await self._carry(thing, to, seconds)
+                    await self._carry(thing, place, seconds)
         finally:
             self._rest()
 
@@ -162,9 +179,13 @@ class PerceivedPerson:
         seconds: that the speech takes; None: as long as such words do.
         partial: tell the words also while they are spoken, as a recognizer does.
         delay: seconds from the end of the speech until the words are known for good.
+
+        Raises:
+            InputRefused: `text` is not text, or `seconds` not a duration.
         """
         self._check_text(text)
-        duration = speaking_time(text) if seconds is None else seconds
+        duration = speaking_time(text) if seconds is None else taken(seconds, Duration, f"{self.id}: seconds")
+        taken(delay, Duration, f"{self.id}: delay")
         said = self._utterances.begun(self._bus.stamp(), _ids(to))
         try:
             self.tell(said)  # first, so that whoever waits for the speech knows that its words will come
@@ -205,8 +226,12 @@ class PerceivedPerson:
 
         action: `look`, `speak`, `nod`, `shake`, `point` or `act`.
         targets: ids of entities; an actor's id means the face.
+
+        Raises:
+            InputRefused: `action` is not one of these, or a target is not an id.
         """
-        self._check(*targets)
+        taken(action, Action, f"{self.id}: action")
+        self._check(*taken(targets, tuple[str, ...], f"{self.id}: targets"))
         self._tell(self._actions.begins(action, tuple(filter(None, targets)), self._bus.stamp()))
 
     def end(self, action: Action, *targets: str) -> None:
@@ -231,9 +256,11 @@ class PerceivedPerson:
         if not 0 < len(utterance.id) <= LONGEST_ID:
             reason = f"the id of an utterance has 1 to {LONGEST_ID} letters, not {len(utterance.id)}"
             raise InputRefused(Fault(reason=reason, where=self.id))
+        taken(utterance, Utterance, self.id)
         self._bus.publish(keys.UTTERANCE, replace(utterance, actor=self.id))
 
     async def _do(self, action: Action, target: str, seconds: Seconds) -> None:
+        taken(seconds, Duration, f"{self.id}: seconds")
         with self._doing(action, target):
             await asyncio.sleep(seconds)
 
@@ -328,11 +355,13 @@ class PerceivedPerson:
 
     def _check_text(self, text: str) -> None:
         self._check()
-        if not text.strip():
+        if isinstance(text, str) and not text.strip():
             raise InputRefused(Fault(reason="no words", where=self.id, advice="give it what the person says"))
         self._check_length(text)
 
     def _check_length(self, text: str) -> None:
+        if not isinstance(text, str):
+            taken(text, str, f"{self.id}: text")
         if not is_utf8(text):
             advice = "half a character is in it: decode its bytes with errors='replace'"
             raise InputRefused(Fault(reason="the words are not UTF-8", where=self.id, advice=advice))

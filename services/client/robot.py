@@ -100,11 +100,15 @@ class Robot(Hearing):
             PerformFailed: it began, and failed.
             RunFailed: generation is gone, or has not come within `timeout`.
         """
-        parsed = fragment_in(fragment, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
+        parsed = fragment_in(fragment, self._unnamed())
         request = self._fragment_request(parsed)
         awaits_answer = await_answer and parsed.turn_status in ("end", "full")
         outcome = await (self._answered(request, timeout) if awaits_answer else self._performed(request, timeout))
         return successful(self._with_new_words(outcome), parsed.id)
+
+    def _unnamed(self) -> str:
+        """Make the id of a fragment or block that has none."""
+        return f"{self._bus.name}-{self._life}-{next(self._numbers)}"
 
     def begin_to_perform(self, fragment: TurnFragment) -> None:
         """Send a fragment and do not wait for what becomes of it.
@@ -163,7 +167,7 @@ class Robot(Hearing):
         if isinstance(block, str) and (parts := tuple(behaviors)):
             made = Block(id=block, behaviors=parts, constraints=tuple(constraints), composition=composition)
         else:
-            made = block_in(block, f"{self._bus.name}-{self._life}-{next(self._numbers)}")
+            made = block_in(block, self._unnamed())
         request = PerformBlock(id=self._request_id(made.id), block=made, follows=tuple(follows))
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)

@@ -14,6 +14,7 @@ from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Configured, WorldFile
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_source, read_world
 
@@ -38,13 +39,13 @@ def main(options: Options) -> int:
     around = read_world(options.world)
     documents, warnings = [], []
     with source.naming_file():
-        plans = generated(source.things, around, config, str(options.file))
+        plans = generated(source.things, around, config, str(source.path))
         blocks = {plan.block.id: plan.block for plan in plans}
         for plan in plans:
             block = in_dialect(core(plan.block) if options.core else plan.block, options.dialect, blocks)
             documents.append(encode_xml(block).decode())
             warnings += [*plan.warnings, *(each.message for each in block.unread), *_unusual_ids(block)]
-    print("\n".join(documents), end="")
+    print_format("\n".join(documents).removesuffix("\n"))
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
     return DONE

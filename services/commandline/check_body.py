@@ -17,8 +17,10 @@ from msgspec.structs import replace
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.options import Configured
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, end_like_ctrl_c
 from engage_hri.services.commandline.sources import read_world
+from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from engage_hri.services.control.body import Body
@@ -62,7 +64,7 @@ def main(options: Options) -> int:
     """
     if missing := [name for name in NEEDED if find_spec(name) is None]:
         reason = f"check-body needs {' and '.join(missing).replace('_', '-')}"
-        raise InputRefused(Fault(reason=reason, advice="install the extra: pip install 'engage-hri[check]'"))
+        raise InputRefused(Fault(reason=reason, advice=extra_command("check")))
     from engage_hri.services.control.testing.check import check
     from engage_hri.services.control.testing.render import rendered
     from engage_hri.services.control.testing.report import Stated, as_json
@@ -77,7 +79,7 @@ def main(options: Options) -> int:
         make = maker(options.body, options.load().control)
         report = check(make, stated, driver=options.body, law=options.law, progress=progress)
     if options.json:
-        print(as_json(report), flush=True)
+        print_format(as_json(report))
     else:
         Terminal(highlight=False).print(rendered(report))
     if report.is_stopped:

@@ -1,9 +1,13 @@
 """Command `engage console`: a page in the browser that shows a running robot, and lets people take part."""
 
+import os
+import re
 import secrets
 import webbrowser
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from socket import gethostname
 from types import ModuleType
@@ -14,10 +18,11 @@ import typer
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.kept import opened
-from engage_hri.services.commandline.options import Connected
+from engage_hri.services.commandline.options import Connected, Shown
 from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name, until_closed
 from engage_hri.services.commandline.sources import Thing, read_source
+from engage_hri.services.commandline.windowed import cannot_listen, lacking, not_installed
 
 if TYPE_CHECKING:
     from engage_hri.services.console.web.guard import Hosts
@@ -25,11 +30,16 @@ if TYPE_CHECKING:
 
 PORT = 8137
 LOCAL = ("127.0.0.1", "::1", "localhost")
+TOKEN = 12
+"""Bytes of chance in a token."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Connected):
-    """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
+class Options(Connected, Shown):
+    """Options of the command. attended: run only until standard input closes, as it does when our parent dies.
+
+    began: seconds of this machine's clock from which the page counts, as the terminal of our parent does.
+    """
 
     role: Annotated[
         Literal["observer", "operator", "wizard"],
@@ -50,19 +60,20 @@ class Options(Connected):
         Path | None,
         typer.Option(metavar="FOLDER", help="Pages of your own, served at /pages/: they may listen at /messages."),
     ] = None
-    host: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Where to listen; others than this machine see it all.")
-    ] = "127.0.0.1"
-    called: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME", help="A further name in the address of the page, as that of a proxy; may be given again."
-        ),
-    ] = None
     port: Annotated[
         int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0: any that is free.")
     ] = PORT
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="File with the token of the address, made if there is none: then the address stays the same when "
+            "the window is started again, and its pages take part as before.",
+            show_default=False,
+        ),
+    ] = None
     browser: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False
+    began: Annotated[float | None, typer.Option("--began", hidden=True)] = None
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
 
@@ -94,12 +105,12 @@ async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> 
     from engage_hri.services.console.web.script import Script
     from engage_hri.services.console.web.service import window
 
-    token = secrets.token_urlsafe(12)
+    token = kept_token(options.token_file) if options.token_file else secrets.token_urlsafe(TOKEN)
     async with await options.open(config.bus, HOLDERS[options.role]) as hub:
         bus = hub.join(unique_name("console"), options.role)
         if bus.role != options.role:
             complain(f"the window has the role {bus.role}, that of its keys, and not --role {options.role}")
-        async with window(hub, bus, Script(things), keyed=bool(config.bus.keys)) as shown:
+        async with window(hub, bus, Script(things), keyed=bool(config.bus.keys), began=options.began) as shown:
             bus.declare_alive()
 
             async def stay() -> None:
@@ -110,13 +121,32 @@ async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> 
             await _serve(options, app, token if bus.role in RIGHTS else "", stay)
 
 
+def kept_token(path: Path) -> str:
+    """The token in a file, which is made for its owner alone if there is none. Raises InputRefused.
+
+    On the command line, every user of the machine could read it.
+    """
+    try:
+        with suppress(FileExistsError), open(path, "x", opener=partial(os.open, mode=0o600)) as file:
+            file.write(f"{secrets.token_urlsafe(TOKEN)}\n")
+        token, mode = path.read_text(encoding="utf-8").strip(), path.stat().st_mode
+    except (OSError, UnicodeDecodeError) as error:
+        reason = f"cannot be read or made: {getattr(error, 'strerror', None) or error}"
+        raise InputRefused(Fault(reason=reason, where=str(path))) from error
+    if os.name == "posix" and mode & 0o077:
+        raise InputRefused(Fault(reason="others may read it", where=str(path), advice=f"chmod 600 {path}"))
+    if not re.fullmatch(r"[\w-]{12,}", token, re.ASCII):
+        reason = "this is no token: at least 12 letters, digits, - and _, on one line"
+        raise InputRefused(Fault(reason=reason, where=str(path), advice="name a new file, and it is made"))
+    return token
+
+
 def _web() -> ModuleType:
     """Load the web server. Raises InputRefused if it is not installed."""
-    try:
-        from engage_hri.services.console.web import server
-    except ModuleNotFoundError as error:
-        advice = "python -m pip install 'engage-hri[console]', in the environment of `engage`"
-        raise InputRefused(Fault(reason=f"{error.name} is not installed", where="console", advice=advice)) from error
+    if package := lacking():
+        raise InputRefused(not_installed(package))
+    from engage_hri.services.console.web import server
+
     return server
 
 
@@ -142,9 +172,7 @@ async def _serve(options: Options, app: Any, token: str, stay: Callable[[], Awai
                 webbrowser.open(url)
             await stay()
     except OSError as error:
-        advice = "is another `engage console` there? --port 0 takes any that is free"
-        where = f"{options.host}:{options.port}"
-        raise RunFailed(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
+        raise RunFailed(cannot_listen(error, options.host, options.port)) from error
 
 
 HOLDERS = {"observer": "viewer", "operator": "operator", "wizard": "wizard"}

@@ -3,20 +3,22 @@
 import asyncio
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.options import Embodied, Simulated, VirtualTime, Written
+from engage_hri.services.commandline.kept import needed
+from engage_hri.services.commandline.options import Embodied, Shown, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run
 from engage_hri.services.commandline.tangram import play_tangram
-from engage_hri.services.commandline.windowed import can_open, windowed
+from engage_hri.services.commandline.windowed import can_open, lacking, not_installed, windowed
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.live import LiveView, Log
@@ -29,7 +31,7 @@ FOR_YOU = ("collaboration.mode=task",)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Written, Simulated, Embodied):
+class Options(Written, Simulated, Embodied, Shown):
     """Options of the command. window: None: where somebody would see one."""
 
     virtual_time: VirtualTime = False
@@ -42,6 +44,11 @@ class Options(Written, Simulated, Embodied):
     you: Annotated[
         bool, typer.Option("--you", help="You are the person: take the seat in the browser, and lay the pieces.")
     ] = False
+
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Record all of it into FILE, as `engage record` does.", show_default=False),
+    ] = None
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -66,33 +73,52 @@ def main(options: Options) -> int:
         console = outputs.console(quiet=options.quiet)
         live = console.is_terminal and not options.virtual_time and not options.quiet
         window = can_open(live) if options.window is None and not options.you else options.window is not False
-        result = run(demonstrate(config, outputs, console, live, window), virtual_time=options.virtual_time)
+        result = run(demonstrate(config, outputs, console, live, options, window), virtual_time=options.virtual_time)
         console.print(tally.render(result, config.robot, console.width))
     return DONE
 
 
 def _check(options: Options) -> None:
-    """Refuse what needs a window that cannot be. Raises InputRefused."""
+    """Refuse what needs a window that cannot be, or a file that cannot be written. Raises InputRefused."""
+    if options.record is not None:
+        needed()
     for option, given in (("--window", options.window), ("--you", options.you)):
         if given and options.virtual_time:
             reason, advice = "the clock of a window cannot jump", "leave out --virtual-time"
             raise InputRefused(Fault(reason=reason, where=option, advice=advice))
     if options.you and options.window is False:
         raise InputRefused(Fault(reason="the seat is in the window", where="--you", advice="leave out --no-window"))
+    if (options.you or options.window) and (package := lacking()):
+        raise InputRefused(not_installed(package))
 
 
 async def demonstrate(
-    config: Config, outputs: Sink, console: Console, live: bool, window: bool = False
+    config: Config, outputs: Sink, console: Console, live: bool, options: Options, window: bool = False
 ) -> tally.Tally:
-    """Run everything until the task is over. Returns the tally of the events. window: show it in the browser, too."""
+    """Run everything until the task is over. Returns the tally of the events. window: show it in the browser, too.
+
+    Raises RunFailed: the window has ended, and the person would sit in it.
+    """
     began = asyncio.get_running_loop().time()
     tallying = Tallying(began)
     with scene_view(console, config.robot, began, live) as show:
-        if window:
-            async with windowed(config.robot, partial(console.print, highlight=False, markup=False)) as hub:
-                await play_tangram(config, (show, tallying, outputs), hub)
-        else:
-            await play_tangram(config, (show, tallying, outputs))
+        if not window:
+            await play_tangram(config, (show, tallying, outputs), record=options.record)
+            return tallying.tally
+        tell = partial(console.print, highlight=False, markup=False)
+        async with windowed(config.robot, options, began, tell) as beside:
+            task = play_tangram(config, (show, tallying, outputs), beside.hub, options.record)
+            playing = asyncio.create_task(task, name="tangram")
+            try:
+                waiting = {playing, beside.ended} if options.you else {playing}
+                await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+                if not playing.done():
+                    code = beside.ended.result()
+                    raise RunFailed(Fault(reason=f"the window has ended with exit code {code}", where="--you"))
+                playing.result()
+            finally:
+                playing.cancel()
+                await asyncio.wait([playing])
     return tallying.tally
 
 

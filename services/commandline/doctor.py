@@ -9,6 +9,7 @@ import typer
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, run
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.doctor.findings import findings
@@ -41,7 +42,7 @@ async def _examine(bus: BusConfig, is_json: bool) -> int:
     async with examining(bus) as facts:
         found = findings(facts)
         if is_json:
-            print(as_json(facts, found), flush=True)
+            print_format(as_json(facts, found))
         else:
             console = Terminal(highlight=False)
             console.print(report(facts, found, console.width))

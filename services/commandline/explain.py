@@ -19,6 +19,7 @@ from engage_hri.schemas.fragments import GestureChoice, PairConsidered, Referenc
 from engage_hri.services.commandline.generating import Unplanned, generated
 from engage_hri.services.commandline.options import Embodied, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_source, read_world
 from engage_hri.services.generation.block.emission import FragmentPlan
@@ -48,16 +49,16 @@ def main(options: Options) -> int:
     fragments = [thing for thing in source.things if isinstance(thing, TurnFragment)]
     if not fragments:
         advice = "only turn fragments refer to objects; for a block: engage plan"
-        raise InputRefused(Fault(reason="holds no turn fragment", where=str(options.file), advice=advice))
+        raise InputRefused(Fault(reason="holds no turn fragment", where=str(source.path), advice=advice))
     failure: Unplanned | None = None
     with source.naming_file():
         try:
-            plans = generated(fragments, around, config, str(options.file))
+            plans = generated(fragments, around, config, str(source.path))
         except Unplanned as error:
             failure, plans = error, error.plans
     impossible = failure.choices if failure else ()
     if options.format == "json":
-        print(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
+        print_format(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)
     else:

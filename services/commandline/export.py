@@ -11,6 +11,7 @@ import typer
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.kept import opened
 from engage_hri.services.commandline.process import DONE
+from engage_hri.services.runtime.installation import extra_command, packages_command
 
 if TYPE_CHECKING:
     from engage_hri.services.recording import annotations
@@ -75,7 +76,8 @@ def _path(options: Options, name: str) -> Path:
     ending = ENDINGS[name]
     if name == "film" and not _has_ffmpeg():
         ending = ".gif"
-    return options.file.with_suffix(ending)
+    file = options.file  # what follows the last dot of its name may be part of a date
+    return file.with_suffix(ending) if file.suffix == ".mcap" else file.with_name(file.name + ending)
 
 
 def _has_ffmpeg() -> bool:
@@ -138,7 +140,7 @@ def _draw(name: str, path: Path, recording: "Recording", options: Options) -> No
     try:
         from engage_hri.services.recording.drawing import sheet, times_of_film, write_film
     except ImportError as error:
-        fault = Fault(reason=f"pictures need matplotlib: {error}", advice="pip install 'engage-hri[study]'")
+        fault = Fault(reason=f"pictures need matplotlib: {error}", advice=extra_command("study"))
         raise InputRefused(fault) from error
     from engage_hri.services.recording.scenes import scenes, spread
 
@@ -150,5 +152,6 @@ def _draw(name: str, path: Path, recording: "Recording", options: Options) -> No
     try:
         write_film(path, list(scenes(recording, times)), RATE)
     except ImportError as error:
-        fault = Fault(reason=f"a film needs more: {error}", advice="pip install pillow imageio-ffmpeg, or --sheet")
+        advice = f"{packages_command('pillow', 'imageio-ffmpeg')}, or --sheet"
+        fault = Fault(reason=f"a film needs more: {error}", advice=advice)
         raise InputRefused(fault) from error

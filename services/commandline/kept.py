@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.patient import complain
+from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from engage_hri.services.recording.reading import Recording
@@ -16,7 +17,7 @@ def needed() -> None:
         import mcap.records  # noqa: F401
         import zstandard  # noqa: F401
     except ImportError as error:
-        fault = Fault(reason=f"recordings need mcap: {error}", advice="pip install 'engage-hri[record]'")
+        fault = Fault(reason=f"recordings need mcap: {error}", advice=extra_command("record"))
         raise InputRefused(fault) from error
 
 

@@ -12,7 +12,9 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import BusConfig
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
+from engage_hri.services.runtime.installation import extra_command
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +40,7 @@ class Options:
 def main(options: Options) -> int:
     """Make or show keys. Exit 3 if `show` finds a certificate that has expired, and was not revoked."""
     if find_spec("cryptography") is None:
-        advice = "pip install 'engage-hri[keys]', on the machine where keys are made; no other needs it"
+        advice = f"{extra_command('keys')}; only the machine where keys are made needs it"
         raise InputRefused(Fault(reason="the package `cryptography` is missing", where="engage keys", advice=advice))
     from engage_hri.services.commandline import certificates
 
@@ -62,7 +64,7 @@ def main(options: Options) -> int:
         case "acl":
             from engage_hri.services.bus.zenoh.rules import access_control
 
-            print(json.dumps({"access_control": access_control(certificates.let_in(folder))}, indent=1))
+            print_format(json.dumps({"access_control": access_control(certificates.let_in(folder))}, indent=1))
     return DONE
 
 

@@ -166,6 +166,21 @@ class Listening(Connected):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Shown:
+    """Options for a window: where it may be looked at from."""
+
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Where to listen; others than this machine see it all.")
+    ] = "127.0.0.1"
+    called: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="A further name in the address of the page, as that of a proxy; may be given again."
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Simulated(Configured):
     """Options for the simulation."""
 

@@ -17,7 +17,15 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.patient import LOG, Patient, as_file, settle, standard_error, standard_output
+from engage_hri.services.commandline.patient import (
+    FORMAT,
+    LOG,
+    Patient,
+    as_file,
+    settle,
+    standard_error,
+    standard_output,
+)
 
 STDOUT = Path("-")
 FeedbackFormat = Literal["json", "xml"]
@@ -94,7 +102,7 @@ class Outputs:
             return None
         begin = HEAD if self._is_xml and path == self._paths[1] else ""
         if path == STDOUT:
-            return standard_output(begin)
+            return standard_output(begin, FORMAT)
         try:
             # Unbuffered, so that a reader that follows the file sees each line at once.
             file = self._files.enter_context(FileIO(path, "w"))

@@ -99,22 +99,38 @@ class Patient:
 class PatientStream(Patient):
     """Patient standard output or error: the stream that Python has there when this is made."""
 
-    def __init__(self, name: str, stream: TextIO | None, begin: str = "") -> None:
-        """stream: None stands for one that is closed; nothing is written then, and nothing lost."""
+    def __init__(self, name: str, stream: TextIO | None, begin: str = "", encoding: str = "") -> None:
+        """stream: None stands for one that is closed; nothing is written then, and nothing lost.
+
+        encoding: empty: the stream's own.
+        """
         self._stream = stream
         if stream is None:
             super().__init__(name, len, LOG.warning)
             return
         with suppress(OSError):
             stream.flush()
-        super().__init__(name, beneath(stream).write, LOG.warning, stream.encoding or "utf-8", begin)
+        super().__init__(name, beneath(stream).write, LOG.warning, encoding or stream.encoding or "utf-8", begin)
 
     def isatty(self) -> bool:
         return self._stream is not None and self._stream.isatty()
 
 
-def standard_output(begin: str = "") -> PatientStream:
-    return PatientStream("standard output", sys.stdout, begin)
+FORMAT = "utf-8"
+"""Encoding of a format, such as JSON and XML: its readers are programs, which know nothing of our terminal."""
+
+
+def standard_output(begin: str = "", encoding: str = "") -> PatientStream:
+    """Standard output for lines as they come. encoding: `FORMAT` for lines of a format; empty: the terminal's."""
+    return PatientStream("standard output", sys.stdout, begin, encoding)
+
+
+def print_format(text: str) -> None:
+    """Print a text of a format on standard output: as UTF-8, with line feeds, whatever the terminal's encoding is."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(f"{text}\n".encode(FORMAT, errors="backslashreplace"))
+        sys.stdout.buffer.flush()
 
 
 def standard_error() -> PatientStream:

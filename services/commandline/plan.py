@@ -20,6 +20,7 @@ from engage_hri.services.commandline.ends import readable
 from engage_hri.services.commandline.generating import generated
 from engage_hri.services.commandline.options import Embodied, Strict, WorldFile
 from engage_hri.services.commandline.outputs import Terminal
+from engage_hri.services.commandline.patient import print_format
 from engage_hri.services.commandline.process import DONE, FAILED
 from engage_hri.services.commandline.prose import strict_refusal
 from engage_hri.services.commandline.sources import read_source, read_world
@@ -50,8 +51,8 @@ def main(options: Options) -> int:
     writers = {"text": _as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
-        for plan in generated(source.things, around, config, str(options.file)):
-            planned = _planned(plan.block, around, config, options.file)
+        for plan in generated(source.things, around, config, str(source.path)):
+            planned = _planned(plan.block, around, config, source.path)
             texts.append(writers[options.format](planned))
             for problem in planned.problems:
                 warnings += 1
@@ -60,9 +61,9 @@ def main(options: Options) -> int:
                 print(f"! {problem.kind} {place}: {problem.message}", file=sys.stderr)
             if nothing_is_left(plan.block, planned.dropped):
                 reason = "it would fail: every behavior of it was dropped, and nothing is left to perform"
-                print(readable(Fault(reason=reason, where=plan.block.id), options.file), file=sys.stderr)
+                print(readable(Fault(reason=reason, where=plan.block.id), source.path), file=sys.stderr)
                 code = FAILED
-    print("\n".join(text.rstrip("\n") for text in texts))
+    (print if options.format == "text" else print_format)("\n".join(text.rstrip("\n") for text in texts))
     if options.strict and warnings and code == DONE:
         raise strict_refusal(warnings)
     return code

@@ -3,6 +3,8 @@
 import asyncio
 import os
 import time
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -20,6 +22,7 @@ from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.runtime.service import installed_version
 
 if TYPE_CHECKING:
+    from engage_hri.services.bus.interface import Bus
     from engage_hri.services.recording.disk import RecordingFile
     from engage_hri.services.recording.service import Recorder
 
@@ -71,25 +74,42 @@ def _repair(path: Path | None) -> int:
 
 async def _record(options: Options, config: RobotConfig, path: Path) -> int:
     from engage_hri.services.bus.zenoh.neighbors import hinting
-    from engage_hri.services.recording.service import opened, record
 
     async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("record"), "observer")
         patterns = access.rows(bus.role, "subscribes") if config.bus.keys else (keys.EVERYTHING,)
-        recorder, file, tap = opened(
-            bus, path, time.time_ns(), patterns, _facts(options), overwrite=options.overwrite, tell=complain
-        )
-        complain(f"recording {config.bus.robot} into {path}; Ctrl-C ends it")
-        try:
+        async with recording(bus, path, patterns, _facts(options), overwrite=options.overwrite) as (
+            recorder,
+            running,
+        ):
+            complain(f"recording {config.bus.robot} into {path}; Ctrl-C ends it")
             bus.declare_alive()
-            async with asyncio.timeout(options.seconds), hinting(bus, config.bus.connect):
-                await record(bus, tap, recorder, file)
-        except (TimeoutError, asyncio.CancelledError):
-            pass  # Ctrl-C is how a recording ends: the exit code says what became of it
-        finally:
-            is_whole = recorder.close()
-            _report(recorder, file, is_whole)
-    return DONE if is_whole and not recorder.losses.disk else FAILED
+            try:
+                async with asyncio.timeout(options.seconds), hinting(bus, config.bus.connect):
+                    await running
+            except (TimeoutError, asyncio.CancelledError):
+                pass  # Ctrl-C is how a recording ends: the exit code says what became of it
+    return DONE if recorder.is_whole and not recorder.losses.disk else FAILED
+
+
+@asynccontextmanager
+async def recording(
+    bus: "Bus", path: Path, patterns: Sequence[str], facts: Mapping[str, str], *, overwrite: bool = False
+) -> AsyncIterator[tuple["Recorder", "asyncio.Task[None]"]]:
+    """Record into a file while the body of `async with` runs; at the end say what is in it, and what is not.
+
+    Raises InputRefused: it cannot be written. The task ends by itself only if recording fails.
+    """
+    from engage_hri.services.recording.service import opened, record
+
+    recorder, file, tap = opened(bus, path, time.time_ns(), patterns, facts, overwrite=overwrite, tell=complain)
+    running = asyncio.create_task(record(bus, tap, recorder, file), name="recorder")
+    try:
+        yield recorder, running
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+        _report(recorder, file, recorder.close())
 
 
 def _report(recorder: "Recorder", file: "RecordingFile", is_whole: bool) -> None:

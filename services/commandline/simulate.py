@@ -29,6 +29,7 @@ from engage_hri.services.commandline.progress import ProgressReport
 from engage_hri.services.commandline.session import Order, SessionResult
 from engage_hri.services.commandline.validation import beside_table_2_1
 from engage_hri.services.commandline.workers import play_all
+from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
@@ -123,7 +124,7 @@ def plotting() -> Draw:
     try:
         from engage_hri.services.study.plots import draw
     except ImportError as error:
-        fault = Fault(reason=f"plots need matplotlib: {error}", advice="pip install 'engage-hri[study]'")
+        fault = Fault(reason=f"plots need matplotlib: {error}", advice=extra_command("study"))
         raise InputRefused(fault) from error
     return draw
 

@@ -1,5 +1,6 @@
 """Reading of the files on the command line: fragments, blocks, worlds. All are checked before anything moves."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -17,6 +18,9 @@ from engage_hri.schemas.world import World
 from engage_hri.services.runtime.service import Service
 
 Thing = Block | TurnFragment
+STDIN = Path("-")
+"""Stands for standard input."""
+NAME_OF_STDIN = Path("standard input")
 
 
 class InputFile(Struct, frozen=True, kw_only=True):
@@ -39,9 +43,10 @@ class InputFile(Struct, frozen=True, kw_only=True):
 
 
 def read_source(path: Path) -> InputFile:
-    """Read a file. Raises InputRefused with the file, the line or JSON path, and the reason."""
+    """Read a file; `-` is standard input. Raises InputRefused with file, line or JSON path, and the reason."""
+    data, path = _bytes(path), NAME_OF_STDIN if path == STDIN else path
     unnamed = path.stem if is_id(path.stem) else json_codec.UNNAMED
-    things = json_codec.read(_bytes(path), str(path), unnamed)
+    things = json_codec.read(data, str(path), unnamed)
     if not things:
         raise InputRefused(Fault(reason="holds nothing to perform", where=str(path)))
     return InputFile(path=path, things=things)
@@ -69,7 +74,9 @@ def still(world: World, *, is_attentive: bool = False) -> Service:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        if path != STDIN:
+            return path.read_bytes()
+        return b"" if sys.stdin is None else sys.stdin.buffer.read()
     except OSError as error:
         raise InputRefused(
             Fault(reason=error.strerror or str(error), where=str(path), advice="check the path")

@@ -3,25 +3,31 @@
 import asyncio
 from collections.abc import Iterable
 from contextlib import nullcontext
+from pathlib import Path
 
+from engage_hri.schemas import keys
 from engage_hri.services.bus.interface import Bus, Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.record import recording
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.runtime.service import Ready, Service, running
 
 
-async def play_tangram(config: Config, sinks: Iterable[Sink], hub: Hub | None = None) -> None:
+async def play_tangram(
+    config: Config, sinks: Iterable[Sink], hub: Hub | None = None, record: Path | None = None
+) -> None:
     """Run all services until the task is over. sinks: get all messages, with instants of this loop.
 
-    hub: the bus on which they run, for others to look on; None: one in memory.
+    hub: the bus on which they run, for others to look on; None: one in memory. record: a file for all that is said.
     """
     finished = asyncio.Event()
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
         services = {name: roster.service(name, config) for name in roster.NAMES}
         services["collaboration"] = ending(services["collaboration"], finished)
-        async with following(hub.join("console"), sinks), running(hub, services):
+        kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
+        async with kept, following(hub.join("console"), sinks), running(hub, services):
             await finished.wait()
 
 

@@ -22,7 +22,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.options import Connected
 from engage_hri.services.commandline.outputs import Terminal
-from engage_hri.services.commandline.patient import Patient, as_file, settle, standard_output
+from engage_hri.services.commandline.patient import FORMAT, Patient, as_file, settle, standard_output
 from engage_hri.services.commandline.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.live import LiveNets, Log, NetLog
@@ -118,7 +118,7 @@ def main(options: Options) -> int:
     if options.net and not wanted.is_everything:
         reason, advice = "shows nets and nothing else", "leave out --only, --actor and --kind"
         raise InputRefused(Fault(reason=reason, where="--net", advice=advice))
-    out = standard_output()
+    out = standard_output(encoding=FORMAT if options.json else "")
     run_until_signal(_watch_nets(options, config, out) if options.net else _watch(options, config, wanted, out))
     settle(out)
     return DONE

@@ -30,6 +30,7 @@ from engage_hri.services.control.composed import composed
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.guarded import GuardedBody
 from engage_hri.services.control.members import Member
+from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
@@ -232,7 +233,7 @@ def _imported(module: str, spec: str, extra: str = "") -> ModuleType:
         if isinstance(error, ModuleNotFoundError):
             missing = error.name or ""
             if extra:
-                advice = f"install it: pip install 'engage-hri[{extra}]'"
+                advice = extra_command(extra)
             elif missing and f"{module}.".startswith(f"{missing}."):
                 advice = f"is the package installed here? Of a file: {FORMS.partition(', ')[2]}"
         raise _refusal(f"it cannot be imported: {words_of(error)}", spec, advice) from error

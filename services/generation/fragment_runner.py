@@ -11,7 +11,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
-from engage_hri.schemas.body import AbortBehavior
+from engage_hri.schemas.body import AbortBehavior, WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import PerformFragment
@@ -21,6 +21,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, is_asked_to_stop
 from engage_hri.services.generation.body_link import BodyLink
+from engage_hri.services.generation.choosing_again import barred, named_objects, remembered, with_other_words, without
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
@@ -28,7 +29,9 @@ from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, planning, targets
+from engage_hri.services.generation.reconsideration import Reconsideration
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
+from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
 from engage_hri.services.generation.turns.heard import HeardWords
@@ -71,6 +74,7 @@ class FragmentRunner:
         self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
         self._blocks: dict[asyncio.Task[None], str] = {}
         """Tasks that wait for the end of a fragment's block, and the turn of each."""
+        self._choosing = Reconsideration(bus, config, requests, leases, self._body, self._live)
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Part of each request id, so that the ids differ after a restart."""
         self._signals = 0
@@ -90,6 +94,7 @@ class FragmentRunner:
         fragment = checked(request.fragment, world, self._bus.robot, self._config.utterance)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
+        performance.known = named_objects(fragment, world)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)
         self._events.expect(fragment.id, turn.turn)
@@ -116,12 +121,13 @@ class FragmentRunner:
 
     def feed(
         self,
-        message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress | Utterance,
+        message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress | WordSpoken | Utterance,
         now: Seconds,
     ) -> None:
         match message:
             case World():
                 self._world = message
+                self._turns.see([person.id for person in message.people], now)
             case ConnectionEvent():
                 self._events.feed(message, now)
                 self._discourse = self._discourse.hearing(message, self._bus.robot)
@@ -129,6 +135,10 @@ class FragmentRunner:
                 self._turns.feed(message, now)
             case SyncPointProgress():
                 self._follow(message)
+            case WordSpoken(block=block):
+                for performance in self._live.values():
+                    if performance.fragment.id == block and not performance.is_over:
+                        performance.hear(message)
             case Utterance():
                 self._heard.feed(message, now)
                 self._turns.hear(
@@ -156,6 +166,7 @@ class FragmentRunner:
         # A fragment that has ended is second choice, but it still hears of its events.
         performance = min(named, key=lambda each: each.is_over)
         performance.feed(progress)
+        self._choosing.look_again(self._world)
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn)
         self._follow_gaze(performance)
@@ -184,6 +195,7 @@ class FragmentRunner:
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
+        self._choosing.look_again(self._world)
         if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
             self._recognition_lost_at = None
             self._events.lose()
@@ -224,11 +236,13 @@ class FragmentRunner:
         The blocks of one turn are sent at once: each names the points of the others that it follows.
         """
         async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._choosing.keep(), name="choices")
             while True:
                 performance = await self._line.get()
                 turn = performance.turn.turn
                 if before := [block for block, its in self._blocks.items() if its != turn]:
                     await asyncio.wait(before)
+                await self._choosing.all_made(turn)
                 if not performance.is_over and (pending := await self._begin(performance)) is not None:
                     block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
                     self._blocks[block] = turn
@@ -237,8 +251,8 @@ class FragmentRunner:
                     self._changed(self._bus.now())
 
     async def _begin(self, performance: FragmentPerformance) -> Pending | None:
-        """Plan and send the block of a fragment. Returns its accepted request; None if the fragment has ended."""
-        fragment, turn = performance.fragment, performance.turn
+        """Plan and send a block of a fragment. Returns its accepted request; None if the fragment has ended."""
+        fragment, turn = performance.left, performance.turn_left
         self._arbiter.stop_thinking()
         self._arbiter.speak_to(turn.addressee)
         permits = self._leases.permits
@@ -251,20 +265,30 @@ class FragmentRunner:
                 if performance.is_over:  # cancelled meanwhile
                     return None
                 assert self._world is not None
-                check_world(fragment, self._world, self._bus.robot)  # it may have changed while the fragment waited
+                world = remembered(self._world, performance.known)
+                check_world(fragment, world, self._bus.robot)  # it may have changed while the fragment waited
+                bars = barred(targets(fragment), self._world, performance.known, performance.barred)
                 body = self._body.capabilities
                 if body is not None:
                     self._arbiter.gaze_perceived_within(body.gaze_half_angle)
                 before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
                 heard, permitted, config = self._heard_in(turn), permits(), self._config
-                made = await self._body.planned(
-                    planning(fragment, turn, self._world, body, motions, permitted, config, before, heard)
-                )
+                reachable = without(motions, bars)
+                try:
+                    made = await self._body.planned(
+                        planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
+                    )
+                except Unreferable:
+                    if (freed := with_other_words(fragment, bars)) is None:
+                        raise
+                    fragment = performance.left = freed  # the author has no phrase that is enough without a gesture
+                    continue
                 if performance.is_over:  # cancelled meanwhile
                     return None
                 if permits() != permitted:
                     continue  # what was inhibited meanwhile is not begun
                 performance.begin(made)
+                performance.world = world
                 try:
                     pending = await self._send_block(performance, followed)
                 except RequestRefused:
@@ -274,6 +298,8 @@ class FragmentRunner:
                 else:
                     named = [mention.object for mention in made.mentions]
                     self._discourse = self._heard_in(turn).naming(fragment.id, named)
+                    performance.is_sent = True
+                    self._choosing.look_again(self._world)
                     return pending
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())
@@ -311,12 +337,21 @@ class FragmentRunner:
         return pending
 
     async def _await_end(self, performance: FragmentPerformance, pending: Pending) -> None:
+        """Wait for the end of a fragment: of its block, and of those with which it goes on after a new choice."""
         try:
             outcome = await pending.outcome
-            if not isinstance(outcome, BlockOutcome):
-                reason = f"the realizer answered {type(outcome).__name__}"
-                raise RunFailed(Fault(reason=reason, where=performance.block_id))
-            performance.end_with(outcome, self._bus.now())
+            while True:
+                if not isinstance(outcome, BlockOutcome):
+                    reason = f"the realizer answered {type(outcome).__name__}"
+                    raise RunFailed(Fault(reason=reason, where=performance.block_id))
+                performance.end_with(outcome, self._bus.now())
+                if performance.is_over:
+                    break
+                self._follow_gaze(performance)
+                self._discourse = self._discourse.without(performance.fragment.id, performance.unsaid)
+                if (following := await self._begin(performance)) is None:
+                    return
+                outcome = await following.outcome
         except EngageError as error:
             performance.fail(error, self._bus.now())
         with self._bus.containing(f"the end of fragment {performance.fragment.id}"):

@@ -1,7 +1,7 @@
 """One fragment from its acceptance to its outcome: what is under way, and which events it still waits for."""
 
 from collections.abc import Mapping
-from itertools import zip_longest
+from typing import Literal
 
 from msgspec import Struct
 
@@ -16,12 +16,23 @@ from engage_hri.schemas.behaviors import (
     Speech,
     TurnSignal,
 )
-from engage_hri.schemas.blocks import BlockOutcome, SpokenText
-from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.faults import EngageError, Fault, OutcomeUnknown
 from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
 from engage_hri.schemas.speakable import has_words
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.acts import (
+    Act,
+    eye_contact,
+    last_choices,
+    reasons,
+    references_made,
+    rest_of,
+    unshown,
+)
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.references.policy import Unreferable
@@ -29,6 +40,8 @@ from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, C
 from engage_hri.services.generation.turns.events import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
 
+MOST_TRIES = 5
+"""Number of blocks after which the gestures of a reference that is to be chosen again are not tried any more."""
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair is not: a person's answer may take long."""
 Looks = Gaze | GazeShift | HeadDirectionShift
@@ -39,8 +52,7 @@ class Ended(Struct, frozen=True):
     """The end of a fragment's block. at: local time."""
 
     at: Seconds
-    status: str
-    spoken: tuple[SpokenText, ...] = ()
+    status: Literal["done", "failed", "interrupted", "unknown"]
     replaced_by: str = ""
     fault: Fault | None = None
 
@@ -57,6 +69,21 @@ class FragmentPerformance:
         self.turn = turn
         self.block_id = ""
         self.plan: FragmentPlan | None = None
+        """The plan of the block that is on its way or performed; None before, and between two blocks."""
+        self.left, self.turn_left = fragment, turn
+        """What has not been performed of fragment and turn: all, unless a reference is chosen again."""
+        self.is_sent = False
+        """True once the realizer has accepted the block of `plan`."""
+        self.world: World | None = None
+        """The world for which references were chosen, or found to be chosen still."""
+        self.known: Mapping[str, Entity] = {}
+        """What the fragment refers to, as it was when the fragment came."""
+        self.barred: dict[str, dict[str, str]] = {}
+        """Gestures, `gaze` and `point`, that failed for objects, and why: they are not chosen again."""
+        self._unspoken: dict[str, str] = {}
+        """Speeches that were dropped, and why."""
+        self.acts: list[Act] = []
+        """All blocks so far."""
         self.accepted = False
         self.refusal: Fault | None = None
         """Set when the realizer found the block impossible before the fragment was accepted: nothing has moved."""
@@ -77,7 +104,6 @@ class FragmentPerformance:
         self._forbidden: set[str] = set()
         self.lost_motions_only = False
         """True if it failed because nothing of its block could be performed, and it had no words."""
-        self._reached: set[tuple[str, str]] = set()
         self._ended: Ended | None = None
 
     def begin(self, plan: FragmentPlan) -> None:
@@ -87,8 +113,11 @@ class FragmentPerformance:
         """
         self._tries += 1
         self.block_id = f"{self.request.id}.block" + (f"-{self._tries}" if self._tries > 1 else "")
+        if self.plan is not None:  # that block was refused
+            self.acts.pop()
         self.plan = plan
-        self._warnings = list(plan.warnings)
+        self.acts.append(Act(plan))
+        self._warnings += [each for each in plan.warnings if each not in self._warnings]
         self._behaviors = {behavior.id: behavior for behavior in plan.block.behaviors}
 
     def feed(self, progress: SyncPointProgress) -> None:
@@ -96,7 +125,7 @@ class FragmentPerformance:
         behavior = self._behaviors.get(progress.behavior)
         if behavior is None:
             return
-        self._reached.add((behavior.id, progress.sync))
+        self.acts[-1].reached.add((behavior.id, progress.sync))
         if progress.sync == "start":
             self._running[behavior.id] = behavior
             if isinstance(behavior, Looks):
@@ -110,6 +139,20 @@ class FragmentPerformance:
             self._closed.add(behavior.id)
             if self._gaze == behavior.id and isinstance(behavior, Gaze):
                 self._gaze = ""
+
+    def hear(self, word: WordSpoken) -> None:
+        """Take a word that the voice has said."""
+        if self.plan is not None:
+            self.acts[-1].heard[word.behavior] = word.position
+
+    @property
+    def _reached(self) -> set[tuple[str, str]]:
+        return self.acts[-1].reached if self.acts else set()
+
+    @property
+    def may_choose_again(self) -> bool:
+        """True while a reference may be chosen again: until then nobody knows what its words will be."""
+        return not self.is_over and (self.plan is None or bool(self.acts[-1].open_hinges))
 
     @property
     def gaze(self) -> Looks | None:
@@ -133,9 +176,9 @@ class FragmentPerformance:
     @property
     def unsaid(self) -> frozenset[str]:
         """Ids of the objects that the fragment was to refer to, and has not."""
-        mentions = self.plan.mentions if self.plan is not None else ()
-        said = {mention.object for mention in mentions if mention.by in self._reached}
-        return frozenset(mention.object for mention in mentions) - said
+        mentions = [(mention, mention.by in act.reached) for act in self.acts for mention in act.plan.mentions]
+        said = {mention.object for mention, has_come in mentions if has_come}
+        return frozenset(mention.object for mention, _ in mentions) - said
 
     @property
     def moving(self) -> tuple[BlockBehavior, ...]:
@@ -163,10 +206,13 @@ class FragmentPerformance:
             self._running.clear()
 
     def fail(self, error: EngageError, at: Seconds) -> None:
-        """Note that no block could be made or sent, or that it went wrong."""
+        """Note that no block could be made or sent, or that nobody knows what became of it."""
         if isinstance(error, Unreferable):
             self._considered = error.choices
-        self.end(Ended(at, "failed", fault=error.fault))
+        is_unknown = isinstance(error, OutcomeUnknown)
+        if is_unknown and self.plan is not None:
+            self.acts[-1].spoken = self.acts[-1].said_so_far
+        self.end(Ended(at, "unknown" if is_unknown else "failed", fault=error.fault))
 
     def refuse(self, fault: Fault, at: Seconds) -> None:
         """Note that the realizer refused the block. A fragment that had been accepted already has failed."""
@@ -174,26 +220,53 @@ class FragmentPerformance:
         self.end(Ended(at, "failed", fault=fault))
 
     def end_with(self, outcome: BlockOutcome, at: Seconds) -> None:
-        """Take the outcome of the block. A fragment with words of which none was spoken has failed."""
-        given = zip_longest(outcome.dropped, outcome.reasons[: len(outcome.dropped)], fillvalue="")
-        why = {id: reason.removeprefix(f"{id}: ") for id, reason in given}
-        self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in why.items()]
-        self._started -= set(outcome.dropped)
+        """Take the outcome of a block. If a reference is to be chosen again, the fragment goes on with `left`.
+
+        A fragment with words of which none was spoken has failed.
+        """
+        act, why = self.acts[-1], reasons(outcome)
+        act.spoken = outcome.spoken
+        self._started -= {*outcome.dropped, *outcome.interrupted}
+        rest = rest_of(self.left, self.turn_left, act, outcome) if self._may_go_on(outcome, why) else None
+        # What fell with another behavior is not worth a word: that one is named.
+        fallen = {each.id for each in act.plan.block.behaviors if {*each.needs} & {*why, *outcome.interrupted}}
+        told = {id: reason for id, reason in why.items() if id not in fallen}
+        self._unspoken |= {id: reason for id, reason in told.items() if self._speaks(id)}
+        self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in told.items()]
+        if rest is not None:
+            self.left, self.turn_left, self.plan, self.is_sent = rest.fragment, rest.turn, None, False
+            for each in act.plan.made:
+                if each.reference in rest.again:
+                    self.barred.setdefault(each.object, {}).update(rest.again[each.reference])
+                    if self._tries >= MOST_TRIES:
+                        self.barred[each.object] = dict.fromkeys(("gaze", "point"), "it has failed too often")
+            self._running.clear()
+            self._gaze = ""
+            return
         status, fault = outcome.status, outcome.fault
-        silence = self._silence(outcome, why)
-        none_left = self._behaviors.keys() <= why.keys() and not any(it.required for it in self._behaviors.values())
+        silence = self._silence()
+        none_left = self._none_left(why)
         if silence is not None and (status == "done" or none_left):
             status, fault = "failed", silence
         self.lost_motions_only = status == "failed" and none_left and silence is None
-        self.end(Ended(at, status, outcome.spoken, outcome.replaced_by, fault))
+        self.end(Ended(at, status, outcome.replaced_by, fault))
 
-    def _silence(self, outcome: BlockOutcome, why: Mapping[str, str]) -> Fault | None:
+    def _none_left(self, why: Mapping[str, str]) -> bool:
+        return self._behaviors.keys() <= why.keys() and not any(it.required for it in self._behaviors.values())
+
+    def _may_go_on(self, outcome: BlockOutcome, why: Mapping[str, str]) -> bool:
+        """True if the block ended by itself: because all came, or fell."""
+        return outcome.status == "done" or (outcome.status == "failed" and self._none_left(why))
+
+    def _speaks(self, id: str) -> bool:
+        return isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)
+
+    def _silence(self) -> Fault | None:
         """Fault that names the dropped speeches of a fragment of which no word was spoken; None: there are none."""
-        unspoken = [id for id in why if isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)]
-        if not unspoken or any(has_words(spoken.text) for spoken in outcome.spoken):
+        if not self._unspoken or any(has_words(each.text) for act in self.acts for each in act.spoken):
             return None
-        reasons = "; ".join(dict.fromkeys(why[id] for id in unspoken if why[id])) or "see the block's warnings"
-        lost = f"{', '.join(unspoken)} {'was' if len(unspoken) == 1 else 'were'} dropped"
+        reasons = "; ".join(dict.fromkeys(filter(None, self._unspoken.values()))) or "see the block's warnings"
+        lost = f"{', '.join(self._unspoken)} {'was' if len(self._unspoken) == 1 else 'were'} dropped"
         return Fault(reason=f"none of its words was spoken: {lost}: {reasons}", where=self.fragment.id)
 
     @property
@@ -217,17 +290,23 @@ class FragmentPerformance:
         undecided = [id for id in sorted(self._started) if not self._decided(id, events)]
         if undecided and self.deadline is not None and now < self.deadline:
             return None
-        status = self._ended.status
-        assert status in ("done", "failed", "interrupted")
+        mine = [event for event in events.of_turn(self.turn.turn) if event.block == self.fragment.id]
+        made = references_made(self.acts, mine)
         return FragmentOutcome(
             id=self.request.id,
             fragment=self.fragment.id,
-            status=status,  # type: ignore[arg-type]
-            spoken=self._ended.spoken,
+            status=self._ended.status,
+            spoken=tuple(each for act in self.acts for each in act.spoken),
+            references=made,
+            eye_contact=eye_contact(self.acts, mine),
             replaced_by=self._ended.replaced_by,
             events=events.of_turn(self.turn.turn),
-            choices=self.plan.choices if self.plan else self._considered,
-            warnings=(*self._warnings, *(f"{id} was never decided" for id in undecided)),
+            choices=last_choices(self.acts) or self._considered,
+            warnings=(
+                *self._warnings,
+                *unshown(self.acts, made),
+                *(f"{id} was never decided" for id in undecided),
+            ),
             fault=self._ended.fault,
         )
 

@@ -7,7 +7,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
-from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.body import RobotState, WordSpoken
 from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
@@ -37,7 +37,8 @@ from engage_hri.services.runtime.world_report import WorldReport
 NAME = "generation"
 PATTERNS = (
     *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD,
-    keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
+    keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE,
+    keys.ANY_STATISTICS,
 )  # fmt: skip
 
 
@@ -120,7 +121,7 @@ class _Generation:
                     self._runner.feed(message, now)
             case RobotState() | Statistics():
                 self._arbiter.feed(message, now)
-            case SyncPointProgress():
+            case SyncPointProgress() | WordSpoken():
                 self._runner.feed(message, now)
             case Unreadable(block=block, fault=fault):
                 self._warn(block, "PARSING_FAILURE", fault.within(block))

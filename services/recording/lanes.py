@@ -6,6 +6,9 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
 
+SHORTEST: Seconds = 0.001
+"""Shortest annotation: annotation tools count milliseconds."""
+
 
 class Annotation(Struct, frozen=True):
     """A stretch of time with what is said of it."""
@@ -30,14 +33,29 @@ class Tier(Struct, frozen=True):
 
 
 def apart(actor: str, name: str, annotations: Iterable[Annotation]) -> Iterator[Tier]:
-    """Make tiers in which nothing overlaps."""
+    """Make tiers in which nothing overlaps.
+
+    An instant, such as a dash between two words, is given the shortest length. That is no overlap: what follows it
+    begins so much later.
+    """
     lanes: list[list[Annotation]] = []
+    ends: list[Seconds] = []
+    """Of each lane the end of its last annotation as it really was."""
     for one in sorted(annotations, key=lambda one: (one.begin, one.end)):
-        begin, _ = one.milliseconds
-        lane = next((lane for lane in lanes if lane[-1].milliseconds[1] <= begin), None)
-        if lane is None:
-            lanes.append(lane := [])
-        lane.append(one)
+        at = round(one.begin * 1000)
+        number = next((number for number, end in enumerate(ends) if round(end * 1000) <= at), len(lanes))
+        if number == len(lanes):
+            lanes.append([])
+            ends.append(0.0)
+        begin = one.begin
+        if lanes[number]:
+            last = lanes[number][-1]
+            until = last.milliseconds[1]
+            if until > at or (last.end > ends[number] and last.end > begin):
+                begin = max(until / 1000, last.end)
+        ends[number] = max(one.begin, one.end)
+        end = one.end if one.end - begin >= SHORTEST - 1e-9 else begin + SHORTEST
+        lanes[number].append(Annotation(begin, end, one.value))
     for number, lane in enumerate(lanes, 1):
         yield Tier(f"{actor} {name}" if number == 1 else f"{actor} {name} {number}", actor, tuple(lane))
 

@@ -37,6 +37,8 @@ class Recorder:
 
     def __init__(self, bus: Bus, file: RecordingFile, began: Seconds, wall: int) -> None:
         self.losses = Losses()
+        self.is_whole = False
+        """True once the file has its end."""
         self.messages = 0
         self._bus = bus
         self._file = file
@@ -111,7 +113,7 @@ class Recorder:
         """End the file. Returns False if something found no room on the disk."""
         self.look()
         note = {"messages": str(self.messages), "lost": str(self.losses.total)}
-        is_whole = self._file.close(note)
+        self.is_whole = is_whole = self._file.close(note)
         self.losses = replace(self.losses, disk=self._file.dropped)  # what waited for room to the end, too
         return is_whole
 

@@ -23,8 +23,6 @@ from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.times import Times, messages
 from engage_hri.services.runtime.ongoing_actions import ends
 
-SHORTEST: Seconds = 0.001
-"""Shortest annotation: annotation tools count milliseconds."""
 NAMES = {
     "speak": "speech", "look": "gaze", "point": "points", "nod": "nods", "shake": "shakes", "act": "manipulations",
 }  # fmt: skip
@@ -263,8 +261,7 @@ class _Collected:
         if end < 0:
             return
         begin = max(0.0, begin)
-        annotation = Annotation(begin, max(end, begin + SHORTEST), value)
-        self._found.setdefault((actor, name), []).append(annotation)
+        self._found.setdefault((actor, name), []).append(Annotation(begin, max(begin, end), value))
 
     def tiers(self, end: Seconds) -> list[Tier]:
         """End what goes on, and make the tiers."""

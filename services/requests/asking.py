@@ -16,7 +16,7 @@ from math import inf
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError, Fault, NeverEnded, RequestRefused, RunFailed, ServerRestarted
+from engage_hri.schemas.faults import EngageError, Fault, NeverEnded, OutcomeUnknown, RequestRefused, ServerRestarted
 from engage_hri.schemas.requests import (
     Accepted,
     Answer,
@@ -300,7 +300,7 @@ class Asking:
         self._fail(asked, error, why)
 
     def _tell_silent(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        self._fail(asked, RunFailed, f"is there, but has not answered for {self._patience.silence:g} s")
+        self._fail(asked, OutcomeUnknown, f"is there, but has not answered for {self._patience.silence:g} s")
 
     def _tell_unstoppable(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         why = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
@@ -390,8 +390,8 @@ _ACTIONS: Mapping[Do, Callable[[Asking, Asked, Seconds, _Said], None]] = {
     Do.TELL_ACCEPTED: Asking._tell_accepted,
     Do.TELL_OUTCOME: Asking._tell_outcome,
     Do.TELL_REFUSED: partial(Asking._tell_refused, error=RequestRefused),
-    Do.TELL_FORGOTTEN: partial(Asking._tell_refused, error=RunFailed),
-    Do.TELL_GONE: partial(Asking._tell_failed, error=RunFailed, why="is gone"),
+    Do.TELL_FORGOTTEN: partial(Asking._tell_refused, error=OutcomeUnknown),
+    Do.TELL_GONE: partial(Asking._tell_failed, error=OutcomeUnknown, why="is gone"),
     Do.TELL_REBORN: partial(Asking._tell_failed, error=ServerRestarted, why="was restarted"),
     Do.TELL_SILENT: Asking._tell_silent,
     Do.TELL_UNSTOPPABLE: Asking._tell_unstoppable,

@@ -22,6 +22,7 @@ from engage_hri.schemas.faults import (
     Fault,
     InputRefused,
     NeverEnded,
+    OutcomeUnknown,
     RequestRefused,
     RunFailed,
     ServerRestarted,
@@ -171,11 +172,11 @@ class Requester:
         self._fail_all(self._broken or RunFailed("the client is closed"))
 
     def _fail_all(self, error: EngageError) -> None:
-        """End all requests with `error`, and refuse all that come later."""
+        """End all requests as unknown, and refuse all that come later with `error`."""
         self._broken = error
         self._alarm.stop()
         for pending in self._pending.values():
-            pending.end(error)
+            pending.end(OutcomeUnknown(error.fault))
         self._pending.clear()
 
     # -- listening by itself ----------------------------------------------------------------------------------------

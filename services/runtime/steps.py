@@ -4,10 +4,11 @@
 microseconds each. What is worked on must not change meanwhile. `finished` does it all in one go.
 """
 
-from collections.abc import Collection, Generator, Iterator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from typing import ParamSpec, TypeVar
 
 T = TypeVar("T")
+P = ParamSpec("P")
 
 Steps = Generator[int, None, T]
 """Work in steps; returns its result."""
@@ -24,6 +25,11 @@ def finished(steps: Steps[T]) -> T:
         except StopIteration as end:
             result: T = end.value
             return result
+
+
+def in_one_go(work: Callable[P, Steps[T]]) -> Callable[P, T]:
+    """The same work as a plain function."""
+    return lambda *args, **rest: finished(work(*args, **rest))
 
 
 def portions(elements: Collection[T], size: int = PORTION) -> Iterator[Sequence[T]]:

@@ -1,14 +1,16 @@
 """Who waits for a robot that is not there is told which are: over real sockets."""
 
+import asyncio
 import logging
 
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.status import BusHealth, Reachable, Status
+from engage_hri.schemas.status import BusHealth, ProcessFacts, Reachable, Status
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.zenoh import neighbors
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.bus.zenoh.neighbors import Unseen, robots, tell_who_is_missing, told, unseen
+from engage_hri.services.bus.zenoh.neighbors import Unseen, hinting, robots, tell_who_is_missing, told, unseen
 from engage_hri.services.bus.zenoh.session import open_session
 from tests.bus.places import free_endpoint
 
@@ -85,11 +87,19 @@ async def test_who_waits_at_an_encrypted_endpoint_is_told_of_keys(caplog: pytest
     assert "the router lets in only --keys that it knows, and shows nothing to revoked ones" in caplog.text
 
 
-def status(name: str, *peers: str, **places: str) -> Status:
+def status(name: str, *peers: str, host: str = "", **places: str) -> Status:
     health = BusHealth(
         peers=(name, *peers), reachable=tuple(Reachable(each, (place,)) for each, place in places.items())
     )
-    return Status(participant=name, run="1", version="1", at=Stamp("c", 0.0), joined=Stamp("c", 0.0), bus=health)
+    return Status(
+        participant=name,
+        run="1",
+        version="1",
+        at=Stamp("c", 0.0),
+        joined=Stamp("c", 0.0),
+        bus=health,
+        process=ProcessFacts(host=host),
+    )
 
 
 def test_what_others_see_is_told_with_the_reason_why_it_cannot_be_seen_from_here() -> None:
@@ -114,3 +124,37 @@ def test_what_others_see_is_told_with_the_reason_why_it_cannot_be_seen_from_here
         "control cannot be seen from here, though realizer can see it: it is a client of a router that this process"
         " has no link to"
     ]
+
+
+def test_on_one_machine_who_is_not_in_sight_is_only_slow() -> None:
+    """As with `engage record` beside `engage up` on a busy machine: all listen on loopback, and can be reached."""
+    control = status("control", "realizer", host="here", realizer="tcp/127.0.0.1:41111")
+
+    assert told(unseen(["realizer"], [control], "here")) == [
+        "realizer is not in sight yet, though control can see it; waiting"
+    ]
+    (elsewhere,) = told(unseen(["realizer"], [control], "there"))
+    assert "127.0.0.1 only" in elsewhere
+
+
+async def test_who_comes_after_all_is_told(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(neighbors, "LOOK", 0.05)
+    lines, missed, come = list[str](), asyncio.Event(), asyncio.Event()
+
+    def take(line: str) -> None:
+        lines.append(line)
+        missed.set()
+        if line.startswith("in sight now"):
+            come.set()
+
+    endpoint = free_endpoint()
+    async with (
+        await open_hub("robot", listen=[endpoint]) as hub,
+        hinting(hub.join("me"), [endpoint], ("control",), take),
+        asyncio.timeout(20),
+    ):
+        await missed.wait()
+        hub.join("control").declare_alive()
+        await come.wait()
+
+    assert lines[-1] == "in sight now: control"

@@ -3,14 +3,18 @@
 import importlib.util
 import socket
 import sys
+from pathlib import Path
 
 import pytest
 
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.commandline import windowed
+from engage_hri.services.commandline.console import kept_token
+from engage_hri.services.recording.disk import read
 from tests.bus.places import free_endpoint
 from tests.cli.command import Engage
 
-needs_console = pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="needs the extra `console`")
+needs_console = pytest.mark.skipif(importlib.util.find_spec("starlette") is None, reason="needs the extra `console`")
 
 
 def test_without_the_extra_the_window_names_it(engage: Engage, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,7 +25,61 @@ def test_without_the_extra_the_window_names_it(engage: Engage, monkeypatch: pyte
 
     assert told.code == 2
     assert "uvicorn is not installed" in told.err
-    assert "engage-hri[console]" in told.err
+    assert "[console]'" in told.err
+
+
+@pytest.mark.parametrize("option", ["--you", "--window"])
+def test_a_demo_whose_window_is_not_installed_names_the_extra_and_ends(
+    engage: Engage, monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+
+    told = engage("demo", option)
+
+    assert told.code == 2
+    assert told.err.count("\n") == 1
+    assert "uvicorn is not installed" in told.err
+
+
+@needs_console
+def test_a_demo_whose_window_cannot_listen_says_so_in_one_line_and_ends(engage: Engage) -> None:
+    told = engage("demo", "--you", "--host", "203.0.113.9")
+
+    assert told.code == 3
+    assert told.err.count("\n") == 1
+    assert "--host takes an address of this machine" in told.err
+
+
+def test_a_demo_is_recorded(engage: Engage, tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    told = engage("demo", "--virtual-time", "--quiet", "--record", tmp_path / "demo.mcap")
+
+    recording = read(tmp_path / "demo.mcap")
+    assert told.code == 0
+    assert recording.is_whole
+    assert len(recording) > 1000
+    assert engage("demo", "--virtual-time", "--record", tmp_path / "demo.mcap").code == 2
+
+
+def test_a_token_is_made_for_its_owner_alone_and_stays(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+
+    assert kept_token(file) == kept_token(file) == file.read_text().strip()
+    assert len(kept_token(file)) >= 16
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize(
+    ("content", "mode", "reason"),
+    [("short", 0o600, "no token"), ("with spaces in it", 0o600, "no token"), ("a-good-token-here", 0o644, "others")],
+)
+def test_a_file_that_holds_no_secret_is_refused(tmp_path: Path, content: str, mode: int, reason: str) -> None:
+    file = tmp_path / "token"
+    file.write_text(content)
+    file.chmod(mode)
+
+    with pytest.raises(InputRefused, match=reason):
+        kept_token(file)
 
 
 @needs_console
@@ -63,5 +121,5 @@ def test_the_demo_opens_a_window_only_where_somebody_sees_it(
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
 
     assert windowed.can_open(terminal) is opens
-    monkeypatch.setattr(windowed, "NEEDED", "no_such_package")
+    monkeypatch.setattr(windowed, "NEEDED", ("no_such_package",))
     assert windowed.can_open(terminal) is False

@@ -184,7 +184,7 @@ def test_without_matplotlib_nothing_is_played(
     result = engage("simulate", *PEOPLE, "--out", tmp_path / "new")
 
     assert (result.code, result.out) == (2, "")
-    assert "pip install 'engage-hri[study]'" in result.err
+    assert "[study]'" in result.err
     assert not (tmp_path / "new").exists()
 
 

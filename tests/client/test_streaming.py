@@ -181,7 +181,7 @@ async def test_a_refused_fragment_ends_the_turn_and_is_told(hub: MemoryHub) -> N
     )  # fmt: skip
     outcomes = await spoken(hub, generation, writing("One. ", "A [cop]. ", "Three. ", "Four."))
 
-    assert [each.status for each in outcomes] == ["done", "failed"]
+    assert [each.status for each in outcomes] == ["done", "refused"]
     assert generation.statuses == ["beginning", "middle", "end"]
     assert generation.heard[-1][1].behaviors == ()
     told = summary(*outcomes)
@@ -192,7 +192,7 @@ async def test_nothing_is_ended_where_the_first_fragment_was_refused(hub: Memory
     generation = Generation(lambda fragment: Fault(reason="nobody is here"))
     outcomes = await spoken(hub, generation, writing("One. ", "Two. "))
 
-    assert [each.status for each in outcomes] == ["failed"]
+    assert [each.status for each in outcomes] == ["refused"]
     assert generation.statuses == ["beginning"]
 
 

@@ -6,9 +6,10 @@ from typing import Any
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.web.frames import HEARTBEAT, Told, Viewer, You
+from engage_hri.services.console.web.frames import HEARTBEAT, Viewer, You
 from engage_hri.services.console.web.lanes import KEPT
 from engage_hri.services.console.web.picture import BLOCK, SECTIONS, Picture
+from engage_hri.services.console.web.receipts import Receipts
 from tests.console.scenes import at
 from tests.console.test_picture import RUN, picture
 
@@ -61,6 +62,11 @@ def test_a_heartbeat_comes_when_nothing_happens_and_news_for_the_visitor_at_once
 
     assert frame(viewer, made, 10.0 + HEARTBEAT) == {"now": HEARTBEAT}
     assert frame(viewer, made, 11.1, you=You(person="ann"))["you"]["person"] == "ann"
-    assert frame(viewer, made, 11.2, you=You(person="ann"), told=(Told("part", "no"),)) == {
-        "now": 1.2, "told": [{"panel": "part", "text": "no"}],
+    receipts = Receipts("here")
+    receipts.tell("part", "no")
+    assert frame(viewer, made, 11.2, you=You(person="ann"), receipts=receipts) == {
+        "now": 1.2, "session": "here", "taken": 0, "told": [{"number": 1, "panel": "part", "text": "no"}],
     }  # fmt: skip
+    receipts.confirm()
+    receipts.take(1)
+    assert frame(viewer, made, 11.3, you=You(person="ann"), receipts=receipts) == {"now": 1.3, "taken": 1}

@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import AsyncIterator, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import aiohttp
@@ -15,10 +16,11 @@ from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
 from tests.console.windows import URL, engage
+from tests.random_cases import trials
 
 pytestmark = [
     pytest.mark.real_time,
-    pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="the extra `console` is not installed"),
+    pytest.mark.skipif(importlib.util.find_spec("starlette") is None, reason="the extra `console` is not installed"),
     pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium on this machine"),
 ]
 MOST_VIEWERS = 100
@@ -26,7 +28,11 @@ SCRIPT = [{"turn_status": "full", "parts": [{"say": "Good morning."}]}]
 SENT = """
 window.sent = [];
 const send = WebSocket.prototype.send;
-WebSocket.prototype.send = function (text) { window.sent.push(JSON.parse(text).do); return send.call(this, text); };
+WebSocket.prototype.send = function (text) {
+  const said = JSON.parse(text);
+  window.sent.push(said.order?.do ?? said.do);
+  return send.call(this, text);
+};
 """
 
 
@@ -127,6 +133,7 @@ async def test_a_key_that_is_held_sends_its_fragment_once(place: Place) -> None:
     async with opened(place) as page:
         await page.until("document.querySelectorAll('.script button').length")
         await page.value(SENT)
+        await take(page, sections={"health": services()})
         await page.value("document.activeElement.blur()")
         for repeat in ("false", "true", "true", "true"):
             key = f"new KeyboardEvent('keydown', {{ key: '1', repeat: {repeat} }})"
@@ -186,6 +193,35 @@ async def test_who_finds_no_room_is_told_so_in_words_and_gets_in_when_there_is_r
             await page.until(
                 "window.engage.state.nets && !document.querySelector('.away').textContent.includes('100')"
             )
+
+
+async def test_each_order_is_taken_once_in_the_order_given_or_reported_whatever_becomes_of_links(
+    place: Place,
+) -> None:
+    model = (Path(__file__).parent / "queue_model.js").read_text()
+    async with opened(place) as page:
+        found = await page.value(f"({model})({20 if trials() is None else 3})")
+
+    assert found["bad"] == 0
+    assert found["done"] > 1000
+    assert found["reported"] > 20
+
+
+async def test_what_cannot_work_is_disabled_and_says_why_and_does_nothing(place: Place) -> None:
+    stop = "document.querySelector('#wizard .stop')"
+    async with opened(place) as page:
+        await take(page, sections={"health": services("realizer")})
+        assert await page.value(f"{stop}.getAttribute('aria-disabled')") == "true"
+        assert await page.value(f"{stop}.getAttribute('aria-description')") == "realizer is not on the bus"
+        assert "realizer is not on the bus" in await page.value("document.querySelector('#wizard').innerText")
+        await page.value(SENT)
+        await page.value(f"{stop}.click()")
+        assert "steer" not in await page.value("window.sent")
+        assert "Stop cannot work now" in await page.value("document.querySelector('#wizard .told').textContent")
+
+        await take(page, sections={"health": services()})
+        await page.value(f"{stop}.click()")
+        assert "steer" in await page.value("window.sent")
 
 
 HASTY = """

@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
+from msgspec import Raw
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
@@ -12,6 +13,8 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.console.web.orders import Given
+from engage_hri.services.console.web.receipts import Receipts, Told
 from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.seats import Seats
 from engage_hri.services.console.web.service import window
@@ -38,7 +41,7 @@ async def visitors(hub: MemoryHub, windows: int, each: int) -> AsyncIterator[lis
             bus = hub.join(f"console-{number}", role="wizard")
             shown = await stack.enter_async_context(window(hub, bus, Script(())))
             bus.declare_alive()
-            made += [Visitor(shown, True) for _ in range(each)]
+            made += [Visitor(shown, True, Receipts()) for _ in range(each)]
         await asyncio.sleep(0.1)
         yield made
         for visitor in made:
@@ -54,8 +57,20 @@ async def places(hub: MemoryHub) -> list[tuple[float, ...]]:
     return [person.position for person in received.message.people]
 
 
+def give(visitor: Visitor, order: str) -> None:
+    """Give an order, as the page does."""
+    visitor.take(Given(number=1, order=Raw(order.encode())))
+
+
+def news(visitor: Visitor) -> tuple[Told, ...]:
+    """News of the orders since this was asked last."""
+    told = visitor.receipts.news()
+    visitor.receipts.confirm()
+    return told
+
+
 def told(visitor: Visitor) -> str:
-    return " ".join(each.text for each in visitor.told())
+    return " ".join(each.text for each in news(visitor))
 
 
 @pytest.mark.parametrize(("windows", "each"), [(1, 2), (2, 1), (2, 2), (3, 3)])
@@ -64,7 +79,7 @@ async def test_who_takes_one_name_at_once_gets_it_alone_and_the_others_are_told(
 ) -> None:
     async with visitors(hub, windows, each) as everybody:
         for visitor in everybody:
-            visitor.take('{"do": "sit", "name": "ann"}')
+            give(visitor, '{"do": "sit", "name": "ann"}')
         await asyncio.sleep(3.0)
 
         assert sorted(visitor.you.person for visitor in everybody) == [""] * (windows * each - 1) + ["ann"]
@@ -77,7 +92,7 @@ async def test_who_takes_any_seat_at_once_gets_a_name_and_a_place_of_their_own(
 ) -> None:
     async with visitors(hub, windows, each) as everybody:
         for visitor in everybody:
-            visitor.take('{"do": "sit"}')
+            give(visitor, '{"do": "sit"}')
         await asyncio.sleep(10.0)
 
         names = {visitor.you.person for visitor in everybody}
@@ -88,14 +103,14 @@ async def test_who_takes_any_seat_at_once_gets_a_name_and_a_place_of_their_own(
 
 async def test_who_asks_twice_sits_once_and_may_come_again_after_leaving(hub: MemoryHub) -> None:
     async with visitors(hub, 1, 1) as [visitor]:
-        visitor.take('{"do": "sit", "name": "ann"}')
-        visitor.take('{"do": "sit", "name": "bob"}')
+        give(visitor, '{"do": "sit", "name": "ann"}')
+        give(visitor, '{"do": "sit", "name": "bob"}')
         await asyncio.sleep(2.0)
         assert (visitor.you.person, len(await places(hub))) == ("ann", 1)
 
-        visitor.take('{"do": "leave"}')
+        give(visitor, '{"do": "leave"}')
         await asyncio.sleep(1.0)
-        visitor.take('{"do": "sit", "name": "ann"}')
+        give(visitor, '{"do": "sit", "name": "ann"}')
         await asyncio.sleep(2.0)
         assert visitor.you.person == "ann"
 
@@ -117,7 +132,7 @@ async def test_a_seat_whose_window_was_killed_is_free_again(hub: MemoryHub) -> N
 @pytest.mark.parametrize("name", ["cup", "robot", "all", "a/b"])
 async def test_a_name_of_a_thing_or_of_the_robot_is_refused_with_the_reason(hub: MemoryHub, name: str) -> None:
     async with visitors(hub, 1, 1) as [visitor]:
-        visitor.take(f'{{"do": "sit", "name": "{name}"}}')
+        give(visitor, f'{{"do": "sit", "name": "{name}"}}')
         await asyncio.sleep(2.0)
 
         assert visitor.you.person == ""

@@ -14,7 +14,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console import view
 from tests.console.scenes import Timed, at, fed
 from tests.console.test_picture import net, picture, section
-from tests.console.test_seats import visitors
+from tests.console.test_seats import give, news, visitors
 
 FACE = Claim(kind="face", priority=1, target="ann", reason="spoken to last")
 
@@ -123,18 +123,18 @@ async def test_an_order_whose_service_is_gone_says_at_once_that_it_waits_and_the
     hub: MemoryHub, order: str, server: str
 ) -> None:
     async with visitors(hub, windows=1, each=1) as (visitor,):
-        visitor.take(order)
-        assert [each.text for each in visitor.told()] == [
+        give(visitor, order)
+        assert [each.text for each in news(visitor)] == [
             f"{server} is not on the bus: this waits for it, 5 s at most"
         ]
         await asyncio.sleep(5.1)
 
-        (told,) = visitor.told()
+        (told,) = news(visitor)
         assert f"no answer within 5.0 s (is {server} running?)" in told.text
 
 
 async def test_letting_the_gaze_go_waits_for_nobody(hub: MemoryHub) -> None:
     async with visitors(hub, windows=1, each=1) as (visitor,):
-        visitor.take('{"do": "inhibit", "on": false}')
+        give(visitor, '{"do": "inhibit", "on": false}')
 
-        assert visitor.told() == ()
+        assert news(visitor) == ()

@@ -6,7 +6,7 @@ import json
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import aiohttp
 import msgspec
@@ -20,7 +20,7 @@ from tests.console.windows import URL, engage
 
 pytestmark = [
     pytest.mark.real_time,
-    pytest.mark.skipif(importlib.util.find_spec("nicegui") is None, reason="the extra `console` is not installed"),
+    pytest.mark.skipif(importlib.util.find_spec("starlette") is None, reason="the extra `console` is not installed"),
 ]
 needs_browser = pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium on this machine")
 SCRIPT = [{"turn_status": "full", "turn_index": 3, "parts": [{"say": "Good morning to you."}]}]
@@ -274,9 +274,10 @@ async def test_what_is_no_order_is_told_and_ends_nothing(place: Place) -> None:
     frames = place.url.replace("http", "ws").replace("/?", "/frames?")
     origin = {"Origin": place.url.rpartition("/")[0]}
     async with aiohttp.ClientSession() as session, session.ws_connect(frames, headers=origin) as socket:
-        for text in ("nonsense", '{"do": "look"}', '{"do": "steer", "to": "continue"}'):
-            await socket.send_str(text)
-        told: list[dict[str, str]] = []
+        await socket.send_str("nonsense")
+        for number, order in enumerate(('{"do": "look"}', '{"do": "steer", "to": "continue"}'), 1):
+            await socket.send_str(f'{{"do": "order", "number": {number}, "order": {order}}}')
+        told: list[dict[str, Any]] = []
         async with asyncio.timeout(20):
             while len(told) < 3:
                 frame = await socket.receive_json()

@@ -26,7 +26,7 @@ from engage_hri.services.control.voice.sounding import EspeakVoice
 from engage_hri.services.control.voice.synthesis import Phrase
 from tests.random_cases import trials
 
-pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
 
 WORLD = World(entities=())
 ENGINE = EspeakSynthesizer(EspeakSettings())

@@ -41,7 +41,7 @@ async def test_the_synthesizer_of_the_page_speaks_by_its_file_name(tmp_path: Pat
 
 
 def test_words_are_aligned_with_sound_alone_within_the_stated_error():
-    pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+    pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
     from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
 
     engine, errors = EspeakSynthesizer(EspeakSettings()), []

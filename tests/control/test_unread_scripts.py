@@ -61,7 +61,7 @@ class Asked(EspeakSynthesizer):
 
 @pytest.fixture(scope="module")
 def engine() -> Asked:
-    pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+    pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
     return Asked(EspeakSettings())
 
 
@@ -116,7 +116,7 @@ def test_the_warning_says_what_to_do() -> None:
 
 @pytest.mark.parametrize("text", ["Привет, мир! How are you?", "你好世界", "สวัสดี"])
 async def test_a_speech_that_is_spelled_is_warned_of_and_takes_as_long_as_estimated(text: str) -> None:
-    pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+    pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
     voice = EspeakVoice()
     speech = Speech(id="s", text=text)
     async with voice.connected():

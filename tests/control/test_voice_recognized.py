@@ -21,7 +21,7 @@ TEXTS = (
 
 
 async def test_words_are_where_a_recogniser_hears_them(tmp_path: Path):
-    pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+    pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
     recogniser = Recogniser()
     voice = EspeakVoice(EspeakSettings(file=str(tmp_path / "said.wav")))
     begun: list[list[float]] = []

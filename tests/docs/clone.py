@@ -49,7 +49,8 @@ class Clone:
         for name, call in {"python": f'{python} "$@"', "engage": f'{python} -m engage_hri "$@"'}.items():
             (programs / name).write_text(f"#!/bin/sh\n{call}\n")
             (programs / name).chmod(0o755)
-        (programs.parent / ".ready").touch()  # make has nothing to do
+        for stamp in (".demo", ".ready"):
+            (programs.parent / stamp).touch()  # make has nothing to do
 
     def placed(self, text: str) -> str:
         return text.replace(RENDEZVOUS, self._endpoint)

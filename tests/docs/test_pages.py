@@ -59,6 +59,7 @@ ELSEWHERE = {
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
+    ("docs/console.md", "nginx"): "tests/console/test_path.py",
     ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }

@@ -169,7 +169,7 @@ def _all_errors(general: type[Exception] = EngageError) -> Iterator[type[Excepti
 
 def _coming(node: ast.AST, owner: str, seen: set[str]) -> Iterator[str]:
     """Names of our errors that it raises and does not catch, itself or in what it calls in the same files."""
-    for each in ast.walk(node):
+    for each in _uncaught(node):
         if isinstance(each, ast.Raise) and isinstance(each.exc, ast.Call):
             name = ast.unparse(each.exc.func)
             if isinstance(kind := _error(name), type) and issubclass(kind, EngageError | ValueError):
@@ -179,6 +179,21 @@ def _coming(node: ast.AST, owner: str, seen: set[str]) -> Iterator[str]:
             if called not in seen and (found := _found(called, owner)) is not None:
                 seen.add(called)
                 yield from _coming(found, owner, seen)
+
+
+def _uncaught(node: ast.AST) -> Iterator[ast.AST]:
+    """The node and all in it, but for what stands under a `try` that takes all of our errors."""
+    yield node
+    for field, value in ast.iter_fields(node):
+        if isinstance(node, ast.Try) and field == "body" and any(map(_takes_all, node.handlers)):
+            continue
+        for each in value if isinstance(value, list) else [value]:
+            if isinstance(each, ast.AST):
+                yield from _uncaught(each)
+
+
+def _takes_all(handler: ast.ExceptHandler) -> bool:
+    return handler.type is not None and "EngageError" in ast.unparse(handler.type)
 
 
 def _found(called: str, owner: str) -> Function | None:

@@ -51,6 +51,7 @@ def test_a_look_comes_before_its_phrase_and_lasts_until_its_end() -> None:
         turn="turn",
         anchors=("r-gaze:stroke", "r-phrase:start"),
         timing=(Timing("start", "r-gaze:start"),),
+        needs=("r-gaze",),
     )
 
 
@@ -102,7 +103,7 @@ def test_the_next_reference_waits_for_the_glance_and_for_its_arm() -> None:
 
     assert "r2-gaze:start after r1-glance:stroke" in lines(made)
     assert "r2-point:start = r1-point:stroke_end" in lines(made)
-    assert by_id(made)["r1-glance"] == Gaze(id="r1-glance", target="human")
+    assert by_id(made)["r1-glance"] == Gaze(id="r1-glance", target="human", needs=("r1-phrase",))
 
 
 def test_after_a_long_speech_head_and_arm_begin_at_home() -> None:

@@ -44,6 +44,7 @@ def test_a_full_turn_announces_the_pair_and_ends_with_a_look_at_the_face() -> No
         optional=True,
         turn="turn",
         timing=(Timing("start", "turn-gaze:start"),),
+        needs=("turn-gaze",),
     )
     assert behaviors["turn-ended"] == TurnSignal(
         id="turn-ended", turn="turn", signal="ended", actor="human", timing=(Timing("start", "s2:end"),)

@@ -117,6 +117,8 @@ async def test_a_reference_costs_what_it_takes_from_where_the_fragments_before_i
         ]
         for id in "abc":
             await partners.fragment_block(id)
+            partners.reach(id, "ref-phrase", "start")  # till then the reference may be chosen again
+        for id in "abc":
             partners.end(partners.request(id))
         sent.append(partners.send(refers("d", "end", "middle")))  # nothing moves any more
         await partners.fragment_block("d")

@@ -2,12 +2,13 @@
 
 import csv
 import io
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import praatio.textgrid
 import pympi
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
@@ -114,6 +115,27 @@ def test_nothing_overlaps_within_a_tier_and_nothing_is_lost(given: list[Annotati
         assert all(one.begin >= end - 1e-9 for one, end in zip(tier.annotations[1:], ends, strict=False))
     kept = sorted((one.begin, one.end) for tier in lanes for one in tier.annotations)
     assert kept == sorted((one.begin, one.end) for one in given)
+
+
+WORDS = st.lists(st.sampled_from((0.0, 0.0, 0.0004, 0.001, 0.0015, 0.2)), max_size=30)
+
+
+@given(st.floats(0, 9), WORDS)
+@example(0.0015, [0.001, 0.001, 0.001])
+def test_words_one_after_the_other_are_one_tier_though_some_take_no_time(begin: float, lengths: list[float]) -> None:
+    ends = [*accumulate(lengths, initial=begin)]
+    words = [Annotation(*times, str(number)) for number, times in enumerate(pairwise(ends))]
+
+    made = [*apart("a", "words", words)]
+
+    assert len(made) == bool(words)
+    assert [one.value for tier in made for one in tier.annotations] == [word.value for word in words]
+    for tier in made:
+        for before, after in pairwise(tier.annotations):
+            assert before.end <= after.begin + 1e-9
+            assert before.milliseconds[1] <= after.milliseconds[0]
+        for one, word in zip(tier.annotations, words, strict=True):
+            assert -1e-9 <= one.begin - word.begin <= 0.001 * (len(words) + 1)
 
 
 @given(st.lists(annotations, max_size=10), st.text(max_size=20))

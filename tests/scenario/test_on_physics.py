@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
-pytest.importorskip("espeakng_loader", reason="eSpeak NG is not installed: pip install 'engage-hri[voice]'")
+pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
 
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault

@@ -6,12 +6,10 @@ import pytest
 
 from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.fragments import FragmentOutcome, GestureChoice, ReferenceChoice
+from engage_hri.schemas.fragments import FragmentOutcome, ReferenceMade
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
-from engage_hri.schemas.summary import LONGEST_PROBLEM, Summary, refusal, summary
+from engage_hri.schemas.summary import LONGEST_PROBLEM, Summary, refusal, summary, unknown
 from engage_hri.schemas.units import Stamp
-
-POINT: GestureChoice = "directed_gaze_with_pointing"
 
 
 def event(kind: str, state: EventState, block: str = "f", **fields: object) -> ConnectionEvent:
@@ -20,14 +18,10 @@ def event(kind: str, state: EventState, block: str = "f", **fields: object) -> C
     return ConnectionEvent(kind=kind, state=state, block=block, at=at, started=at, **values)  # type: ignore[arg-type]
 
 
-def looked(reference: str, state: EventState, **fields: object) -> ConnectionEvent:
-    return event("directed_gaze", state, id=f"dg-{reference}", behavior=f"{reference}-event", **fields)
-
-
-def choice(reference: str, gesture: GestureChoice = POINT, phrase: str = "that cup") -> ReferenceChoice:
-    return ReferenceChoice(
-        reference=reference, target="cup", gesture=gesture, phrase=phrase, reliability=0.9, cost=1.0
-    )  # fmt: skip
+def made(
+    by: str = "pointing", looked: bool | None = None, delay: float | None = None, phrase: str = "that cup"
+) -> ReferenceMade:
+    return ReferenceMade(reference="r", object="cup", by=by, phrase=phrase, looked=looked, delay=delay)  # type: ignore[arg-type]
 
 
 def outcome(id: str = "f", status: str = "done", **fields: object) -> FragmentOutcome:
@@ -40,12 +34,9 @@ def said(*texts: str, complete: bool = True) -> tuple[SpokenText, ...]:
 
 DONE = outcome(
     spoken=said("Please take", "that cup", "away."),
-    choices=(choice("r"),),
-    events=(
-        event("adjacency_pair", "succeeded", response="act", delay=-0.204, turn="f"),
-        looked("r", "completed", delay=0.4151),
-        event("mutual_facial_gaze", "failed", delay=1.9),
-    ),
+    references=(made(looked=True, delay=0.4151),),
+    eye_contact=False,
+    events=(event("adjacency_pair", "succeeded", response="act", delay=-0.204, turn="f"),),
 )
 
 
@@ -75,7 +66,7 @@ def test_words_that_end_with_a_stop_of_their_own_get_no_other(words: str) -> Non
 
 @pytest.mark.parametrize("words", ["Please move the blue piece", "first,", "3.5", "請"])
 def test_a_full_stop_parts_words_without_one_from_the_next_sentence(words: str) -> None:
-    told = summary(outcome(spoken=said(words), choices=(choice("cup"),)))
+    told = summary(outcome(spoken=said(words), references=(made(),)))
 
     assert told.text.startswith(f'Said: "{words}". cup: ')
 
@@ -97,15 +88,11 @@ def test_what_was_interrupted_tells_the_words_really_spoken_and_why() -> None:
 
 
 def test_who_did_not_look_and_who_was_not_waited_for() -> None:
-    choices = (choice("a"), choice("b", "gaze", "it"), choice("c", "none", "the cup"), choice("d"), choice("e"))
-    events = (looked("a", "failed", delay=2.5), looked("d", "superseded"), looked("e", "started"))
+    references = (made(looked=False), made("look", phrase="it"), made("words", phrase="the cup"), made("nothing"))
 
-    references = summary(outcome(choices=choices, events=events)).references
+    told = summary(outcome(references=references)).references
 
-    assert [(each.by, each.looked, each.delay) for each in references] == [
-        ("pointing", False, None), ("a look", None, None), ("words alone", None, None),
-        ("pointing", None, None), ("pointing", None, None),
-    ]  # fmt: skip
+    assert [(each.by, each.looked) for each in told] == [("pointing", False), ("a look", None), ("words alone", None)]
 
 
 def test_an_answer_is_pending_none_or_none_expected() -> None:
@@ -127,8 +114,9 @@ def test_the_fragments_of_a_turn_are_told_together_each_event_in_its_last_state(
     begun = event("adjacency_pair", "started", "f-1", id="pair")
     first = outcome("f-1", spoken=said("So,"), events=(begun,), warnings=("late", "late"))
     decided = event("adjacency_pair", "succeeded", "f-1", id="pair", response="nod", delay=0.5)
-    contact = event("mutual_facial_gaze", "succeeded", "f-2", delay=0.0)
-    last = outcome("f-2", "failed", spoken=said("take it."), events=(decided, contact), fault=Fault(reason="stuck"))
+    last = outcome(
+        "f-2", "failed", spoken=said("take it."), events=(decided,), eye_contact=True, fault=Fault(reason="stuck")
+    )
 
     told = summary(first, last)
 
@@ -155,15 +143,36 @@ def test_nothing_is_told_of_nothing() -> None:
     assert summary().text == "Nothing was said."
 
 
-def test_what_was_never_referred_to_is_not_told_as_if_it_had_been() -> None:
-    cut = outcome(
-        status="interrupted",
-        spoken=(SpokenText(behavior="r1-phrase", text="that", complete=False),),
-        choices=(choice("r1"), choice("r2")),
-    )
+def test_a_gaze_event_or_a_choice_alone_is_no_deed() -> None:
+    contact = event("mutual_facial_gaze", "succeeded", delay=0.0)
 
-    assert len(summary(cut).references) == 1
-    assert summary(outcome(status="failed", choices=(choice("r"),))).references == ()
+    assert summary(outcome(events=(contact,))).eye_contact is None
+    assert summary(outcome(references=(made("nothing", phrase=""),))).references == ()
+
+
+@pytest.mark.parametrize(
+    ("statuses", "worst"),
+    [
+        (("refused",), "refused"),
+        (("refused", "refused"), "refused"),
+        (("done", "refused"), "failed"),
+        (("interrupted", "failed"), "failed"),
+        (("failed", "unknown"), "unknown"),
+    ],
+)
+def test_a_turn_is_as_its_worst_fragment_and_refused_only_if_nothing_was_done(
+    statuses: tuple[str, ...], worst: str
+) -> None:
+    assert summary(*(outcome(f"f-{n}", status) for n, status in enumerate(statuses))).status == worst
+
+
+def test_what_nobody_knows_is_not_told_as_refused() -> None:
+    told = unknown(Fault(reason="generation is gone"))
+
+    assert told.json == '{"status":"unknown","problems":["generation is gone"]}'
+    assert told.text == (
+        "A part of the robot has gone: it is unknown what became of the fragment. Problems: generation is gone."
+    )
 
 
 def test_nobody_waits_for_the_answer_to_a_turn_that_ended_early() -> None:

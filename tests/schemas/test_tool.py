@@ -213,7 +213,7 @@ PART = {"say": "hello"}
     ("call", "where", "reason", "advice"),
     [
         ({"turn_status": "ful", "parts": []}, "$.turn_status", "'ful'", "one of beginning, middle, end, full"),
-        ({"turn_status": "full"} | {"parts": None}, "$", "`parts`", "engage tool"),
+        ({"turn_status": "full"} | {"parts": None}, "$", "`parts`", '"parts": [{"say"'),
         ({"turn_status": "full", "parts": [PART, {"saay": "x"}]}, "$.parts[1]", "only 'saay'", "say, refer, look"),
         ({"turn_status": "full", "parts": [{}]}, "$.parts[0]", "nothing", "exactly one of"),
         ({"turn_status": "full", "parts": [{"say": "x", "refer": "y"}]}, "$.parts[0]", "2 of them", "exactly one"),

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Collection, Iterable, Sequence
 from contextlib import asynccontextmanager
+from socket import gethostname
 from typing import Any, NamedTuple
 
 import zenoh
@@ -27,19 +28,23 @@ Tell = Callable[[str], None]
 
 
 class Unseen(NamedTuple):
-    """A participant that is not in sight. seen_by: who sees it. places: where others may connect to its process."""
+    """A participant that is not in sight. seen_by: who sees it. places: where others may connect to its process.
+
+    is_near: somebody on this machine sees it. Then a place on this machine can be reached from here, too.
+    """
 
     name: str
     seen_by: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
+    is_near: bool = False
 
 
 @asynccontextmanager
 async def hinting(
     bus: Bus, connect: Sequence[str], wanted: Collection[str] = keys.SERVICES, tell: Tell | None = None
 ) -> AsyncIterator[None]:
-    """Run the body of `async with`, and beside it `tell_who_is_missing`."""
-    hint = asyncio.create_task(tell_who_is_missing(bus, connect, wanted, tell=tell), name="hint")
+    """Run the body of `async with`, and beside it tell who is missing, and who has come after all."""
+    hint = asyncio.create_task(_hint(bus, connect, wanted, tell), name="hint")
     try:
         yield
     finally:
@@ -53,19 +58,25 @@ async def tell_who_is_missing(
     wanted: Collection[str] = keys.SERVICES,
     after: Seconds = AFTER,
     tell: Tell | None = None,
-) -> None:
+) -> set[str]:
     """Log a warning for those of the `wanted` participants that are not in sight after this time, with the reason.
 
     connect: the endpoints that this process connects to. tell: takes these lines, too.
+    Returns their names.
     """
     await asyncio.sleep(after)
-    absent = sorted(set(wanted) - {bus.name} - set(bus.health.peers))
-    if not absent:
-        return
+
+    def still_absent() -> list[str]:
+        return sorted(set(wanted) - {bus.name} - set(bus.health.peers))
+
+    if not (absent := still_absent()):
+        return set()
     spoken = await versions(connect)
     lines = []
     if set(bus.health.peers) & set(keys.SERVICES) - {bus.name}:
-        lines += told(unseen(absent, await _statuses(bus)))
+        statuses = await _statuses(bus)
+        absent = [name for name in still_absent() if name in absent]  # some came while the others were asked
+        lines += told(unseen(absent, statuses, gethostname()))
     else:
         others = sorted(name for name, its in spoken.items() if keys.PREFIX in its and name != bus.robot)
         there = f"; there are: {', '.join(map(repr, others))}" if others else ""
@@ -75,10 +86,25 @@ async def tell_who_is_missing(
             f"somebody of robot {bus.robot!r} speaks {version}, which nobody hears who speaks {keys.PREFIX}: "
             "bring all machines to one version of Engage"
         )
+    _say(lines, tell)
+    return set(absent)
+
+
+def _say(lines: Iterable[str], tell: Tell | None) -> None:
     for line in lines:
         LOG.warning("%s", line)
         if tell is not None:
             tell(line)
+
+
+async def _hint(bus: Bus, connect: Sequence[str], wanted: Collection[str], tell: Tell | None) -> None:
+    """Tell who is missing, and of each as soon as it is in sight after all: then what was told does not hold."""
+    missing = await tell_who_is_missing(bus, connect, wanted, tell=tell)
+    while missing:
+        await asyncio.sleep(LOOK)
+        if here := missing & set(bus.health.peers):
+            _say([f"in sight now: {', '.join(sorted(here))}"], tell)
+            missing -= here
 
 
 def _way_in(robot: str, connect: Sequence[str]) -> str:
@@ -90,8 +116,8 @@ def _way_in(robot: str, connect: Sequence[str]) -> str:
     return starts
 
 
-def unseen(absent: Iterable[str], statuses: Iterable[Status]) -> list[Unseen]:
-    """Participants that are not in sight here, with what others tell of them."""
+def unseen(absent: Iterable[str], statuses: Iterable[Status], host: str = "") -> list[Unseen]:
+    """Participants that are not in sight here, with what others tell of them. host: name of this machine."""
     known = list(statuses)
     return [
         Unseen(
@@ -108,6 +134,7 @@ def unseen(absent: Iterable[str], statuses: Iterable[Status]) -> list[Unseen]:
                     }
                 )
             ),
+            any(name in each.bus.peers and each.process.host == host != "" for each in known),
         )
         for name in absent
     ]
@@ -116,8 +143,11 @@ def unseen(absent: Iterable[str], statuses: Iterable[Status]) -> list[Unseen]:
 def told(missing: Sequence[Unseen]) -> list[str]:
     """Lines about participants that are not in sight: one for each that others see, one for all the rest."""
     lines = []
-    for name, seen_by, places in missing:
+    for name, seen_by, places, is_near in missing:
         if not seen_by:
+            continue
+        if is_near and any(map(is_on_this_machine, places)):
+            lines.append(f"{name} is not in sight yet, though {', '.join(seen_by)} can see it; waiting")
             continue
         if places and all(map(is_on_this_machine, places)):
             why = f"it listens on {', '.join(_host(place) for place in places)} only; {REMEDY}"
@@ -126,7 +156,7 @@ def told(missing: Sequence[Unseen]) -> list[str]:
         else:
             why = "it is a client of a router that this process has no link to"
         lines.append(f"{name} cannot be seen from here, though {', '.join(seen_by)} can see it: {why}")
-    if nowhere := [name for name, seen_by, _ in missing if not seen_by]:
+    if nowhere := [each.name for each in missing if not each.seen_by]:
         lines.append(f"nobody here sees {', '.join(nowhere)} yet; waiting")
     return lines
 

@@ -1,37 +1,29 @@
 """Frames: what a browser gets next, which is all that has changed since the last one that it drew. Pure."""
 
-from collections.abc import Iterable
-from typing import Literal
-
 from msgspec import Raw, Struct
 from msgspec.json import Encoder
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.picture import Picture
+from engage_hri.services.console.web.receipts import Receipts, Told
 
 HEARTBEAT: Seconds = 1.0
 """Time after which a browser gets a frame though nothing has changed, so that it knows that the window is there."""
 
 
-class Told(Struct, frozen=True):
-    """News of an order for who gave it.
-
-    panel: where it was given: the seat (`part`), the robot by hand (`wizard`), or the bar of a recording (`player`).
-    """
-
-    panel: Literal["part", "wizard", "player"]
-    text: str
-
-
 class Frame(Struct, frozen=True, omit_defaults=True):
     """Message to the browser. now: seconds of the picture. sections: by name. gone: names of those that are over.
 
-    you: who looks at this page. told: what became of its orders. place: of a recording, where the page is in it.
+    session: id of what the window keeps of this page, in the first frame of a link. taken: number of the last
+    order that it has taken, in the first frame and whenever it changes. told: what became of orders. you: who looks
+    at this page. place: of a recording, where the page is in it.
     """
 
     now: Seconds
     sections: dict[str, Raw] = {}
     gone: tuple[str, ...] = ()
+    session: str = ""
+    taken: int | None = None
     you: "You | None" = None
     told: tuple[Told, ...] = ()
     place: "Place | None" = None
@@ -76,6 +68,7 @@ class Viewer:
     def __init__(self) -> None:
         self._known: dict[str, int] = {}
         self._you: You | None = None
+        self._taken: int | None = None
         self._told: Seconds | None = None
         self._place: Place | None = None
         self._encoder = Encoder()
@@ -85,27 +78,33 @@ class Viewer:
         picture: Picture,
         now: Seconds,
         you: You | None = None,
-        told: Iterable[Told] = (),
+        receipts: Receipts | None = None,
         place: Place | None = None,
         clock: Seconds | None = None,
     ) -> bytes | None:
         """The next frame as JSON; None: there is nothing new, and the browser has heard of the window lately.
 
-        place: with a recording; at another visit the picture is another one, and is told whole. clock: what runs on
-        while the time of the picture stands still; None: that never does.
+        receipts: of the orders of its page. place: with a recording; at another visit the picture is another one, and
+        is told whole. clock: what runs on while the time of the picture stands still; None: that never does.
         """
-        told = tuple(told)
+        told: tuple[Told, ...] = ()
+        taken, session = None, ""
+        if receipts is not None:
+            told = receipts.news()
+            taken = receipts.taken if receipts.taken != self._taken else None
+            session = receipts.session if self._taken is None else ""
+            self._taken = receipts.taken
         if place is not None and (self._place is None or place.visit != self._place.visit):
             self._known = {}
         is_moved, self._place = place != self._place, place
         new = {name: version for name, version in picture.versions.items() if self._known.get(name) != version}
         gone = tuple(self._known.keys() - picture.versions.keys())
         beat = now if clock is None else clock
-        is_new = new or gone or told or is_moved or you != self._you
+        is_new = new or gone or told or taken is not None or is_moved or you != self._you
         if not is_new and self._told is not None and beat - self._told < HEARTBEAT:
             return None
         self._told = beat
         self._known = dict(picture.versions)
         sections = {name: Raw(picture.section(name)) for name in new}
         news, self._you = (you if you != self._you else None), you
-        return self._encoder.encode(Frame(picture.zero(now), sections, gone, news, told, place))
+        return self._encoder.encode(Frame(picture.zero(now), sections, gone, session, taken, news, told, place))

@@ -1,7 +1,7 @@
 """Guard of the page: lets in who calls the window by a name of its own, and whose page is one of the window's own.
 
-Another page in the visitor's browser may call this machine, too. It may open any WebSocket, the one of NiceGUI among
-them, and it may have a name of its own point to this machine (DNS rebinding) to read what is served. So each request
+Another page in the visitor's browser may call this machine, too. It may open any WebSocket,
+and it may have a name of its own point to this machine (DNS rebinding) to read what is served. So each request
 is looked at before anything serves it. Pure: it knows the form of ASGI, and no web stack.
 """
 

@@ -14,6 +14,7 @@ from engage_hri.schemas.conditions import words
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.perception import LONGEST_TEXT
 from engage_hri.schemas.units import Coordinate
+from engage_hri.services.console.web.receipts import Panel
 
 Right = Literal["seat", "speak", "steer", "faults", "condition"]
 ALL_RIGHTS: tuple[Right, ...] = ("seat", "speak", "steer", "faults", "condition")
@@ -33,10 +34,6 @@ class Order(Struct, frozen=True, kw_only=True, tag_field="do", omit_defaults=Tru
     """Order of a page. needs: the right that it takes; empty: none."""
 
     needs: ClassVar[Right | Literal[""]] = ""
-
-
-class Drawn(Order, frozen=True, kw_only=True, tag="drawn"):
-    """Said after each frame: it is on the screen."""
 
 
 class SeatOrder(Order, frozen=True, kw_only=True):
@@ -174,29 +171,59 @@ class Play(Order, frozen=True, kw_only=True, tag="play"):
 
 
 AnyOrder = (
-    Drawn | Sit | Leave | LookAt | PointAt | MoveHead | Move | Speak | Type
+    Sit | Leave | LookAt | PointAt | MoveHead | Move | Speak | Type
     | Tell | Prepared | Backchannel | InhibitGaze | Condition | SteerOrder | SwitchOrder
 )  # fmt: skip
-_decoder: "msgspec.json.Decoder[AnyOrder]" = msgspec.json.Decoder(AnyOrder)
 
 
-def decoded(text: str | bytes) -> AnyOrder:
+class Drawn(Struct, frozen=True, tag_field="do", tag="drawn"):
+    """Said after each frame: it is on the screen."""
+
+
+class Given(Struct, frozen=True, kw_only=True, tag_field="do", tag="order"):
+    """An order on its way. number: its place among all of its page, from 1.
+
+    until: seconds of the picture (`Frame.now`) after which it is too old to be obeyed; None: it never is.
+    """
+
+    number: Annotated[int, Meta(ge=1)]
+    until: float | None = None
+    order: msgspec.Raw
+
+
+_messages: "msgspec.json.Decoder[Drawn | Given]" = msgspec.json.Decoder(Drawn | Given)
+_orders: "msgspec.json.Decoder[AnyOrder]" = msgspec.json.Decoder(AnyOrder)
+_played: "msgspec.json.Decoder[Play]" = msgspec.json.Decoder(Play)
+_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+def message(text: str | bytes) -> Drawn | Given:
+    """Read what a page says. Raises InputRefused for what is nothing of it."""
+    try:
+        return _messages.decode(text)
+    except _UNREADABLE as error:
+        raise InputRefused(Fault(reason=str(error), where="message", advice="reload the page")) from error
+
+
+def decoded(text: str | bytes | msgspec.Raw) -> AnyOrder:
     """Read an order. Raises InputRefused for what is none."""
     try:
-        return _decoder.decode(text)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        return _orders.decode(text)
+    except _UNREADABLE as error:
         raise InputRefused(Fault(reason=str(error), where="order", advice="reload the page")) from error
 
 
-_played_decoder: "msgspec.json.Decoder[Drawn | Play]" = msgspec.json.Decoder(Drawn | Play)
-
-
-def decoded_in_recording(text: str | bytes) -> Drawn | Play:
+def decoded_in_recording(text: str | bytes | msgspec.Raw) -> Play:
     """Read an order of a page that shows a recording. Raises InputRefused for what is none."""
     try:
-        return _played_decoder.decode(text)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        return _played.decode(text)
+    except _UNREADABLE as error:
         raise InputRefused(Fault(reason="it can only be played", where="this is a recording")) from error
+
+
+def panel(order: Order) -> Panel:
+    """The panel in which an order is given."""
+    return "part" if order.needs == "seat" else "wizard"
 
 
 def server(order: Order) -> str:

@@ -5,7 +5,7 @@ which sections there are, and which have changed; `section(name)` gives one as J
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import count
 from typing import Any
 
@@ -101,6 +101,17 @@ class Picture:
     def body(self) -> Capabilities | None:
         """The body as it described itself; None: not yet."""
         return self._body
+
+    def in_words(self, blocks: Iterable[str]) -> str:
+        """Words for what the robot does with these blocks: what it says, or that it moves. Empty without blocks."""
+        known = list(blocks)
+        told = [
+            f"“{words}”" if (words := self._turns.words(id)) else "a movement"
+            for id in known
+            if not id.startswith(view.OWN_BLOCKS)
+        ]
+        looks = ["where it looks"] if any(id.startswith(view.OWN_BLOCKS) for id in known) else []
+        return ", ".join(dict.fromkeys((*told, *looks)))
 
     def has(self, name: str) -> bool:
         """Tell whether a participant is on the bus."""

@@ -1,27 +1,34 @@
-"""Server of the page: the page itself by NiceGUI, and the frames over a WebSocket of their own."""
+"""Server of the page: its files, and the frames over a WebSocket."""
 
 import asyncio
 import contextlib
 import secrets
 import socket
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from html import escape
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any, TypeVar
 
 import uvicorn
-from fastapi import FastAPI, WebSocket, WebSocketDisconnect
-from nicegui import ui
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web import orders
-from engage_hri.services.console.web.frames import Told, Viewer, You
+from engage_hri.services.console.web.frames import Viewer, You
 from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.outbox import Outbox, types
-from engage_hri.services.console.web.page import build
 from engage_hri.services.console.web.played import PlayedPicture
+from engage_hri.services.console.web.receipts import Receipts
 from engage_hri.services.console.web.service import Window
+from engage_hri.services.console.web.sessions import CLOSED, Guest, Session, Sessions
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
 
@@ -29,12 +36,16 @@ TICK: Seconds = 1 / 15
 """Least time between two frames of a browser."""
 LARGEST_ORDER = 2**16
 """Bytes of one order of a page."""
-AWAY: Seconds = 60.0
-"""Time for which NiceGUI waits for a page that sleeps; after that the page is loaded anew, without its seat."""
 MOST_VIEWERS = 100
 FULL = 4429
 """Code with which a WebSocket is closed for which there is no room: 4000 and the status that HTTP has for it."""
 WORDS_FULL = f"{MOST_VIEWERS} browsers look on already, and it shows itself to no more"
+PAGE = Path(__file__).parent / "page"
+"""Files of the page."""
+THREE = "elements/scene/dist"
+"""Where NiceGUI keeps three.js, as one module. No more of NiceGUI is used, and none of its Python is loaded."""
+TOO_MANY = 4408
+"""Code with which a WebSocket is closed whose page gives orders and draws no news of them."""
 FRAMES = "/frames"
 """Path of the WebSocket of our own page."""
 MESSAGES = "/messages"
@@ -42,6 +53,7 @@ MESSAGES = "/messages"
 PAGES = "/pages"
 """Path of pages of others."""
 MOST_PROGRAMS = 100
+G = TypeVar("G", bound=Guest)
 NO_TEXT = 1003
 """Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
@@ -52,20 +64,16 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
     pages: a folder of pages of somebody else, which may listen to the messages. token: who takes part has it in the
     address of the page.
     """
-    app = _empty()
+    sessions = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
 
-    @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
-        await browser.accept()  # who is refused before learns no reason
-        if window.viewers >= MOST_VIEWERS:
-            await browser.close(FULL, WORDS_FULL)
-            return
-        with contextlib.suppress(WebSocketDisconnect):
-            given = browser.query_params.get("token", "")
-            visitor = Visitor(window, secrets.compare_digest(given.encode(), token.encode()))
-            await _show_robot(window, browser, visitor)
+        given = browser.query_params.get("token", "")
+        window.viewers += 1
+        try:
+            await _shown(browser, sessions, secrets.compare_digest(given.encode(), token.encode()), _live(window))
+        finally:
+            window.viewers -= 1
 
-    @app.websocket(MESSAGES)
     async def messages(program: WebSocket) -> None:
         only = frozenset(filter(None, program.query_params.get("only", "").split(",")))
         await program.accept()  # who is refused before learns no reason
@@ -77,37 +85,59 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
             with contextlib.suppress(WebSocketDisconnect):
                 await _tell(window, program, Outbox(only))
 
+    more: list[BaseRoute] = [WebSocketRoute(MESSAGES, messages)]
     if pages is not None:
-        app.mount(PAGES, StaticFiles(directory=pages, html=True))
-
-    _with_page(app, window.bus.robot)
-    return Guarded(app, hosts, {MESSAGES})
+        more.append(Mount(PAGES, StaticFiles(directory=pages, html=True)))
+    return Guarded(_app(window.bus.robot, frames, sessions.close, more), hosts, {MESSAGES})
 
 
 def recorded(recording: Recording, hosts: Hosts) -> App:
-    """The page, playing a recording."""
-    app, viewers = _empty(), set[WebSocket]()
+    """The page, playing a recording. Each browser has a place of its own in it."""
+    sessions = Sessions(lambda receipts, trusted: _Played(recording, receipts), MOST_VIEWERS)
 
-    @app.websocket(FRAMES)
     async def frames(browser: WebSocket) -> None:
-        await browser.accept()  # who is refused before learns no reason
-        if len(viewers) >= MOST_VIEWERS:
-            await browser.close(FULL, WORDS_FULL)
-            return
-        viewers.add(browser)
+        await _shown(browser, sessions, False, lambda session, viewer: session.guest.frame(viewer))
+
+    return Guarded(_app(recording.robot, frames, sessions.close), hosts)
+
+
+def _app(
+    robot: str,
+    frames: Callable[[WebSocket], Awaitable[None]],
+    close: Callable[[], Awaitable[None]],
+    more: Iterable[BaseRoute] = (),
+) -> Starlette:
+    """The page and its frames. close: is called at the end."""
+    page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{robot}", escape(robot))
+
+    async def index(request: Request) -> Response:
+        return HTMLResponse(page)
+
+    @contextlib.asynccontextmanager
+    async def life(app: Starlette) -> AsyncIterator[None]:
         try:
-            await _show_recording(recording, browser)
-        except WebSocketDisconnect:
-            pass
+            yield
         finally:
-            viewers.discard(browser)
+            await close()
 
-    _with_page(app, recording.robot)
-    return Guarded(app, hosts)
+    (nicegui,) = find_spec("nicegui").submodule_search_locations  # type: ignore[union-attr,misc]
+    routes = [
+        Route("/", index),
+        Mount("/page", _Fresh(directory=PAGE)),
+        Mount("/three", StaticFiles(directory=Path(nicegui) / THREE)),
+        WebSocketRoute(FRAMES, frames),
+        *more,
+    ]
+    return Starlette(routes=routes, lifespan=life)
 
 
-def _empty() -> FastAPI:
-    return FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+class _Fresh(StaticFiles):
+    """Files that a browser asks for again: after an update none of another version is mixed in."""
+
+    def file_response(self, *args: Any, **more: Any) -> Response:
+        response = super().file_response(*args, **more)
+        response.headers["cache-control"] = "no-cache"
+        return response
 
 
 async def _text(socket: WebSocket) -> str:
@@ -122,87 +152,96 @@ async def _text(socket: WebSocket) -> str:
     return str(text)
 
 
-def _with_page(app: FastAPI, robot: str) -> None:
-    @ui.page("/", title=f"Engage: {robot}")
-    def page() -> None:
-        build(robot)
+async def _shown(
+    browser: WebSocket, sessions: Sessions[G], trusted: bool, frame: Callable[[Session[G], Viewer], bytes | None]
+) -> None:
+    """Serve one link of a page, until it ends. frame: makes the next one for this viewer; None: there is none."""
+    await browser.accept()  # who is refused before learns no reason
+    session = await sessions.enter(browser.query_params.get("session", ""), trusted)
+    if session is None:
+        await browser.close(FULL, WORDS_FULL)
+        return
+    link, code = session.links, CLOSED[0]
+    try:
+        await _show(browser, session, frame)
+    except WebSocketDisconnect as end:
+        code = end.code
+    finally:
+        await sessions.part(session, link, code)
 
-    ui.run_with(
-        app, dark=None, language="en-US", tailwind=False, show_welcome_message=False, storage_secret=None,
-        reconnect_timeout=AWAY, binding_refresh_interval=None, gzip_middleware_factory=None,
-    )  # fmt: skip
 
-
-async def _show(browser: WebSocket, take: Callable[[str], bool], frame: Callable[[], bytes | None]) -> None:
-    """Send frames until the browser has gone. Raises WebSocketDisconnect then.
-
-    take: takes an order; True: it says that the last frame is drawn. frame: makes the next one; None: there is none.
-    """
-    drawn = asyncio.Event()
-    drawn.set()
+async def _show(browser: WebSocket, session: Session[G], frame: Callable[[Session[G], Viewer], bytes | None]) -> None:
+    """Send frames until the browser has made another link. Raises WebSocketDisconnect when it has gone."""
+    viewer, drawn, receipts = Viewer(), asyncio.Event(), session.receipts
 
     async def listen() -> None:
-        while True:
-            if take(await _text(browser)):
+        while not receipts.is_full:
+            try:
+                said = orders.message(await _text(browser))
+            except InputRefused as error:
+                receipts.tell("part", str(error))
+                continue
+            if isinstance(said, orders.Drawn):
+                receipts.confirm()
                 drawn.set()
+            else:
+                session.take(said)
+        await browser.close(TOO_MANY, "orders are given, and news of them are not drawn")
+        raise WebSocketDisconnect(TOO_MANY)
 
-    listening = asyncio.create_task(listen(), name="browser")
+    session.link = listening = asyncio.create_task(listen(), name="browser")
     try:
         while not listening.done():
-            if (made := frame()) is not None:
+            if (made := frame(session, viewer)) is not None:
                 drawn.clear()
                 await browser.send_text(made.decode())
                 waiting = asyncio.ensure_future(drawn.wait())
                 await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
                 waiting.cancel()
             await asyncio.sleep(TICK)
-        listening.result()
+        if not listening.cancelled():
+            listening.result()
     finally:
         listening.cancel()
 
 
-async def _show_robot(window: Window, browser: WebSocket, visitor: Visitor) -> None:
-    viewer = Viewer()
-
-    def frame() -> bytes | None:
+def _live(window: Window) -> Callable[[Session[Visitor], Viewer], bytes | None]:
+    def frame(session: Session[Visitor], viewer: Viewer) -> bytes | None:
         window.picture.advance(window.bus.now())
-        return viewer.frame(window.picture, window.bus.now(), visitor.you, visitor.told())
+        return viewer.frame(window.picture, window.bus.now(), session.guest.you, session.receipts)
 
-    window.viewers += 1
-    try:
-        await _show(browser, visitor.take, frame)
-    finally:
-        window.viewers -= 1
-        await visitor.leave()
+    return frame
 
 
-async def _show_recording(recording: Recording, browser: WebSocket) -> None:
-    """Each browser has a place of its own in the recording."""
-    now = asyncio.get_running_loop().time
-    viewer, told, played = Viewer(), list[Told](), PlayedPicture(recording, now())
-    reason = "this is a recording"
-    you = You(denied=dict.fromkeys(orders.ALL_RIGHTS, reason))
+class _Played:
+    """A page that plays a recording."""
 
-    def take(text: str) -> bool:
+    def __init__(self, recording: Recording, receipts: Receipts) -> None:
+        self._now = asyncio.get_running_loop().time
+        self._receipts = receipts
+        self._played = PlayedPicture(recording, self._now())
+        self._you = You(denied=dict.fromkeys(orders.ALL_RIGHTS, "this is a recording"))
+
+    def take(self, given: orders.Given) -> None:
         try:
-            order = orders.decoded_in_recording(text)
+            order = orders.decoded_in_recording(given.order)
         except InputRefused as error:
-            told.append(Told("player", str(error)))
-            return False
-        if isinstance(order, orders.Play):
-            at = now()
-            if order.at is not None:
-                played.seek(order.at, at)
-            played.play(at, order.speed) if order.on else played.pause(at)
-        return isinstance(order, orders.Drawn)
+            self._receipts.tell("player", str(error))
+            return
+        at = self._now()
+        if order.at is not None:
+            self._played.seek(order.at, at)
+        self._played.play(at, order.speed) if order.on else self._played.pause(at)
 
-    def frame() -> bytes | None:
-        played.advance(now())
-        place, news = played.place(now()), tuple(told)
-        told.clear()
-        return viewer.frame(played.picture, place.at, you, news, place, now())
+    async def leave(self) -> None:
+        """End nothing: it has begun nothing that goes on."""
 
-    await _show(browser, take, frame)
+    def frame(self, viewer: Viewer) -> bytes | None:
+        """The next frame for this viewer."""
+        now = self._now()
+        self._played.advance(now)
+        place = self._played.place(now)
+        return viewer.frame(self._played.picture, place.at, self._you, self._receipts, place, now)
 
 
 async def _tell(window: Window, program: WebSocket, outbox: Outbox) -> None:

@@ -43,13 +43,15 @@ class Window:
     they are. listeners: what gets each message.
     """
 
-    def __init__(self, hub: Hub, bus: Bus, robot: Robot, script: Script, *, keyed: bool = False) -> None:
+    def __init__(
+        self, hub: Hub, bus: Bus, robot: Robot, script: Script, *, keyed: bool = False, began: Seconds | None = None
+    ) -> None:
         self.hub = hub
         self.keyed = keyed
         self.bus = bus
         self.robot = robot
         self.script = script
-        self.picture = Picture(bus.robot, bus.now())
+        self.picture = Picture(bus.robot, bus.now() if began is None else began)
         self.seats = Seats()
         self.viewers = 0
         self.listeners: set[Callable[[Message], None]] = set()
@@ -69,6 +71,11 @@ class Window:
         self.picture.feed(message, at, self.bus.now())
         for listener in self.listeners:
             listener(message)
+
+    @property
+    def seconds(self) -> Seconds:
+        """Seconds of the picture now."""
+        return self.picture.zero(self.bus.now())
 
     @property
     def invitation(self) -> Invitation:
@@ -130,13 +137,15 @@ class Window:
 
 
 @asynccontextmanager
-async def window(hub: Hub, bus: Bus, script: Script, *, keyed: bool = False) -> AsyncIterator[Window]:
+async def window(
+    hub: Hub, bus: Bus, script: Script, *, keyed: bool = False, began: Seconds | None = None
+) -> AsyncIterator[Window]:
     """Follow the bus while the body of `async with` runs. bus: the window's own, with its role.
 
-    keyed: the role is that of its keys.
+    keyed: the role is that of its keys. began: the instant of this machine that counts as zero; None: now.
     """
     async with Robot.on(bus) as robot:
-        shown = Window(hub, bus, robot, script, keyed=keyed)
+        shown = Window(hub, bus, robot, script, keyed=keyed, began=began)
         async with _following(shown):
             yield shown
 

@@ -92,6 +92,11 @@ class Turns:
                 return False
         return True
 
+    def words(self, id: str) -> str:
+        """All words of a block, whether they are said yet or not; empty: it has none, or is unknown."""
+        block = self._find(id)
+        return joined(block.texts.values()) if block is not None else ""
+
     def _find(self, id: str, at: Seconds | None = None) -> _Block | None:
         """The newest block of this name. at: that began by then."""
         found = (each for each in reversed(self._blocks) if each.id == id)

@@ -1,7 +1,6 @@
 """Visitors: each is somebody at a browser, whose orders are carried out here."""
 
 import asyncio
-from collections import deque
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from itertools import count
@@ -19,8 +18,9 @@ from engage_hri.services.client.perceive import check_id, perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
 from engage_hri.services.console.web.company import Invitation
-from engage_hri.services.console.web.frames import Told, You
+from engage_hri.services.console.web.frames import You
 from engage_hri.services.console.web.laying import laid
+from engage_hri.services.console.web.receipts import Panel, Receipts
 from engage_hri.services.console.web.seats import SETTLED
 from engage_hri.services.console.web.service import Window
 
@@ -28,16 +28,15 @@ REACH: Seconds = 0.9
 """Time that a person takes to lay a thing elsewhere."""
 PATIENCE: Seconds = 5.0
 """Time that the robot has to accept what it is asked for."""
-TOLD_KEPT = 8
 
 
 class Visitor:
     """The one at a browser. trusted: the page was called with the token of the window."""
 
-    def __init__(self, window: Window, trusted: bool) -> None:
+    def __init__(self, window: Window, trusted: bool, receipts: Receipts) -> None:
         self._window = window
+        self.receipts = receipts
         self._denied = orders.denied(window.bus.role, trusted, keyed=window.keyed)
-        self._told: deque[Told] = deque(maxlen=TOLD_KEPT)
         self._tasks: set[asyncio.Task[None]] = set()
         self._person: PerceivedPerson | None = None
         self._sitting: asyncio.Task[None] | None = None
@@ -60,31 +59,22 @@ class Visitor:
             inhibits=self._inhibits,
         )
 
-    def told(self) -> tuple[Told, ...]:
-        """News of the orders since this was asked last."""
-        news = tuple(self._told)
-        self._told.clear()
-        return news
-
-    def take(self, text: str) -> bool:
-        """Carry out an order, or begin to. Returns True if it says that a frame was drawn; what fails is told."""
-        order = None
+    def take(self, given: orders.Given) -> None:
+        """Carry out an order, or begin to; what fails is told."""
+        panel: Panel = "part"
         try:
-            order = orders.decoded(text)
+            order = orders.decoded(given.order)
+            panel = orders.panel(order)
             if reason := self._denied.get(order.needs, ""):
                 raise InputRefused(Fault(reason=reason, where="not allowed"))
-            if isinstance(order, orders.Drawn):
-                return True
+            if given.until is not None and self._window.seconds > given.until:
+                raise InputRefused(Fault(reason="it came too late"))
             if isinstance(order, orders.SeatOrder):
                 self._be(order)
             else:
                 self._drive(order)
         except EngageError as error:
-            self._tell(str(error), is_by_hand=order is not None and order.needs not in ("", "seat"))
-        return False
-
-    def _tell(self, text: str, *, is_by_hand: bool) -> None:
-        self._told.append(Told("wizard" if is_by_hand else "part", text))
+            self.receipts.tell(panel, str(error), refused=given.number)
 
     async def leave(self) -> None:
         """End all that this visitor does. The person leaves, and a lease on the gaze ends."""
@@ -97,9 +87,10 @@ class Visitor:
 
     def _be(self, order: orders.SeatOrder) -> None:
         if isinstance(order, orders.Sit):
-            if self._sitting is None or self._sitting.done():
-                self._stands_up.clear()
-                self._sitting = self._begin(self._sit(order.name.strip()))
+            if self._sitting is not None and not self._sitting.done():
+                raise InputRefused(Fault(reason="you have a seat, or are about to", advice="leave it first"))
+            self._stands_up.clear()
+            self._sitting = self._begin(self._sit(order.name.strip()))
             return
         if self._person is None:
             raise InputRefused(Fault(reason="you have no seat", advice="take a seat first"))
@@ -173,7 +164,7 @@ class Visitor:
         by = getattr(order, "by", "") or "somebody"
         self._window.log(f"{by}: {orders.written(order)}")
         if (server := orders.server(order)) and not self._window.picture.has(server):
-            self._tell(f"{server} is not on the bus: this waits for it, {PATIENCE:g} s at most", is_by_hand=True)
+            self.receipts.tell("wizard", f"{server} is not on the bus: this waits for it, {PATIENCE:g} s at most")
         robot = self._window.robot
         match order:
             case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
@@ -187,9 +178,10 @@ class Visitor:
             case orders.Backchannel(how=how, addressee=addressee):
                 self._drives(self._perform(script.backchannel(how, addressee)))
             case orders.InhibitGaze(on=True, mode=mode, target=target):
-                if not self._inhibits:
-                    self._lets_go.clear()
-                    self._drives(self._inhibit(mode, target))
+                if self._inhibits:
+                    raise InputRefused(Fault(reason="you keep the gaze already", advice="let it go first"))
+                self._lets_go.clear()
+                self._drives(self._inhibit(mode, target))
             case orders.InhibitGaze():
                 self._lets_go.set()
             case orders.SteerOrder(to="hold"):
@@ -206,7 +198,7 @@ class Visitor:
                 self._drives(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))
 
     def _drives(self, work: Coroutine[Any, Any, None]) -> None:
-        self._begin(work, is_by_hand=True)
+        self._begin(work, "wizard")
 
     async def _perform(self, thing: Any) -> None:
         if isinstance(thing, Block):
@@ -215,11 +207,13 @@ class Visitor:
         fragment = fragment_in(thing, self._window.new_id())
         outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
         if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
-            self._tell("; ".join(problems), is_by_hand=True)
+            self.receipts.tell("wizard", "; ".join(problems))
 
     async def _steered(self, verb: str, work: Coroutine[Any, Any, tuple[str, ...]]) -> None:
         blocks = await work
-        self._tell(f"{verb}: {', '.join(blocks) or 'nothing is being performed'}", is_by_hand=True)
+        self.receipts.tell(
+            "wizard", f"{verb}: {self._window.picture.in_words(blocks) or 'nothing is being performed'}"
+        )
 
     async def _inhibit(self, mode: Any, target: str) -> None:
         async with self._window.robot.inhibit_gaze(mode, target=target, timeout=PATIENCE):
@@ -229,12 +223,12 @@ class Visitor:
             finally:
                 self._inhibits = False
 
-    def _begin(self, work: Coroutine[Any, Any, None], *, is_by_hand: bool = False) -> asyncio.Task[None]:
+    def _begin(self, work: Coroutine[Any, Any, None], panel: Panel = "part") -> asyncio.Task[None]:
         async def contained() -> None:
             try:
                 await work
             except EngageError as error:
-                self._tell(str(error), is_by_hand=is_by_hand)
+                self.receipts.tell(panel, str(error))
 
         task = asyncio.create_task(contained(), name="visitor")
         self._tasks.add(task)

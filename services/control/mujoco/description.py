@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Degrees, Meters, Vector
+from engage_hri.services.runtime.installation import packages_command
 
 
 class Place(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -101,7 +102,7 @@ def _model(model: str, file: Path) -> Path:
     try:
         owned = files(package) or []
     except PackageNotFoundError:
-        raise _refused(f"no package {package!r}", file, f"install it: pip install {package}") from None
+        raise _refused(f"no package {package!r}", file, packages_command(package)) from None
     for each in owned:
         if each.as_posix().endswith(tail):
             return Path(str(each.locate())).resolve()

@@ -20,6 +20,7 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.mujoco import face
 from engage_hri.services.control.mujoco.pictures import FROM_THE_SIDE, Beam, Camera, Cone, Picture, View
+from engage_hri.services.runtime.installation import packages_command
 
 if TYPE_CHECKING:
     from PIL import ImageDraw
@@ -100,7 +101,7 @@ def check(path: Path) -> None:
             Fault(reason=f"a film {path.name!r}", advice=f"name it {', '.join(FORMATS)}", service="control")
         )
     if path.suffix == ".mp4" and _ffmpeg() is None:
-        advice = "install ffmpeg, or `pip install imageio-ffmpeg`, or name the film .webp or .gif"
+        advice = f"install ffmpeg, or {packages_command('imageio-ffmpeg')}; or name the film .webp or .gif"
         raise InputRefused(
             Fault(reason="no program ffmpeg for an .mp4", where=str(path), advice=advice, service="control")
         )

@@ -10,12 +10,13 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.reachy_mini.link import VERSION, Daemon, Lost
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.runtime.installation import extra_command
 
 try:
     import aiohttp
 except ImportError as error:  # pragma: no cover - where the extra is not installed
     raise InputRefused(
-        Fault(reason="the driver reachy_mini needs aiohttp", advice="pip install 'engage-hri[reachy-mini]'")
+        Fault(reason="the driver reachy_mini needs aiohttp", advice=extra_command("reachy-mini"))
     ) from error
 
 RATE = 50

@@ -17,8 +17,9 @@ from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.torso import choreography, following, head, tracks
+from engage_hri.services.control.torso.asked import HURRIED, START, paced_by, told_apart
 from engage_hri.services.control.torso.copied import Clock
-from engage_hri.services.control.torso.course import Course, Impossible
+from engage_hri.services.control.torso.course import Impossible
 from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible
 from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.moving import Torso, is_last_on_target
@@ -28,12 +29,10 @@ from engage_hri.services.control.variability import Deviations
 from engage_hri.services.control.waiting import EARLY
 from engage_hri.services.runtime.steps import Steps
 
-START, RELEASE, BEGIN = "start", 0, 1
-"""Name of the first sync point; and the two kinds of events, in the order in which those of one instant happen."""
+RELEASE, BEGIN = 0, 1
+"""The two kinds of events, in the order in which those of one instant happen."""
 ROUNDING = 6
 """Decimals of seconds that tell instants apart."""
-HURRIED: Seconds = 0.0005
-"""Seconds by which a point comes too early for a behavior that does not hurry."""
 SAME: Seconds = 0.1
 """Seconds by which a behavior may have begun at another time than who asks says."""
 ELEMENTS, TO_FORESEE, TO_SETTLE, A_WAY_HOME = 256, 16, 4, 384
@@ -62,6 +61,8 @@ class _Part:
         self._marks: Mapping[str, Seconds] = {}
         self._least: dict[str, Seconds] = {}
         """Phases that took longer than they were asked to, as fast as the body could."""
+        self._cut: Mapping[str, Seconds] = {}
+        """When it would have passed the points that it is asked for, as it moved when it last set out or was cut."""
         self._most: dict[str, Seconds] = {}
         """Phases that took less, as slow as it could be without a stop."""
 
@@ -82,6 +83,12 @@ class _Part:
                 clock.at = due
                 torso.leave_target(run)
                 yield A_WAY_HOME
+
+    def note_coming(self) -> None:
+        """Note when it will pass the points that it is asked for: another behavior may cut it before."""
+        if (run := self.run).authority.pace and not (run.is_over or run.holding):
+            coming = {each.sync: run.due(each) for each in run.pending}
+            self._cut = {sync: due for sync, due in coming.items() if due is not None}
 
     def next_due(self) -> Seconds | None:
         """Instant at which a paced behavior passes its next point: then it is given the next one."""
@@ -153,14 +160,13 @@ class _Part:
 
     def _note_misses(self) -> None:
         """Note the phases to points that came later than it was asked to be there."""
-        asked = self.run.authority.pace
-        for since, to in pairwise([point.sync for point in self.run.course.points if point.sync in self.passed]):
-            if to in asked and self.passed[to] > asked[to] + HURRIED:
-                seconds = self.passed[to] - self.passed[since]
-                if seconds > asked[to] - asked.get(since, self.passed[since]):
+        asked, at = self.run.authority.pace, {**self._cut, **self.passed}
+        for since, to in pairwise([point.sync for point in self.run.course.points if point.sync in at]):
+            if to in asked and at[to] > asked[to] + HURRIED:
+                if (seconds := at[to] - at[since]) > asked[to] - asked.get(since, at[since]):
                     self._least[to] = seconds
-            elif to in asked and self.passed[to] < asked[to] - HURRIED:
-                self._most[to] = self.passed[to] - self.passed[since]
+            elif to in asked and at[to] < asked[to] - HURRIED:
+                self._most[to] = at[to] - at[since]
 
     def _updated(self, phase: Phase) -> Phase:
         natural = max(0.0, self._phases.get(phase.to, phase.natural))
@@ -226,6 +232,8 @@ def rehearsed(
         if kind == RELEASE:
             yield from _let_go(torso, parts[number], hold, clock.at)
         else:
+            for part in parts.values():
+                part.note_coming()
             begun = yield from _begin(torso, clock, items[number], times[number], passing[number], moved)
             if isinstance(begun, Estimate):
                 told[number] = begun
@@ -311,8 +319,8 @@ def _begin(
         yield TELLING
     except Impossible as impossible:
         return infeasible(behavior, impossible)
-    waits, forced = _told_apart(course, path, times, passing)
-    paced = _paced(course, path, times, forced)
+    waits, forced = told_apart(course, path, times, passing)
+    paced = paced_by(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Deviations(), 0)
     run.bell = clock
@@ -322,41 +330,6 @@ def _begin(
     if paced:
         yield from torso.extended(run)
     return part
-
-
-def _told_apart(
-    course: Course, path: Path, times: Mapping[str, Seconds], passing: Container[str]
-) -> tuple[dict[str, Seconds], dict[str, Seconds]]:
-    """Times of hold points at which it has to wait, and of points for which it hurries or dawdles.
-
-    It hurries to a hold point if it would come there later by itself.
-    """
-    waits: dict[str, Seconds] = {}
-    forced: dict[str, Seconds] = {}
-    before, at = START, times[START]
-    for point in course.points[1:]:
-        if point.sync in times:
-            natural = path.marks[point.sync] - path.marks[before]
-            is_hurried = times[point.sync] - at < natural - HURRIED
-            if point.held_with and not is_hurried and point.sync not in passing:
-                waits[point.held_with] = times[point.sync]
-            else:
-                forced[point.sync] = times[point.sync]
-            before, at = point.sync, times[point.sync]
-    return waits, forced
-
-
-def _paced(
-    course: Course, path: Path, times: Mapping[str, Seconds], forced: Mapping[str, Seconds]
-) -> dict[str, Seconds]:
-    """Instants for all points up to the last that is forced: the others are asked for as they come by themselves."""
-    paced: dict[str, Seconds] = {}
-    at = times[START]
-    for since, to in pairwise([point.sync for point in course.points]):
-        if len(forced.keys() & paced.keys()) == len(forced):
-            break
-        at = paced[to] = times.get(to, at + path.marks[to] - path.marks[since])
-    return paced
 
 
 def _place(torso: Torso, pose: BodyPose | None, parts: Sequence[str]) -> bool:

@@ -30,10 +30,9 @@ from engage_hri.services.control.voice.synthesis import (
     Synthesizer,
     refused,
 )
+from engage_hri.services.runtime.installation import extra_command
 
-ADVICE = (
-    "pip install 'engage-hri[voice]' (eSpeak NG is under the GPL, version 3), or Debian: apt install libespeak-ng1"
-)
+OR_ELSE = " (eSpeak NG is under the GPL, version 3), or Debian: apt install libespeak-ng1"
 
 _SYNCHRONOUS, _PHONES_IN_IPA, _DO_NOT_EXIT = 2, 0x0003, 0x8000
 _UTF8, _SSML = 1, 0x10
@@ -211,7 +210,7 @@ def _loaded(settings: EspeakSettings) -> tuple[Any, bytes | None]:
         library.espeak_Info.restype = ctypes.c_char_p
         return library, data.encode() if data else None
     except (OSError, AttributeError) as error:
-        raise refused(f"no library of eSpeak NG: {error}", ADVICE) from error
+        raise refused(f"no library of eSpeak NG: {error}", extra_command("voice") + OR_ELSE) from error
 
 
 _EMPHASIS = {"strong": "strong", "moderate": "moderate", "reduced": "reduced"}

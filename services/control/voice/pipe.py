@@ -66,9 +66,9 @@ class FedProcess:
 
     @property
     def words(self) -> str:
-        """Return what it has said on standard error: the first line, and the last one."""
+        """Return what it has said last on standard error: before that come complaints of its libraries."""
         lines = [line.strip() for line in self._said.decode(errors="replace").splitlines() if line.strip()]
-        return " ... ".join(dict.fromkeys(printable(line)[:200] for line in (*lines[:1], *lines[-1:])))
+        return printable(lines[-1])[:200] if lines else ""
 
     def write(self, content: bytes) -> None:
         """Let it have some bytes, after those before; once it is gone they are lost."""

@@ -34,7 +34,8 @@ PROBE: Seconds = 0.25
 DYING = 50
 """Steps for which it is waited until a player is dead that was killed: a second."""
 _STEP: Seconds = 0.02
-ADVICE = "install one of them (Debian: alsa-utils, pulseaudio-utils, pipewire-bin or sox), or set device=none or file"
+WITHOUT = "`--set control.drivers.espeak.device=none` goes on without sound (espeak, or the name of your own voice)"
+ADVICE = f"install one of them (Debian: alsa-utils, pulseaudio-utils, pipewire-bin or sox); {WITHOUT}"
 
 
 class PlayerProgram(NamedTuple):
@@ -212,7 +213,7 @@ class Player:
         code = self._process.process.poll()
         how = "has closed its input" if code is None else f"has ended with code {code}"
         words = f": {self._process.words}" if self._process.words else ""
-        self._fail(f"the player {self._command[0]} {how}{words}", "is there a device?")
+        self._fail(f"the player {self._command[0]} {how}{words}", f"is there a sound card? {WITHOUT}")
 
     def _fail(self, reason: str, advice: str) -> None:
         self.fault = Fault(reason=reason, where="sound device", advice=advice, service="control")

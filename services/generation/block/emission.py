@@ -34,10 +34,10 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.lowering import lowered
 from engage_hri.services.generation.block.ordering import ordered
-from engage_hri.services.generation.block.parts import FreshIds, Mention, Parts
+from engage_hri.services.generation.block.parts import FreshIds, Made, Mention, Parts
 from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, from_there, same
 from engage_hri.services.generation.block.punctuation import moved_punctuation
-from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named
+from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named, tie_needs
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
@@ -47,12 +47,15 @@ from engage_hri.services.generation.turns.policy import TurnPlan
 class FragmentPlan(Struct, frozen=True, kw_only=True):
     """The block of a fragment and what is known of it before it is sent.
 
-    continuation: for the turn's next fragment. mentions: when each object has been referred to.
+    continuation: for the turn's next fragment. mentions: when each object is referred to. made: the behaviors of
+    each reference, in order. opening: ids of what opens the turn.
     """
 
     block: Block
     continuation: Continuation = NO_CONTINUATION
     mentions: tuple[Mention, ...] = ()
+    made: tuple[Made, ...] = ()
+    opening: tuple[str, ...] = ()
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -87,18 +90,17 @@ class Emission:
         punctuation = moved_punctuation(order, [id for id, choice in chosen.items() if choice.phrase])
         self.kept = [each for old in kept if (each := punctuation.rest.get(old.id, old)) is not None]
         self.order = [each for old in order if (each := punctuation.rest.get(old.id, old)) is not None]
-        self.parts = {
-            behavior.id: Parts(
-                behavior,
-                chosen[behavior.id],
-                punctuation.closings.get(behavior.id, ""),
-                self.names,
-                turn,
-                hands.get(behavior.id, permits.only_hand),
-            )
-            for behavior in self.order
-            if isinstance(behavior, Reference)
-        }
+        self.parts: dict[str, Parts] = {}
+        self.hinge: tuple[str, ...] = ()  # the phrase that what comes now needs (see `Parts`)
+        self.needs: dict[str, tuple[str, ...]] = {}  # of the author's behaviors
+        for behavior in self.order:
+            if isinstance(behavior, Reference):
+                hand, closing = hands.get(behavior.id, permits.only_hand), punctuation.closings.get(behavior.id, "")
+                parts = Parts(behavior, chosen[behavior.id], closing, self.names, turn, hand, self.hinge)
+                self.parts[behavior.id] = parts
+                self.hinge = parts.hinge or self.hinge
+            self.needs[behavior.id] = self.hinge
+        tie_needs(self.needs, self.kept, fragment)
         self.named = points_named(fragment.id, fragment.behaviors, fragment.constraints)
         self.named_behaviors = {behavior for behavior, _ in self.named}
         self.speeches = self._speeches()
@@ -138,7 +140,9 @@ class Emission:
                 self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes)
             ),
             mentions=tuple(parts.mention for parts in self.parts.values()),
+            made=tuple(parts.made for parts in self.parts.values()),
             choices=tuple(self.choices),
+            opening=tuple(each.id for each in opening),
             warnings=tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped),
         )
 
@@ -162,10 +166,19 @@ class Emission:
         return behaviors
 
     def _passed_through(self, behavior: BlockBehavior) -> BlockBehavior:
-        timing = self.rewriting.timing(behavior)
         if isinstance(behavior, Pointing) and behavior.mode is None and self.permits.only_hand:
-            return msgspec.structs.replace(behavior, timing=timing, mode=self.permits.only_hand)
-        return msgspec.structs.replace(behavior, timing=timing) if timing != behavior.timing else behavior
+            behavior = msgspec.structs.replace(behavior, mode=self.permits.only_hand)
+        new = msgspec.structs.replace(behavior, timing=self.rewriting.timing(behavior), needs=self._needs(behavior))
+        return behavior if new == behavior else new
+
+    def _needs(self, behavior: BlockBehavior) -> tuple[str, ...]:
+        """Ids that a behavior of the author needs: those that it names, and the phrase that it stands behind."""
+        said: list[str] = []
+        for needed in behavior.needs:
+            parts = self.parts.get(needed)
+            said += [needed] if parts is None else parts.made.gestures or filter(None, [parts.phrase])
+        behind = () if behavior.required else self.needs.get(behavior.id, ())
+        return tuple(dict.fromkeys((*said, *behind)))
 
     # -- after the turn's earlier fragments -----------------------------------------------------------------------
 
@@ -253,7 +266,8 @@ class Emission:
 
     def _glance(self, parts: Parts) -> Operator:
         parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
-        parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee))
+        needs = self.needs[parts.reference.id]
+        parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee, needs=needs))
         return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
     def _is_said(self, operator: Operator, inherited: Sequence[Operator]) -> bool:
@@ -296,6 +310,7 @@ class Emission:
         id: str,
         kind: EventKind,
         start: str,
+        needs: tuple[str, ...] = (),
         *,
         accept: tuple[Action, ...] = (),
         within: Seconds | None = None,
@@ -305,23 +320,27 @@ class Emission:
         return Event(
             id=self.names.fresh(id), kind=kind, responder=self.turn.addressee, cause="turn", turn=self.turn.turn,
             timing=(Timing("start", start),) if start else (), accept=accept, limit=within, optional=optional,
+            needs=needs,
         )  # fmt: skip
 
     def _opening(self) -> list[BlockBehavior]:
         """The turn's event or signal that begins with the first speech, or with the block if there is none."""
         turn = self.turn
         start = f"{self.speeches[0]}:start" if self.speeches else ""
+        needs = next((each.hinge for each in self.parts.values() if [*each.hinge] == self.speeches[:1]), ())
         if turn.announces_pair:
-            return [self._event("turn-pair", "adjacency_pair", start, accept=turn.accept, within=turn.within)]
+            return [self._event("turn-pair", "adjacency_pair", start, needs, accept=turn.accept, within=turn.within)]
         if turn.reply:
             id = self.names.fresh(f"turn-{turn.reply}")
             timing = (Timing("start", start),) if start else ()
-            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=turn.addressee, timing=timing)]
+            who = turn.addressee
+            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=who, timing=timing, needs=needs)]
         if turn.backchannel:
             nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
             if not start and nod and not self.permits.speech_only:
                 start = f"{nod}:start"
-            return [self._event("backchannel", "backchannel", start)]
+            about = (start.rpartition(":")[0],) if start else ()
+            return [self._event("backchannel", "backchannel", start, about)]
         return []
 
     def _closing(self) -> list[BlockBehavior]:
@@ -330,14 +349,15 @@ class Emission:
         if not turn.closes:
             return []
         ended = self.names.fresh("turn-ended")
-        signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee)
+        signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee, needs=self.hinge)
         operators: list[Operator] = []
         closing: list[BlockBehavior] = []
         wordless = self._wordless_at_the_end() if self.speeches else ()
         if self._ends_with_gaze:
             gaze = self.names.fresh("turn-gaze")
-            closing.append(Gaze(id=gaze, target=turn.addressee))
-            closing.append(self._event("turn-gaze-event", "mutual_facial_gaze", f"{gaze}:start", optional=True))
+            closing.append(Gaze(id=gaze, target=turn.addressee, needs=self.hinge))
+            start = f"{gaze}:start"
+            closing.append(self._event("turn-gaze-event", "mutual_facial_gaze", start, optional=True, needs=(gaze,)))
             if wordless:
                 operators += [after(end, f"{gaze}:start") for end in (f"{self.speeches[-1]}:end", *wordless)]
             elif self.speeches:

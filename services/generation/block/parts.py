@@ -8,6 +8,26 @@ from engage_hri.services.generation.block.rewriting import Point, Replacement
 from engage_hri.services.generation.turns.policy import TurnPlan
 
 
+class Made(Struct, frozen=True):
+    """Ids of the behaviors that a block has for one reference; "": it has none.
+
+    words: of its phrase, as chosen. falls: the phrase falls with a gesture (see `Parts`).
+    """
+
+    reference: str
+    object: str
+    gaze: str = ""
+    point: str = ""
+    phrase: str = ""
+    event: str = ""
+    words: str = ""
+    falls: bool = False
+
+    @property
+    def gestures(self) -> tuple[str, ...]:
+        return tuple(filter(None, (self.gaze, self.point)))
+
+
 class Mention(Struct, frozen=True):
     """An object that a block refers to. by: the sync point from which on it has been referred to."""
 
@@ -31,7 +51,11 @@ class FreshIds:
 
 
 class Parts:
-    """The behaviors that replace one reference. closing: punctuation at the end of its phrase."""
+    """The behaviors that replace one reference. closing: punctuation at the end of its phrase.
+
+    needs: what they need, each of them. The phrase needs the gestures with which it was chosen: it is never said
+    without them, and what follows needs the phrase, so that the reference can be chosen again in the place of both.
+    """
 
     def __init__(
         self,
@@ -41,28 +65,34 @@ class Parts:
         names: FreshIds,
         turn: TurnPlan,
         hand: Hand | None,
+        needs: tuple[str, ...] = (),
     ):
         points = choice.gesture == "directed_gaze_with_pointing"
         looks = choice.gesture != "none"
         required, line = reference.required, reference.line
+        given = () if required else needs
         self.reference = reference
         self.gaze = self.point = self.phrase = self.event = self.glance = ""
         self.behaviors: list[BlockBehavior] = []
         anchors: list[str] = []
         if looks:
             self.gaze = names.fresh(f"{reference.id}-gaze")
-            self.behaviors.append(Gaze(id=self.gaze, target=reference.target, required=required, line=line))
+            self.behaviors.append(
+                Gaze(id=self.gaze, target=reference.target, required=required, needs=given, line=line)
+            )
             anchors.append(f"{self.gaze}:stroke")
         if points:
             self.point = names.fresh(f"{reference.id}-point")
             self.behaviors.append(
-                Pointing(id=self.point, target=reference.target, mode=hand, required=required, line=line)
+                Pointing(id=self.point, target=reference.target, mode=hand, required=required, needs=given, line=line)
             )
             anchors.append(f"{self.point}:stroke")
         if choice.phrase:
             self.phrase = names.fresh(f"{reference.id}-phrase")
             said = choice.phrase + closing
-            self.behaviors.append(Speech(id=self.phrase, text=said, required=required, line=line))
+            gestures = tuple(filter(None, (self.gaze, self.point)))
+            phrase_needs = given if required else gestures or given
+            self.behaviors.append(Speech(id=self.phrase, text=said, required=required, needs=phrase_needs, line=line))
             anchors.append(f"{self.phrase}:start")
         if looks and choice.gesture != "gaze":
             self.event = names.fresh(f"{reference.id}-event")
@@ -76,8 +106,19 @@ class Parts:
                     anchors=tuple(anchors),
                     turn=turn.turn,
                     timing=(Timing("start", f"{self.gaze}:start"),),
+                    needs=tuple(filter(None, (self.gaze, self.point))),
                 )
             )
+
+        falls = bool(self.phrase and looks and not required)
+        self.made = Made(
+            reference.id, reference.target, self.gaze, self.point, self.phrase, self.event, choice.phrase, falls
+        )
+
+    @property
+    def hinge(self) -> tuple[str, ...]:
+        """Ids that the behaviors behind it need: its phrase, if that falls with a gesture."""
+        return (self.phrase,) if self.made.falls else ()
 
     @property
     def closing(self) -> Replacement:

@@ -10,7 +10,17 @@ from functools import cached_property
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import After, Before, Behavior, Constraint, Synchronize, Timing
+from engage_hri.schemas.behaviors import (
+    After,
+    Before,
+    Behavior,
+    Constraint,
+    Reference,
+    Speech,
+    Synchronize,
+    Timing,
+)
+from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 
 Operator = Synchronize | Before | After
@@ -214,3 +224,29 @@ def points_named(
     ]
     refs = map(SyncRef.parse, filter(None, texts))
     return Counter((ref.behavior, ref.sync) for ref in refs if ref.block in ("", fragment))
+
+
+def tie_needs(needs: dict[str, tuple[str, ...]], behaviors: Sequence[Behavior], fragment: TurnFragment) -> None:
+    """Let what is tied to words or references need what these need; what is tied to neither needs nothing.
+
+    needs: of each behavior, changed in place; of words and references by their order.
+    """
+    words = {each.id for each in behaviors if isinstance(each, Speech | Reference)}
+    for id in needs.keys() - words:
+        needs[id] = ()
+    groups = [
+        {ref.behavior for text in group if text and (ref := SyncRef.parse(text)).block in ("", fragment.id)}
+        for group in [
+            *((f"{each.id}:{timing.sync}", timing.ref) for each in behaviors for timing in each.timing),
+            *((each.ref, *each.syncs) for constraint in fragment.constraints for each in constraint.operators),
+        ]
+    ]
+    order = list(dict.fromkeys(needed for needed in needs.values() if needed))
+    changed = True
+    while changed:
+        changed = False
+        for group in groups:
+            latest = max((needs.get(id, ()) for id in group), key=lambda each: order.index(each) if each else -1)
+            for id in group & needs.keys() - words:
+                if latest and needs[id] != latest and (not needs[id] or order.index(needs[id]) < order.index(latest)):
+                    needs[id], changed = latest, True

@@ -4,6 +4,7 @@ Fragments of one turn arrive one by one while earlier ones are still performed. 
 was accepted; whatever ends it early (barge-in, fault, cancellation, silence) also ends the fragments in line.
 """
 
+from collections.abc import Collection
 from typing import Literal
 
 from msgspec import Struct
@@ -99,6 +100,8 @@ class TurnPolicy:
         self._robot_speaks = False
         self._spoke_in = ""
         """The turn of the robot's last words."""
+        self._away: dict[str, Seconds] = {}
+        """People who are out of sight, and since when."""
         self._interrupters: dict[str, Seconds | None] = {}
         """People who began to speak within the robot's turn, and since when the robot speaks, too."""
         self._spoke_since: Seconds = 0.0
@@ -237,11 +240,34 @@ class TurnPolicy:
         if is_final:
             self._taken_by = actor
 
+    def see(self, people: Collection[str], now: Seconds) -> None:
+        """Note who is in sight."""
+        addressees = {plan.addressee for plan in self._turns_under_way} - {*people}
+        self._away = {actor: self._away.get(actor, now) for actor in addressees}
+
+    @property
+    def _turns_under_way(self) -> tuple[TurnPlan, ...]:
+        return (*self._live.values(), *([self._open] if self._open else []))
+
+    @property
+    def _left_at(self) -> tuple[TurnPlan, Seconds] | None:
+        """The turn whose addressee is out of sight, and when that has lasted so long that the person has left."""
+        return next(
+            (
+                (plan, self._away[plan.addressee] + self._config.face_lost)
+                for plan in self._turns_under_way
+                if plan.addressee in self._away
+            ),
+            None,
+        )
+
     @property
     def deadline(self) -> Seconds | None:
         due = [self._takes_floor_at(actor, began) for actor, began in self._talked_into.items()]
         if self._silent_since is not None:
             due.append(self._silent_since + self._config.turn_silence)
+        if (left := self._left_at) is not None:
+            due.append(left[1])
         return min(due, default=None)
 
     @property
@@ -255,7 +281,9 @@ class TurnPolicy:
         return began + (LONGEST_LISTENING if actor in self._listeners else self._config.barge_in)
 
     def tick(self, now: Seconds) -> Aborted | None:
-        """Abort the turn that silence or a barge-in has ended by `now`; None: there is none."""
+        """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
+        if (left := self._left_at) is not None and now >= left[1]:
+            return self._abort(left[0], f"{left[0].addressee} has left")
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
             return self._abort(self._open, f"silence for {self._config.turn_silence:g} s")

@@ -16,8 +16,8 @@ from engage_hri.services.realizer.foresee.foresight import Foresight
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
-from engage_hri.services.realizer.points import EPSILON, Member, Point, frozen
+from engage_hri.services.realizer.plan.slack import BRAKING, UNNOTICED, slack
+from engage_hri.services.realizer.points import EPSILON, WITH_STROKE, Member, Point, frozen
 
 
 class Grants(Observer):
@@ -139,9 +139,11 @@ class Grants(Observer):
                 else:
                     self._foresight.may_be_slower.add(may_pass.behavior)
                     self._grant(transition, may_pass)
+            self._decide_together(transition, missing, due, now)
             return []
         if may_pass is not None:
             self._grant(transition, may_pass)
+        self._decide_together(transition, missing, due, now)
         begun = self._facts.begun
         beginning = [each.behavior for each in members if each.kind == "start" and each.behavior not in begun]
         beginning = [each for each in beginning if not self._is_to_take(each, transition)]
@@ -150,6 +152,26 @@ class Grants(Observer):
         for member in members:
             self._grant(transition, member)
         return beginning
+
+    def _decide_together(self, transition: int, missing: list[Member], due: Seconds, now: Seconds) -> None:
+        """Let those pass that are expected at one time: each of them is the last, and none has to stop.
+
+        They are told when the first would brake, and not before: until then each waits for what the others do. Of a
+        look nobody knows so well when it arrives.
+        """
+        if len(missing) < 2 or not all(each.can_wait for each in missing):
+            return
+        types = {self._plan.chains[each.behavior].type for each in missing}
+        arrivals = [self._foresight.arrival(each) for each in missing]
+        coming = [each for each in arrivals if each is not None]
+        if not types <= WITH_STROKE or len(coming) < len(missing):
+            return
+        if max(coming) - min(coming) <= UNNOTICED and min(coming) >= due - UNNOTICED:
+            if (told := min(coming) - BRAKING) > now + EPSILON:
+                self._wake(transition, told)
+            else:
+                for each in missing:
+                    self._grant(transition, each)
 
     def _is_to_take(self, behavior: str, transition: int) -> bool:
         """True if a behavior that begins here takes a part of another one that has yet to make what it has to here.

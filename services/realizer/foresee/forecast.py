@@ -78,7 +78,8 @@ class Forecast(LongestPaths):
             behavior = bound.behavior if bound.kind == "phase" else ""
             least = bound.lag if not behavior else -inf if bound.stretch is None else bound.lag - bound.stretch
             arc = self._add(bound.source, bound.target, bound.lag, least, behavior, is_bound=True)
-            missed_by = unkept.get((bound.source, bound.target)) or abroad.get(bound.target, 0.0)
+            ends = (bound.source, bound.target)
+            missed_by = 0.0 if ends in plan.late else unkept.get(ends) or abroad.get(bound.target, 0.0)
             if missed_by > bound.stopped + EPSILON:
                 self._unkept.add(arc)
             if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag + bound.stopped:
@@ -88,8 +89,7 @@ class Forecast(LongestPaths):
         self._awaited: dict[int, list[str]] = {}
         """For each instant, the behaviors of other blocks that have yet to pass it."""
         for point in plan.foreign:
-            transition = plan.at[point]
-            self._awaited.setdefault(transition, []).append(point.behavior)
+            self._awaited.setdefault(transition := plan.at[point], []).append(point.behavior)
             if transition not in self._elsewhere:
                 node = self._new_node()
                 self.times[node] = began

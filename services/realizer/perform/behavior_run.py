@@ -189,9 +189,25 @@ class BehaviorRun:
             self._hold_changed = asyncio.get_running_loop().create_future()
             await asyncio.wait([self._hold_changed], timeout=None if facts.is_held(self.id) else left)
 
+    async def _really_begun(self, event: Event) -> Seconds:
+        """Time at which an event begins that may: with the first report of what it needs, else now.
+
+        The body may refuse what it needs only as that begins. Then recognition must not hear of the event: with a
+        person who looks already, it would succeed at once.
+        """
+        block, now = self._block, self._block.bus.now()
+        starts = [Point(id, "start") for id in event.needs if id in block.decisions.plan.chains]
+        if not starts:
+            return now
+        if not any(start in block.decisions.facts.reached for start in starts):
+            awaited = [block.futures.reached(start) for start in starts]
+            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
+        reached = block.decisions.facts.reached
+        return max(now, min(reached[start] for start in starts if start in reached))
+
     async def _event(self, event: Event) -> None:
         block = self._block
-        began = block.bus.now()
+        began = await self._really_begun(event)
         block.reach(Point(event.id, "start"), began)
         pending = block.recognition.ask(block.body.id(event.id), block.id, event, began)
         if pending is not None:

@@ -31,6 +31,8 @@ from engage_hri.services.realizer.points import Point, frozen
 
 MOVED: Seconds = 0.008
 """Seconds; a prediction that moves by less, as something was measured, is not told again."""
+NOTICEABLE: Seconds = 0.008
+"""Seconds; a plan that misses what its block says by less is not told."""
 PLANNED: Seconds = 0.002
 """The same for the predictions of another plan: they are no mere consequence of what was measured."""
 ON_REQUEST = "stopped on request"
@@ -65,8 +67,8 @@ class Reporter:
         self._block = block
         self._tolerance = tolerance
         self.spelling = spelling
-        self._late: set[Point] = set()
-        """Instants of behaviors that were reported as late."""
+        self._late: dict[Point, Seconds] = {}
+        """Instants of behaviors that were reported as late, and the seconds planned; inf: none were."""
         self._character = ""
         self._latest: Seconds = -inf
         """Time of the latest message; none after it has an earlier one."""
@@ -162,25 +164,28 @@ class Reporter:
 
     def _broken(self, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
         """Warn of what is broken by more than is tolerated. times: of points that have come, or are planned."""
-        if broken.seconds > self._tolerance:
+        is_past = verb == "came"
+        is_of_plan = bool(plan.late) and not is_past and not is_foreign(broken.early.behavior + broken.late.behavior)
+        if broken.seconds > (NOTICEABLE if is_of_plan else self._tolerance):
             point = broken.point
             late = point.behavior if broken.direction == "later" else ""
-            is_past = verb == "came"
             why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""
             sync = self.spelling(point) if is_foreign(point.behavior) else self.spelling.sync(point)
             members = plan.members[plan.at[point]] if point in plan.at else ()
             instant = next((each.point for each in members if each.behavior == point.behavior), point)
-            self.late(instant, broken.told(sync, verb, why))
+            if broken.seconds > self._late.get(instant, inf) + self._tolerance:
+                del self._late[instant]  # It comes later than it was planned to be late.
+            self.late(instant, broken.told(sync, verb, why), planned=inf if is_past else broken.seconds)
 
     def overdue(self, decisions: Decisions, late: Late) -> None:
         """Warn that a behavior takes too long. How much too late it comes in the end is told when it comes."""
         line, sync = decisions.plan.chains[late.behavior].behavior.line, self.spelling.sync(late.point)
         self.warn("LATE", at_line(line, f"{sync} is {late.overdue:.1f} s overdue"), late.behavior)
 
-    def late(self, instant: Point, message: str) -> None:
+    def late(self, instant: Point, message: str, *, planned: Seconds = inf) -> None:
         """Warn that a behavior is late for an instant: once for each."""
         if instant not in self._late:
-            self._late.add(instant)
+            self._late[instant] = planned
             # What is said only of other blocks is no behavior of this one.
             self.warn("LATE", message, "" if is_foreign(instant.behavior) else instant.behavior)
 

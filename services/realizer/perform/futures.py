@@ -16,6 +16,7 @@ class SyncPointFutures(Observer):
     def __init__(self) -> None:
         self._granted: dict[Point, asyncio.Future[None]] = {}
         self._fired: dict[Point, asyncio.Future[Seconds]] = {}
+        self._reached: dict[Point, asyncio.Future[Seconds]] = {}
 
     def adopt(self, net: RunningNet) -> "SyncPointFutures":
         """Observe another net of the same block from now on."""
@@ -41,9 +42,17 @@ class SyncPointFutures(Observer):
         if not (future := self.granted(point)).done():  # done: its task was cancelled
             future.set_result(None)
 
+    def reached(self, point: Point) -> "asyncio.Future[Seconds]":
+        """Resolved when the behavior itself has passed `point`, with the time, whatever else is of that instant."""
+        return _future(self._reached, point)
+
+    def reach(self, point: Point, at: Seconds) -> None:
+        """Note that the behavior has passed `point`."""
+        _resolve(self._reached, point, at)
+
     def cancel(self) -> None:
         """Cancel all that is still awaited: the block has ended."""
-        for futures in (self._granted, self._fired):
+        for futures in (self._granted, self._fired, self._reached):
             for future in futures.values():
                 future.cancel()
 

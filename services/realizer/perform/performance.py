@@ -34,6 +34,7 @@ from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.plan.again import planned_again, reestimated
+from engage_hri.services.realizer.plan.needs import events_needing, without
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point
@@ -65,20 +66,16 @@ class BlockPerformance:
         self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._dropped = reasons(plan)
-        """Behaviors that were dropped, each with the reason."""
+        self._dropped = reasons(plan)  # behaviors that were dropped, each with the reason
         self.interrupted: dict[str, str] = {}
         """Behaviors that are ended on request, each with the reason if one was given."""
         self.ties = Ties(self, shared.others, shared.live_blocks, live.elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
-        self._timer = Timer(self.take_in)
-        self._afterwards = Afterwards(self.take_in)
-        self._soon = Alarm(self.take_in)
+        self._timer, self._soon, self._afterwards = Timer(self.take_in), Alarm(self.take_in), Afterwards(self.take_in)
         self.rehearsing = Rehearsing(self, shared.others, shared.bus.now, shared.ask)
         self.leaders: Collection[str] = ()
-        self._untold: list[News] = []
-        self._needs_replan = False
+        self._untold, self._needs_replan = list[News](), False
 
     def containing(self) -> Containing:
         """Contain exceptions in the body of `with`: they end this block, and no other."""
@@ -205,10 +202,8 @@ class BlockPerformance:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
         await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort)
-        if self._outcome.status == "done":
-            self.decisions.net.let_go()
-        else:
-            self.decisions.net.clear()
+        net = self.decisions.net
+        (net.let_go if self._outcome.status == "done" else net.clear)()
         self._net.end()
         if ending.status == "failed":
             self._go_home(self.parts_used)
@@ -238,10 +233,9 @@ class BlockPerformance:
         self._afterwards.stop()
         if self._needs_replan:
             self.replan()
-        again = True
-        while again and not self._ending.done():
-            made_news = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
-            again = any(made_news)
+        while not self._ending.done():
+            if not any([self.apply(each) for each in self.decisions.advance(self.bus.now())]):  # noqa: C419
+                break
         foresight = self.decisions.foresight
         if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
@@ -300,6 +294,7 @@ class BlockPerformance:
             self._untold += [News(each, at, arrived if each == point else None, by_body) for each in news]
             for each in news:
                 self.spoken.reach(each)
+                self.futures.reach(each, at)
             self._hurry()
 
     def _hurry(self) -> None:
@@ -326,6 +321,11 @@ class BlockPerformance:
                 said = Fault(reason=fault.reason, where=f"{self.id}: {id}", line=fault.line, advice=fault.advice)
                 self._live.stop(Ending("failed", said))
         self._let_go(id)
+        for event in events_needing(id, self.plan.block):
+            if self.is_going_on(event.id):  # what else needs it falls by the next plan
+                self._tasks[event.id].cancel()
+                self.body.cancel(event.id, f"{id} was dropped")
+                self.lose(event.id, Fault(reason=without(id), line=event.line), kind, at_rest=True)
         self.plan_again()
 
     def plan_again(self) -> None:

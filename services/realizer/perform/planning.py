@@ -95,15 +95,19 @@ class Planning:
             if is_to_wait:
                 known = replace(known, holders={})
             try:
-                steps = plan_steps(chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns)
+                steps = plan_steps(
+                    chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns, manner=rounds.manner
+                )
                 plan = await unhurried(steps)
             except BlockRefused:
                 if rounds.turns:
                     rounds.let_go()
                     continue
-                if rounds.settled is None:
+                if not rounds.can_give_way:
                     raise
-                return rounds.settled
+                if (agreed := rounds.give_way()) is not None:
+                    return agreed
+                continue
             about_plan = self._question(plan, known)
             if plan.block is chosen:
                 told = rounds.answer(about_plan) or await self.estimates(chosen, about_plan)

@@ -18,7 +18,12 @@ def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
     """A plan of a block as if the behaviors that are gone had never been written. Raises BlockRefused."""
     known = _still_untied(so_far, known)
     plan = plan_block(
-        so_far.block, so_far.estimates.values(), dropped=gone, known=known, barred=_chosen(so_far, known)
+        so_far.block,
+        so_far.estimates.values(),
+        dropped=gone,
+        known=known,
+        barred=_chosen(so_far, known),
+        manner=so_far.manner,
     )
     return replace(plan, net=as_run(plan.net))
 
@@ -31,7 +36,13 @@ def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: It
     known = _still_untied(so_far, known)
     try:
         plan = plan_block(
-            so_far.block, estimates, dropped=gone, known=known, barred=_chosen(so_far, known), turns=so_far.turns
+            so_far.block,
+            estimates,
+            dropped=gone,
+            known=known,
+            barred=_chosen(so_far, known),
+            turns=so_far.turns,
+            manner=so_far.manner,
         )
     except BlockRefused:
         return None

@@ -1,6 +1,6 @@
 """Agreement of a plan with what the body says about it: each answer may make another plan, with another answer."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -9,8 +9,11 @@ from msgspec.structs import replace
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.handover import Turn
+from engage_hri.services.realizer.plan.manner import AT_EASE, Manner
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE
+from engage_hri.services.realizer.plan.slack import UNNOTICED
+from engage_hri.services.realizer.points import Point, frozen
 
 STRAIGHT, MOST = 2, 12
 """How often the body is asked about a plan anew. After the first so many times estimates go half-way only; at most,
@@ -24,14 +27,26 @@ class Rounds:
     """Plans of one block, and what the body has said about them.
 
     estimates: those to plan with next. turns: those that the next plan is to begin with: where two orders on one part
-    each call for the other, what waited in one plan waits in all. settled: the last plan that is right but for phases
-    that cannot be hurried so.
+    each call for the other, what waited in one plan waits in all. manner: that of the next plan.
     """
 
     def __init__(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
+        self.manner = AT_EASE
+        self._begin(question, first)
+        self._first = question, first
+        self._believing: Plan | None = None
+        """The first plan: it believes all that the body has promised."""
+        self._settled: Plan | None = None
+        """The last plan that is right but for phases that cannot be hurried so."""
+        self._refuted: set[Point] = set()
+        """Hold points behind which a phase took longer than the body had promised."""
+        self._agreed: list[Plan] = []
+        """Plans that the body can keep and that miss something, each in a manner of its own."""
+        self._is_resigned = False
+
+    def _begin(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
         self.estimates = first
         self.turns: frozenset[Turn] = frozenset()
-        self.settled: Plan | None = None
         self._answers = [(question, first)]
         self._nearest: tuple[Seconds, Plan] | None = None
         self._has_jumped = False
@@ -53,17 +68,19 @@ class Rounds:
         if self.turns and self._nearest is not None and len(plan.dropped) > len(self._nearest[1].dropped):
             self.let_go()
             return None
+        self._believing = self._believing or plan
         off = difference(self.estimates, told)
-        if self.settled is not None and len(plan.dropped) > len(self.settled.dropped):
-            return self.settled
+        if len(plan.dropped) > len(self._believing.dropped) and not self._is_resigned:
+            return self.give_way()
         if max(off) <= NOTICEABLE:
-            return plan
-        if off.natural <= NOTICEABLE and self.settled is None:
-            self.settled = plan
+            return self._close(plan)
+        self._refuted.update(_refuted(plan, self.estimates, told))
+        if off.natural <= NOTICEABLE and not plan.manner.may_be_late:
+            self._settled = self._settled or plan
         if self._nearest is None or max(off) < self._nearest[0]:
             self._nearest = max(off), plan
         if len(self._answers) > MOST:
-            return self._nearest[1]
+            return self._close(self._nearest[1])
         # The same question again: its answer is tried once as it is.
         is_settled = self._answers[-1][0] == question and not self._has_jumped
         is_early = len(self._answers) < STRAIGHT + 1
@@ -74,6 +91,48 @@ class Rounds:
         earlier = [answer for _, answer in self._answers[-SURE:-1]]
         self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, earlier)
         return None
+
+    def _close(self, plan: Plan) -> Plan | None:
+        """Take a plan that the body can keep, unless it misses something and another manner may miss less."""
+        if plan.lateness > UNNOTICED:
+            self._agreed.append(plan)
+            return self.give_way()
+        return plan
+
+    @property
+    def can_give_way(self) -> bool:
+        """True if there is anything but a refusal left where a plan is impossible."""
+        return self._believing is not None and not self._is_resigned
+
+    def give_way(self) -> Plan | None:
+        """Plan in the next manner: what was promised cannot be kept in this one. Returns the plan to take if none is
+        left: the one that misses least."""
+        stands, first = frozen(self._refuted), self._believing
+        assert first is not None
+        if not self.manner.may_be_late:
+            lost = tuple([each for each in first.problems if each.behavior in first.dropped])
+            self.manner = Manner(may_be_late=True, lost=lost)
+        elif stands - self.manner.stands and not self.manner.stands:
+            self.manner = replace(self.manner, stands=stands)
+        elif self._agreed:
+            return min(self._agreed, key=lambda plan: plan.lateness)
+        elif self._settled is not None:
+            return self._settled
+        else:
+            self.manner, self._is_resigned = AT_EASE, True
+        self._begin(*self._first)
+        return None
+
+
+def _refuted(plan: Plan, before: Sequence[Estimate], after: Sequence[Estimate]) -> Iterator[Point]:
+    """Hold points behind which a phase cannot be as short as was thought."""
+    known = {(each.behavior, phase.to): phase.shortest for each in before for phase in each.phases}
+    for each in after:
+        chain = plan.chains.get(each.behavior)
+        for number, phase in enumerate(each.phases if chain is not None else ()):
+            if phase.shortest > known.get((each.behavior, phase.to), inf) + NOTICEABLE:
+                holds = [earlier.to for earlier in each.phases[:number] if earlier.hold]
+                yield from (Point(each.behavior, sync) for sync in holds[-1:])
 
 
 class Difference(NamedTuple):

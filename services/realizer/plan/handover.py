@@ -95,6 +95,13 @@ class Conflict(NamedTuple):
     turn: Turn | None
     hand: tuple[str, Hand] | None
 
+    def is_open(self, begun: Container[str], settled: Container[Turn]) -> bool:
+        """True if it can be settled: who has begun waits no more. settled: turns that are."""
+        if self.hand:
+            return True
+        assert self.turn is not None
+        return self.turn[0] not in begun and self.turn not in settled
+
 
 def arrange(
     chains: Mapping[str, Chain],

@@ -12,6 +12,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import PetriNet
 from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.known import BLOCK_END, is_foreign
+from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.plan.relations import Problem, Relations
@@ -36,7 +37,8 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     have, what the block said, with the warning.
     untied: points of other blocks that are not waited for, though the block names them: there is no time for it.
     relations: what the block says of these behaviors. broken: what of that the plan cannot keep, since times are
-    fixed, or another block has passed a point already.
+    fixed, another block has passed a point already, or the body cannot hurry so.
+    manner: see there. late: bounds that the plan misses, though all that can hurry for them does.
     constrained: points that something waits for, or that are timed.
     successors: behaviors that hand their parts over, each with the one that takes them (`block:behavior` of another
     block), and the first of its points that comes by that. takes: behaviors of other blocks whose parts are taken.
@@ -58,6 +60,8 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     relations: Relations
     rounds: Mapping[str, int] = {}
     turns: frozenset[Turn] = frozenset()
+    manner: Manner = AT_EASE
+    late: Late = {}
     holders: Mapping[str, tuple[str, ...]] = {}
     untied: frozenset[Point] = frozenset()
     broken: tuple[Broken, ...] = ()
@@ -72,6 +76,11 @@ class Plan(Struct, frozen=True, kw_only=True, dict=True):
     def predicted(self, point: Point) -> Seconds:
         """Seconds from the block's start to the point, if all goes as estimated."""
         return self.schedule[self.at[point]]
+
+    @property
+    def lateness(self) -> Seconds:
+        """Most seconds by which the plan misses what the block says, as the body cannot hurry so."""
+        return max(self.late.values(), default=0.0)
 
     @property
     def times(self) -> dict[Point, Seconds]:

@@ -17,16 +17,18 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.services.realizer.plan import foresight, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
+from engage_hri.services.realizer.plan.comparison import compared
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.given_up import times_of
 from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner, eased, standing
+from engage_hri.services.realizer.plan.needs import falling, without
 from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
-from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import (
     BlockRefused,
     Equal,
@@ -36,7 +38,7 @@ from engage_hri.services.realizer.plan.relations import (
     as_dropped,
     at_line,
     relation_steps,
-)
+)  # fmt: skip
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, needless_turns, share, waits_elsewhere
@@ -44,24 +46,7 @@ from engage_hri.services.realizer.plan.speaking_order import Misordered, Speakin
 from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
-from engage_hri.services.runtime.steps import PORTION, Steps, finished, portions
-
-
-def plan_block(
-    block: Block,
-    estimates: Iterable[Estimate] = (),
-    *,
-    dropped: Iterable[str] = (),
-    known: Known = NOTHING,
-    barred: Container[tuple[str, Hand]] = (),
-    turns: frozenset[Turn] = frozenset(),
-) -> Plan:
-    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
-
-    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
-    cannot be done. turns: those to begin with.
-    """
-    return finished(plan_steps(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns))
+from engage_hri.services.runtime.steps import PORTION, Steps, in_one_go, portions
 
 
 def plan_steps(
@@ -72,12 +57,21 @@ def plan_steps(
     known: Known = NOTHING,
     barred: Container[tuple[str, Hand]] = (),
     turns: frozenset[Turn] = frozenset(),
+    manner: Manner = AT_EASE,
 ) -> Steps[Plan]:
-    """Plan as `plan_block` does, in steps. turns: those to begin with."""
-    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known)
+    """Plan `block` in steps; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
+
+    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
+    cannot be done. turns: those to begin with. manner: see there.
+    """
+    planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known, manner)
     planner.parts = PartOrder(turns)
     yield from planner.read()
     return (yield from planner.plan())
+
+
+plan_block = in_one_go(plan_steps)
+"""Plan as `plan_steps` does, in one go."""
 
 
 class _Planner:
@@ -88,8 +82,11 @@ class _Planner:
         dropped: Iterable[str],
         barred: Container[tuple[str, Hand]],
         known: Known,
+        manner: Manner,
     ) -> None:
         self.block = block
+        self.manner = manner
+        self.late: Late = {}
         self.known = known
         self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
         self.untied: set[Point] = set(known.untied)  # see `Plan`
@@ -99,25 +96,26 @@ class _Planner:
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
-        self.dropped = dict.fromkeys(dropped)  # in the order in which they were dropped; the values mean nothing
+        self.dropped = dict.fromkeys(
+            [*dropped, *(each.behavior for each in manner.lost)]
+        )  # in the order in which they were dropped; the values mean nothing
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
-        self.turns = frozenset[Turn]()
+        self.turns, self.parts = frozenset[Turn](), PartOrder()
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.pruned: set[Turn] = set()  # turns that were found to be needless, once
-        self.parts = PartOrder()
-        self.hands: dict[str, Hand] = {}
-        self.chains: dict[str, Chain] = {}
+        self.hands, self.chains = dict[str, Hand](), dict[str, Chain]()
 
     def read(self) -> Steps[None]:
         self.relations = yield from relation_steps(self.block, self.known.blocks)
-        self.problems = list(self.relations.problems)
+        self.problems = [*dict.fromkeys((*self.relations.problems, *self.manner.lost))]
         for portion in portions(self.block.behaviors):
             for behavior in portion:
                 if behavior.id not in self.dropped:
                     self._read(behavior)
             yield 4 * len(portion)
+        self._let_fall()
         if begun := sorted(
             self.known.begun & self.chains.keys(), key=lambda id: self.known.natural_end(self.chains[id])
         ):
@@ -156,6 +154,14 @@ class _Planner:
             self.problems = [each for each in self.problems if each not in futile.values()]
         self.problems.append(Problem(kind, at_line(line or self.lines[id], as_dropped(reason, advice)), id))
 
+    def _let_fall(self) -> None:
+        """Drop what needs a behavior that is dropped."""
+        for id, needed in falling(self.chains, self.dropped, self.known.begun).items():
+            fallen = self.chains[id]
+            self._drop(id, "CANNOT_CREATE_BEHAVIOR", without(needed))
+            if needed in self.depending:
+                self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
+
     def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
 
@@ -165,12 +171,13 @@ class _Planner:
         while True:
             self.turns = self.parts.turns - self.overlaps
             said = self.relations
-            present, classes = yield from self._remaining(untied(said, self.untied) if self.untied else said)
+            left = untied(said, self.untied) if self.untied else said
+            present, classes = yield from remaining(left, self.chains, self.dropped, self.block.id)
             try:
                 plan = yield from self._plan(present, classes)
                 if self.untied:
-                    present, _ = yield from self._remaining(said)
-                return (yield from self._compared(plan, present))
+                    present, _ = yield from remaining(said, self.chains, self.dropped, self.block.id)
+                return (yield from compared(plan, present, self.known))
             except Misordered:
                 continue
             except Losses as found:
@@ -198,20 +205,9 @@ class _Planner:
                         if given_up.isdisjoint(loss.among):
                             self._lose(loss)
                     yield len(part)
+                self._let_fall()
                 self.order.begin_anew(self.chains)
                 self.parts.begin_anew()
-
-    def _remaining(self, relations: Relations) -> Steps[tuple[Relations, Classes]]:
-        return (yield from remaining(relations, self.chains, self.dropped, self.block.id))
-
-    def _compared(self, plan: Plan, said: Relations) -> Steps[Plan]:
-        """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
-        if not self.known.points:
-            return replace(plan, relations=replace(plan.relations))
-        times = self.known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
-        yield len(times) // 4
-        broken = yield from broken_by(said, times)
-        return replace(plan, relations=replace(said), broken=tuple(broken))
 
     def _lose(self, loss: Loss) -> None:
         id = loss.behavior
@@ -250,8 +246,7 @@ class _Planner:
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
-        tried: list[Arrangement] = []
-        """Arrangements since the last conflict."""
+        tried: list[Arrangement] = []  # since the last conflict
         while True:
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
@@ -269,10 +264,12 @@ class _Planner:
             waits = foresight.waits(assembly, self.known)
             sharing = share(self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits)
             arranged, others = yield from sharing
-            conflicts = [each for each in (*conflicts, *others) if self._is_open(each)]
+            conflicts = [
+                each for each in (*conflicts, *others) if each.is_open(self.known.begun, self.overlaps | self.turns)
+            ]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
             rivals = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
-            if losses := (yield from rivals):
+            if (losses := (yield from rivals)) and not self.manner.may_be_late:
                 raise Losses(losses)
             for part in portions(conflicts):
                 for conflict in part:
@@ -304,6 +301,8 @@ class _Planner:
             kept=kept_points(self.chains, present, arrangement.handovers),
             entering=arranged.ranked,
             turns=self.turns,
+            manner=self.manner,
+            late=self.late,
             holders={
                 name: given[name].parts for name in sorted({turn[1].behavior for turn in self.turns} & given.keys())
             },
@@ -321,14 +320,6 @@ class _Planner:
             ),
         )
 
-    def _is_open(self, conflict: Conflict) -> bool:
-        """True if a conflict can be settled: who has begun waits no more."""
-        if conflict.hand:
-            return True
-        assert conflict.turn is not None
-        is_settled = conflict.turn in self.overlaps or conflict.turn in self.turns
-        return conflict.turn[0] not in self.known.begun and not is_settled
-
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
     ) -> Steps[tuple[Assembler, Assembly, Solution]]:
@@ -338,6 +329,7 @@ class _Planner:
         """
         while True:
             assembly = yield from assembler.assemble(arrangement)
+            net = standing(assembly.net, assembly.at, self.chains, self.manner.stands)
             if assembly.is_ordered or not (circles := (yield from assembler.circles())):
                 break
             for points in circles:
@@ -347,7 +339,11 @@ class _Planner:
         try:
             times = foresight.foreseen(assembly, self.known, self.doubted)
             behind = tuple(foresight.awaited(assembly, self.known, self.waived))
-            solution = yield from predict(assembly.net, lambda ties: bool(assembly.waits(ties)), times, behind)
+            is_custom, may_be_late = (lambda ties: bool(assembly.waits(ties))), self.manner.may_be_late
+            solution = yield from predict(net, is_custom, times, behind, may_be_late)
+            if may_be_late:
+                net, self.late = eased(net, solution.times)
+            assembly = replace(assembly, net=net)
             if (yield from self.order.pass_alone(assembly.net, assembly.at, solution.times)):
                 raise Misordered
             return assembler, assembly, solution

@@ -43,6 +43,7 @@ def predict(
     is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False,
     known: Mapping[int, Seconds] = {},
     awaited: Iterable[Awaited] = (),
+    may_be_late: bool = False,
 ) -> Steps[Solution]:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
@@ -50,7 +51,7 @@ def predict(
     awaited: which of them come after transitions of this net.
     A cycle that takes too long is shortened: each phase by a share of its room, those that can be slower before those
     that have to hurry. Raises Impossible; also for a cycle with ties that are dispensable: no phase is hurried for
-    their sake.
+    their sake. may_be_late: what the block says is missed then, by as little as can be.
     """
     foreseen = [Foresight("order", 0, each, at, at) for each, at in sorted(known.items()) if each and at > 0.0]
     past = {each: at for each, at in known.items() if each and at <= 0.0}
@@ -75,6 +76,8 @@ def predict(
                 circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
                 room = [seconds - least(tie) for tie, seconds in circle]
                 excess = sum(lag.seconds for lag in cycle)
+                if sum(room) < excess - EPSILON and may_be_late and (last := _said(circle)) is not None:
+                    room[last] = excess - sum(room)
                 if sum(room) < excess - EPSILON:
                     hopeless.append(tuple([(tie, least(tie)) for tie, _ in circle]))
                     continue
@@ -108,6 +111,12 @@ def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> 
     return [
         lag._replace(seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share
     ]
+
+
+def _said(circle: Circle) -> int | None:
+    """Number of the tie in a circle that may be missed: of what the block says, that of the last instant."""
+    said = [number for number, (tie, _) in enumerate(circle) if isinstance(tie, Bound) and not tie.behavior]
+    return max(said, key=lambda number: circle[number][0].source, default=None)
 
 
 def _is_beginning(tie: Place | Bound) -> bool:

@@ -10,12 +10,14 @@ BRIEF: Seconds = 0.05
 """Most seconds by which a behavior is slower on its way, so as not to stop."""
 UNNOTICED: Seconds = 0.008
 """Seconds by which it may pass there too early."""
+BRAKING: Seconds = 0.1
+"""Seconds before a hold point at which a movement that is to stop there begins to brake, at the most."""
 
 
 def slack(plan: Plan, point: Point) -> Seconds:
     """Seconds by which a behavior may be early at a hold point that it shares with nobody, and not stop there."""
     members = plan.members[plan.at[point]]
-    if len(members) > 1 or not members[0].can_wait:
+    if len(members) > 1 or not members[0].can_wait or point in plan.manner.stands:
         return 0.0
     chain = plan.chains[point.behavior]
     number = chain.points.index(point) - 1

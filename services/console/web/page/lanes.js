@@ -101,6 +101,8 @@ function caption(context, text, from, to, middle, room, inside) {
 
 // -- connection events ---------------------------------------------------------------------------------------------
 
+// States of an event in plain words, where the term says little.
+const MEANT = { superseded: "another one took its place", preempted: "another one came first" };
 const GOOD = new Set(["succeeded", "completed"]);
 
 export function eventLanes(panel) {
@@ -154,14 +156,14 @@ function drawEvent({ context, x, now, names }, event, top, size, shade, room) {
   let text = "";
   if (GOOD.has(event.state)) {
     context.fillRect(x(decided), high, to - x(decided), low);
-    text = event.delay === null ? "" : `after ${seconds(event.delay)}`;
+    text = event.delay === null ? "" : event.delay < 0 ? `had begun ${seconds(-event.delay)} before` : `after ${seconds(event.delay)}`;
   } else if (event.state !== "started") {
     context.fillStyle = color(event.state === "failed" ? "--bad" : "--quiet");
     context.textAlign = "center";
     context.textBaseline = "middle";
     context.fillText(event.state === "failed" ? "✕" : "–", x(decided), top + size / 2);
     context.textBaseline = "alphabetic";
-    text = event.state === "failed" && event.optional ? "(failed)" : event.state;
+    text = event.state === "failed" && event.optional ? "(failed)" : MEANT[event.state] ?? event.state;
   } else {
     text = `waits ${(now - event.since).toFixed(1)} s`;
   }

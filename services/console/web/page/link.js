@@ -1,37 +1,70 @@
-// The WebSocket with frames. The next one comes only when we say that we have drawn the last.
-const AGAIN = 1000; // ms from a broken link to the next try
-const LOOK = 1000; // ms between two looks at whether frames come
-const SILENCE = 4; // looks without any frame after which the window is away
-const DEAD = 15; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
+// The link to the window: frames come, one when we say that we have drawn the last, and orders go.
+import { queue } from "./queue.js";
 
-export function follow(take, tell) {
+const AGAIN = 1000; // ms from a broken link to the next try
+const LOOK = 250; // ms between two looks at how the link is
+const SILENCE = 16; // looks without any frame after which the window is away
+const DEAD = 60; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
+const NOTED = 0.5; // seconds after which an order without an answer is shown
+const KEPT = "engage-orders"; // what is left over as the page is loaded anew
+const clock = () => Date.now() / 1000; // goes on while a computer sleeps
+
+// take: gets each frame, and whether it is the first of a link. tell: whether the window is there, and why not. report: what was not done. wait: names of orders without an answer.
+export function follow({ take, tell, report, wait }) {
   let socket = null;
   let ended = false;
   let silent = 0; // looks since the last frame: time in which this page does not run, as that of a computer that sleeps, does not count
   let reason = ""; // why the window has closed the link itself
+  let told = 0; // number of the last news of orders
+  let last = null; // the last frame's time and ours, once the link is open
+  const orders = queue(JSON.parse(sessionStorage.getItem(KEPT) ?? "null"));
+  sessionStorage.removeItem(KEPT);
+
+  const say = (reports) => reports.length && report(reports);
+  function flush() {
+    if (last === null || socket.readyState !== WebSocket.OPEN) return;
+    say(orders.expire(clock()));
+    for (const message of orders.next(last)) socket.send(message);
+  }
 
   function open() {
-    const own = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/frames${location.search}`);
+    const place = new URL("frames", document.baseURI);
+    place.protocol = place.protocol.replace("http", "ws");
+    place.search = location.search;
+    place.searchParams.set("session", orders.session);
+    const own = new WebSocket(place);
     socket = own;
-    let isFirst = true;
+    last = null;
     own.onmessage = (message) => {
       if (own !== socket) return;
+      const frame = JSON.parse(message.data);
+      const isFirst = last === null;
       silent = 0;
       reason = "";
+      last = { frame: frame.now, heard: clock() };
+      if (isFirst && frame.session !== orders.session) told = 0;
+      frame.told = frame.told?.filter((each) => each.number > told);
+      told = frame.told?.at(-1)?.number ?? told;
+      for (const each of frame.told ?? []) each.text = orders.refusal(each); // before it is known to be taken, and forgotten
+      if (isFirst) say(orders.open(frame.session, frame.taken));
+      else if (frame.taken !== undefined) orders.taken(frame.taken);
       tell(true);
-      take(JSON.parse(message.data), isFirst);
-      isFirst = false;
+      take(frame, isFirst);
+      flush();
       requestAnimationFrame(() => own.readyState === WebSocket.OPEN && own.send('{"do":"drawn"}'));
     };
     own.onclose = (event) => {
       if (ended || own !== socket) return;
       reason = event.reason;
-      tell(false, reason);
-      setTimeout(open, AGAIN);
+      last = null;
+      if (reason) tell(false, reason);
+      setTimeout(() => own === socket && open(), AGAIN);
     };
   }
   const watch = setInterval(() => {
-    if (document.hidden) return (silent = 0); // it draws nothing, and so gets nothing
+    say(orders.expire(clock()));
+    wait(orders.pending(clock() - NOTED));
+    if (document.hidden && socket.readyState === WebSocket.OPEN) return (silent = 0); // it draws nothing, and so gets nothing
     silent += 1;
     if (silent < SILENCE) return;
     tell(false, reason);
@@ -40,15 +73,17 @@ export function follow(take, tell) {
     socket.close();
     open();
   }, LOOK);
+  addEventListener("pagehide", () => {
+    ended = true;
+    clearInterval(watch);
+    if (orders.pending(Infinity).length) sessionStorage.setItem(KEPT, JSON.stringify(orders.kept()));
+    socket.close(1000);
+  });
   open();
   return {
     send(order) {
-      if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order));
-    },
-    end() {
-      ended = true;
-      clearInterval(watch);
-      socket.close();
+      say(orders.give(order, clock()));
+      flush();
     },
   };
 }

@@ -28,7 +28,7 @@ export function words(panel) {
   return {
     take(state, changed) {
       if (!changed.has("words")) return;
-      const shown = state.words.filter((said) => said.words || said.open || said.left.length);
+      const shown = state.words.filter((said) => said.words || (said.open && said.actor !== state.robot) || said.left.length); // of a robot that has begun, the first word comes
       while (list.children.length > shown.length) list.lastChild.remove();
       shown.forEach((said, index) => {
         const item = list.children[index] ?? list.appendChild(element("li"));

@@ -69,12 +69,16 @@ export function prose(text) {
 // News of the orders that were given in a panel: shown for a while in its line for them.
 export function news(panel) {
   const line = panel.querySelector(".told");
-  let clearing = null;
+  let shown = [];
+  const show = () => line.replaceChildren(...prose(shown.join(" ")));
   return (told) => {
     const texts = told.filter((each) => each.panel === panel.id).map((each) => each.text);
     if (!texts.length) return;
-    line.replaceChildren(...prose(texts.join(" ")));
-    clearTimeout(clearing);
-    clearing = setTimeout(() => (line.textContent = ""), 9000);
+    shown.push(...texts);
+    show();
+    setTimeout(() => {
+      shown = shown.slice(texts.length);
+      show();
+    }, 9000);
   };
 }

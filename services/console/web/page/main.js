@@ -14,9 +14,8 @@ const EACH = ["block/", "net/"]; // sections that there are several of
 
 export function begin(root, robot) {
   const at = (id) => root.querySelector(`#${id}`);
-  const state = { robot, blocks: new Map(), layouts: new Map(), now: () => 0 };
-  let send = () => {};
-  const order = (what) => send(what);
+  const state = { robot, blocks: new Map(), layouts: new Map(), now: () => 0, away: "" };
+  const order = (what) => link.send(what);
   const drawn = [
     space(at("scene"), order), map(at("above"), order), part(at("part"), order), wizard(at("wizard"), order), words(at("said")), head(at("head")), eventLanes(at("events")),
     behaviorLanes(at("behaviors")), net(at("net")), measures(at("measures")), references(at("references")),
@@ -80,20 +79,36 @@ export function begin(root, robot) {
     }
   }
 
-  let running = true;
   function tick() {
-    if (!running) return;
     for (const part of drawn) alone(part, () => part.tick?.(state));
     requestAnimationFrame(tick);
   }
   requestAnimationFrame(tick);
-  const link = follow(take, warning.link);
-  send = link.send;
+
+  // Tell all panels something that no frame has.
+  function news(what) {
+    for (const part of drawn) alone(part, () => part.take(state, new Set([what])));
+  }
+  const waits = root.querySelector(".waits");
+  const link = follow({
+    take,
+    tell(there, reason = "") {
+      warning.link(there, reason);
+      const away = there ? "" : reason || "the window does not answer";
+      if (away === state.away) return;
+      state.away = away;
+      news("away");
+    },
+    report(told) {
+      state.told = told;
+      news("told");
+    },
+    wait(names) {
+      waits.textContent = names.length ? `Without an answer from the window yet: ${names.join(", ")}.` : "";
+      waits.hidden = !names.length;
+    },
+  });
   window.engage = { state, send: link.send, take, drawn }; // for who looks into the page with the browser's tools
-  return () => {
-    running = false;
-    link.end();
-  };
 }
 
 // Seconds of the picture, between frames by the browser's own clock. Frames come late, never early.

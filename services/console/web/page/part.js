@@ -1,12 +1,12 @@
 // The seat: whoever looks at the page becomes a person before the robot.
+import { gate } from "./gate.js";
 import { element, news, prose } from "./look.js";
-
-const PATIENCE = 8000; // ms after which one may try again to sit down
 
 export function part(panel, order) {
   const place = panel.querySelector(".part");
   let speaking = false;
   const told = news(panel);
+  const close = gate(panel, (text) => told([{ panel: panel.id, text }]));
 
   const button = (text, attributes, act) => {
     const made = element("button", { type: "button", ...attributes }, text);
@@ -25,13 +25,12 @@ export function part(panel, order) {
     sit.setAttribute("aria-disabled", "true");
     sit.textContent = "Sitting down…";
     order({ do: "sit", name: name.value.trim() });
-    setTimeout(rise, PATIENCE);
   });
   let seat = "Take a seat";
   let isSitting = false;
   const rise = () => {
     isSitting = false;
-    sit.removeAttribute("aria-disabled");
+    if (!sit.dataset.why) sit.removeAttribute("aria-disabled");
     sit.textContent = seat;
   };
 
@@ -70,12 +69,19 @@ export function part(panel, order) {
       button("Leave", {}, () => order({ do: "leave" }))),
     form);
   const refused = element("p", { class: "why" });
-  place.replaceChildren(away, here, refused);
+  const closed = element("p", { class: "why", role: "status" });
+  place.replaceChildren(away, here, refused, closed);
   here.hidden = true;
 
   return {
     take(state, changed) {
       here.dataset.robot = state.robot;
+      if (changed.has("away") || changed.has("health")) {
+        for (const each of place.querySelectorAll("button")) if (each !== pointing) close(each, state.away);
+        const isAlone = state.health && !state.health.some((each) => each.service && each.here);
+        close(sit, state.away || (isAlone ? "no robot is on the bus" : ""));
+        closed.textContent = sit.dataset.why ? `Nobody can take part now: ${sit.dataset.why}.` : "";
+      }
       if (changed.has("you")) {
         const { person, denied, there: company } = state.you;
         seat = state.you.sit || seat;

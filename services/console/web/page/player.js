@@ -1,4 +1,5 @@
 // The bar of a recording: play and pause, a place to go to, and how fast.
+import { gate } from "./gate.js";
 import { clock, element, news } from "./look.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 10];
@@ -33,10 +34,12 @@ export function player(bar, order) {
   const where = element("span", { class: "where" });
   bar.replaceChildren(button, slider, where, speed, element("p", { class: "told", role: "status" }));
   const told = news(bar);
+  const close = gate(bar, (text) => told([{ panel: bar.id, text }]));
 
   return {
     take(state, changed) {
       if (changed.has("told")) told(state.told);
+      if (changed.has("away")) close(button, state.away);
       if (!changed.has("place")) return;
       place = state.place;
       bar.hidden = false;

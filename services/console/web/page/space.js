@@ -1,5 +1,5 @@
 // The scene in 3D. Drawn when a frame has changed it, or when somebody turns it: never for nothing.
-import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
+import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "three";
 import { element, isDark, pieceColor } from "./look.js";
 import { described, sceneInWords } from "./tell.js";
 

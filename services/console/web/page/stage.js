@@ -1,5 +1,5 @@
-// The part of the page that is drawn from frames: where its panels stand. What they show is drawn by the other modules.
-import { begin } from "engage-window/main.js";
+// The page: where its panels stand, and its colours. What the panels show is drawn by the other modules, from frames.
+import { begin } from "./main.js";
 
 const what = (text) => `<p class="what">${text}</p>`; // what a panel shows, for whoever sees it for the first time
 const MAIN = [
@@ -24,20 +24,17 @@ const SIDE = [
 const panels = (all) => all.map(([id, title, inside]) => `<section id="${id}" aria-labelledby="${id}-title">
   <h2 id="${id}-title">${title}</h2>${inside}</section>`).join("\n");
 
-export default {
-  props: { robot: String },
-  template: `<div class="window">
-    <h1 class="unseen">Engage: {{ robot }}</h1>
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const paint = () => document.body.classList.toggle("body--dark", dark.matches);
+dark.addEventListener("change", paint);
+paint();
+document.body.innerHTML = `<div class="window">
+    <h1 class="unseen">${document.title.replace(/[&<]/g, (sign) => `&#${sign.charCodeAt()};`)}</h1>
     <p class="away" role="alert" hidden></p>
+    <p class="waits" role="status" hidden></p>
     <p class="switched" role="status" hidden></p>
     <div id="player" class="player row" role="group" aria-label="The recording" hidden></div>
     <div class="column main">${panels(MAIN)}</div>
     <div class="column side">${panels(SIDE)}</div>
-  </div>`,
-  mounted() {
-    this.end = begin(this.$el, this.robot);
-  },
-  unmounted() {
-    this.end();
-  },
-};
+  </div>`;
+begin(document.querySelector(".window"), document.body.dataset.robot);

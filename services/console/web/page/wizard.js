@@ -1,9 +1,11 @@
 // The robot by hand: words, references, questions, signs of listening, its gaze, what is held, conditions of a study, faults of the body.
+import { gate } from "./gate.js";
 import { element, news, prose } from "./look.js";
 
 export function wizard(panel, order) {
   const place = panel.querySelector(".wizard");
   const told = news(panel);
+  const close = gate(panel, (text) => told([{ panel: panel.id, text }]));
   const by = input("by", "Your name, for the log", { maxlength: "40" });
   const send = (what) => order({ ...what, by: by.field.value.trim() });
   const button = (text, act, attributes = {}) => {
@@ -50,11 +52,26 @@ export function wizard(panel, order) {
   const named = element("div", { class: "row" }, ...by.parts);
   const speaks = element("div", {}, form, signs, script);
   const refused = element("p", { class: "why" });
-  place.replaceChildren(refused, named, speaks, steer, study, faults);
+  const closed = element("p", { class: "why", role: "status" }); // what cannot be ordered now, and why
+  place.replaceChildren(refused, closed, named, speaks, steer, study, faults);
+  const served = [[speaks, "generation", "the robot cannot be told what to say"], [steer, "realizer", "Stop, Hold and Go on have nothing to act on"],
+    [study, "generation", "no condition can begin"], [faults, "control", "no fault can be switched"]];
+  const shut = (state) => {
+    const missing = new Set(state.health?.filter((each) => each.service && !each.here).map((each) => each.name));
+    const told = [];
+    for (const [group, service, what] of served) {
+      const why = state.away || (missing.has(service) ? `${service} is not on the bus` : "");
+      for (const each of group.querySelectorAll("button")) close(each, each === inhibit && inhibit.getAttribute("aria-pressed") === "true" ? state.away : why);
+      if (why && !state.away && !group.hidden) told.push(`${what}: ${why}.`);
+    }
+    const text = state.away ? `Nothing can be ordered from here, no Stop either: ${state.away}. \`engage steer stop\` in a terminal stops the robot.` : told.map((each) => each[0].toUpperCase() + each.slice(1)).join(" ");
+    if (closed.dataset.text !== text) closed.replaceChildren(...prose(text));
+    closed.dataset.text = text;
+  };
   document.addEventListener("keydown", (event) => {
     const busy = event.target.closest?.("input, select, textarea") || event.repeat || event.ctrlKey || event.metaKey || event.altKey;
     const number = Number(event.key) - 1;
-    if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) send({ do: "prepared", number, addressee: whom.field.value });
+    if (!busy && !speaks.hidden && number >= 0 && number < script.children.length) script.children[number].querySelector("button").click();
   });
 
   let on = []; // kinds of faults that the body has
@@ -80,6 +97,7 @@ export function wizard(panel, order) {
         for (const [kind, isOn] of ordered) if (on.includes(kind) === isOn) ordered.delete(kind);
         for (const each of faults.querySelectorAll("button")) each.setAttribute("aria-pressed", String(on.includes(each.dataset.kind)));
       }
+      if (["you", "away", "health"].some((each) => changed.has(each))) shut(state);
       if (changed.has("told")) {
         ordered.clear(); // it may have been refused
         told(state.told);

@@ -1,0 +1,182 @@
+"""References that are chosen again before their words begin, and what is told of them: whole robots in memory."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any
+
+import pytest
+
+from engage_hri import perceive
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.summary import Summary
+from engage_hri.schemas.world import Entity
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.language_models import perform_call, stream
+from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.commandline import roster
+from engage_hri.services.commandline.config import load
+from engage_hri.services.runtime.service import running
+from tests.generation import deeds
+from tests.random_cases import share_of
+
+Happens = Callable[[Any, Robot], Awaitable[None]]
+CALL = {
+    "turn_status": "full",
+    "parts": [
+        {"say": "Please take this very nice"},
+        {"refer": "cup", "certainty": "high"},
+        {"say": "from the table."},
+    ],
+}
+
+
+def cup(*position: float) -> Entity:
+    return Entity(id="cup", kind="object", position=position, category="cup")  # type: ignore[arg-type]
+
+
+@asynccontextmanager
+async def robot(hub: MemoryHub, *left_out: str) -> AsyncIterator[tuple[Robot, AsyncExitStack]]:
+    config = load(settings=["simulation.human=none"])
+    names = [name for name in (*roster.ROBOT, "simulation") if name not in left_out]
+    services = {name: roster.service(name, config) for name in names}
+    async with running(hub, services), connect(hub=hub) as client, AsyncExitStack() as others:
+        for name in left_out:
+            await others.enter_async_context(running(hub, {name: roster.service(name, config)}))
+        yield client, others
+
+
+async def performed(hub: MemoryHub, happens: Happens, call: dict[str, Any] = CALL) -> Summary:
+    async with robot(hub) as (client, _), perceive("ann", hub=hub) as ann:
+        ann.bring(cup(0.5, 0.2, 0.8))
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        performing = asyncio.create_task(perform_call(client, call))
+        await happens(ann, client)
+        return await performing
+
+
+async def test_nothing_happens_and_the_robot_points(hub: MemoryHub) -> None:
+    async def nothing(ann: Any, client: Robot) -> None: ...
+
+    told = await performed(hub, nothing)
+
+    assert told.said == "Please take this very nice this from the table."
+    assert [(each.by, each.phrase) for each in told.references] == [("pointing", "this")]
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.3, 0.6, 0.9, 1.2])
+@pytest.mark.parametrize("place", [(-1.0, 0.2, 0.8), (-0.5, 0.6, 0.8)])
+async def test_a_reference_whose_object_goes_out_of_reach_is_made_without_the_hand(
+    hub: MemoryHub, delay: float, place: tuple[float, float, float]
+) -> None:
+    async def moves(ann: Any, client: Robot) -> None:
+        await asyncio.sleep(delay)
+        ann.bring(cup(*place))
+
+    told = await performed(hub, moves)
+
+    assert told.status == "done"
+    (made,) = told.references
+    assert made.by in ("words alone", "a look")
+    assert made.phrase == "the cup"
+    assert told.said == "Please take this very nice the cup from the table."
+
+
+async def test_an_object_that_comes_to_another_place_within_reach_is_pointed_at_there(hub: MemoryHub) -> None:
+    async def moves(ann: Any, client: Robot) -> None:
+        await asyncio.sleep(0.5)
+        ann.bring(cup(0.45, -0.2, 0.8))
+
+    told = await performed(hub, moves)
+
+    assert [each.by for each in told.references] == ["pointing"]
+
+
+@pytest.mark.parametrize("part", ["left_arm", "head"])
+async def test_a_reference_is_chosen_again_if_the_body_breaks_off_its_gesture(hub: MemoryHub, part: str) -> None:
+    before = "stroke_start" if part == "left_arm" else "stroke"
+
+    async def breaks(ann: Any, client: Robot) -> None:
+        await client.switch_on(BodyFault(kind="overheated", part=part, before=before))
+
+    told = await performed(hub, breaks)
+
+    assert told.status == "done"
+    assert [each.phrase for each in told.references] == ["the cup"]
+    assert told.said == "Please take this very nice the cup from the table."
+
+
+async def test_words_that_have_begun_are_said_and_a_warning_tells_that_nothing_was_shown(hub: MemoryHub) -> None:
+    async def breaks(ann: Any, client: Robot) -> None:
+        await client.switch_on(BodyFault(kind="overheated", part="left_arm", before="stroke"))
+
+    told = await performed(hub, breaks)
+
+    assert [(each.by, each.phrase, each.looked) for each in told.references] == [("a look", "this", None)]
+    assert "refer-2: 'this' was said, but the point at cup did not come" in told.problems
+
+
+async def test_a_turn_ends_once_its_addressee_has_left_and_says_so(hub: MemoryHub) -> None:
+    async def leaves(ann: Any, client: Robot) -> None:
+        await asyncio.sleep(0.6)
+        await ann.leave()
+
+    call = {"turn_status": "full", "parts": [{"say": "one two three four five six seven eight nine ten " * 3}]}
+    told = await performed(hub, leaves, call)
+
+    assert told.status == "interrupted"
+    assert told.cut_short
+    assert any("ann has left" in each for each in told.problems), told.problems
+
+
+@pytest.mark.parametrize("service", ["generation", "realizer"])
+async def test_what_a_service_that_died_was_doing_is_unknown_and_not_refused(hub: MemoryHub, service: str) -> None:
+    async with robot(hub, service) as (client, life), perceive("ann", hub=hub):
+        await asyncio.sleep(1.0)
+        call = {"turn_status": "full", "parts": [{"say": "one two three four five six seven eight nine ten " * 3}]}
+        performing = asyncio.create_task(perform_call(client, call))
+        await asyncio.sleep(3.0)
+        await life.aclose()
+        told = await performing
+
+    assert told.status == "unknown"
+    assert told.said.startswith("one two three") is (service == "realizer")
+
+
+async def test_a_stream_whose_first_fragment_is_refused_is_refused(hub: MemoryHub) -> None:
+    async def pieces() -> AsyncIterator[str]:
+        yield "Hello there."
+
+    async with (
+        robot(hub) as (client, _),
+        perceive("ann", hub=hub),
+        perceive("bob", hub=hub, position=(1.0, 1.0, 1.3)),
+    ):
+        await asyncio.sleep(1.0)
+        outcomes = await stream(client, pieces(), id="s")
+
+    told = deeds.summary(*outcomes)
+    assert told.status == "refused"
+    assert not told.cut_short
+
+
+@pytest.mark.parametrize("seed", range(share_of(12)))
+def test_an_independent_reader_of_the_robot_finds_no_difference(seed: int) -> None:
+    assert deeds.run(seed) == []
+
+
+def test_the_reader_finds_what_is_told_wrongly() -> None:
+    reader = deeds.Reader()
+    reader.take({"type": "block_progress", "block": "f", "progress": "end", "status": "done"})
+    reader.take({"type": "sync_point_progress", "block": "f", "behavior": "r-gaze", "sync": "stroke"})
+    reader.take({"type": "word_spoken", "block": "f", "behavior": "r-phrase", "word": "this"})
+    right = deeds.Referred(object="cup", phrase="this", by="a look")
+    wrong = deeds.Referred(object="cup", phrase="this", by="pointing")
+
+    def told(references: tuple[Any, ...], said: str = "this") -> list[str]:
+        return deeds.compared("t", Summary(status="done", said=said, references=references), ["f"], reader)
+
+    assert told((right,)) == []
+    assert len(told((wrong,))) == 1
+    assert len(told((right,), "this one")) == 1
