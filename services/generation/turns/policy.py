@@ -16,6 +16,7 @@ from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.listening import is_listening
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 LONGEST_LISTENING: Seconds = 3.0
 """Seconds of nothing but a listener's words, such as "yes, yes, okay", after which their speaker takes the floor."""
@@ -254,7 +255,7 @@ class TurnPolicy:
         """The turn whose addressee is out of sight, and when that has lasted so long that the person has left."""
         return next(
             (
-                (plan, self._away[plan.addressee] + self._config.face_lost)
+                (plan, self._away[plan.addressee] + FACE_GRACE)
                 for plan in self._turns_under_way
                 if plan.addressee in self._away
             ),
