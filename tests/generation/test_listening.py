@@ -14,8 +14,8 @@ LISTENING = (
     "d'accord", "sí, claro", "うんうん", "なるほど", "嗯 对",
 )  # fmt: skip
 OTHERS = (
-    "stop", "stop please", "wait", "no", "yes but wait", "okay stop", "what?", "okay I see what you mean", "halt", "", "!",
-    "righteous", "ja aber", "待って",
+    "stop", "stop please", "wait", "no", "yes but wait", "okay stop", "what?", "okay I see what you mean", "halt", "",
+    "!", "righteous", "ja aber", "待って",
 )  # fmt: skip
 
 
