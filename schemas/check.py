@@ -17,7 +17,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import LONGEST_WITHIN, TurnFragment
 from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
 from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, is_sync_point, objection
+from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, objection
 
 MOST_NODS = 1000
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"
@@ -140,7 +140,7 @@ def _values(behavior: Behavior) -> Iterator[tuple[str, str, str]]:
             yield f"{field} is {value}", field, "give a finite number"
     syncs = [timing.sync for timing in behavior.timing]
     for sync in syncs:
-        if not is_sync_point(sync):
+        if not is_id(sync):
             yield f"{sync!r} is not a sync point", "timing", _SYNC_ADVICE
     if len(set(syncs)) < len(syncs):
         yield "a sync point is timed twice", "timing", "use a <constraint> for the second"

@@ -85,7 +85,7 @@ class SyncRef(Struct, frozen=True, omit_defaults=True):
         elif len(parts) == 4:
             raise _bad(text, "the fourth part is the number of a repetition")
         *block, behavior, sync = parts
-        if not is_sync_point(sync):
+        if not is_id(sync):
             why = ": ".join(filter(None, (f"{sync!r} is not a sync point", objection(sync))))
             raise _bad(text, why if sync else "no sync point")
         if behavior == BLOCK_ITSELF and sync not in ("start", "end"):
@@ -119,11 +119,6 @@ def objection(text: str) -> str:
     if text.startswith("-"):
         return "it begins with '-'"
     return f"it is longer than {LONGEST_ID} characters" if len(text) > LONGEST_ID else "it is empty or no UTF-8"
-
-
-def is_sync_point(text: str) -> bool:
-    """Tell whether a text can name a sync point or mark."""
-    return is_id(text)
 
 
 def _split_offset(tail: str, names: Collection[str]) -> tuple[str, float]:

@@ -36,7 +36,8 @@ DEMONSTRATIVES = ("this", "that")
 """First words of phrases that need a pointing gesture."""
 
 _BEHAVIOR = re.compile(r"\$\.behaviors\[(?P<index>\d+)\](?:\.options\[(?P<option>\d+)\])?[\w.\[\]]*")
-CALL = 'for example {"turn_status": "full", "parts": [{"say": "Hello."}]}'
+EXAMPLE = '{"turn_status": "full", "parts": [{"say": "Hello."}]}'
+CALL = f"for example {EXAMPLE}"
 """Advice for a call that is none."""
 _KINDS = {kind.__struct_fields__[0]: kind for kind in PARTS}
 _OF_CALLS = {*_KINDS, *ToolInput.__struct_fields__} - {*TurnFragment.__struct_fields__}

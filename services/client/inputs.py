@@ -12,7 +12,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import decode, published
 from engage_hri.schemas.requests import Request
-from engage_hri.schemas.tool_call import CALL
+from engage_hri.schemas.tool_call import EXAMPLE
 
 FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 """A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""
@@ -67,9 +67,7 @@ def _things(source: str | bytes | Path | dict[str, Any], unnamed: str) -> tuple[
             )
     if isinstance(source, str) and not source.lstrip("\ufeff \t\r\n").startswith(("<", "{", "[")):
         is_path = source.endswith((".xml", ".json", ".bml", ".ebml"))
-        advice = (
-            f"the content of a file is read from Path({source!r})" if is_path else f"words are said by {CALL[12:]}"
-        )
+        advice = f"the content of a file is read from Path({source!r})" if is_path else f"words are said by {EXAMPLE}"
         raise InputRefused(Fault(reason="neither XML nor JSON", where=source[:80], advice=advice))
     return read(data, place, unnamed), place
 
