@@ -112,7 +112,7 @@ class TurnPolicy:
     @property
     def _current(self) -> TurnPlan | None:
         """The turn that the robot has, until its end is signalled. A backchannel is said in the other's turn."""
-        plans = (*self._live.values(), *([self._open] if self._open else []))
+        plans = self._turns_under_way
         return next((plan for plan in plans if not plan.backchannel and not self._begun.get(plan.turn)), None)
 
     def accept(self, fragment: TurnFragment, addressee: str) -> TurnPlan:
