@@ -25,14 +25,13 @@ from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
 from engage_hri.services.realizer.plan.relations import at_line
+from engage_hri.services.realizer.plan.slack import UNNOTICED
 from engage_hri.services.realizer.plan.waiting import waited_for
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
 MOVED: Seconds = 0.008
 """Seconds; a prediction that moves by less, as something was measured, is not told again."""
-NOTICEABLE: Seconds = 0.008
-"""Seconds; a plan that misses what its block says by less is not told."""
 PLANNED: Seconds = 0.002
 """The same for the predictions of another plan: they are no mere consequence of what was measured."""
 ON_REQUEST = "stopped on request"
@@ -166,7 +165,7 @@ class Reporter:
         """Warn of what is broken by more than is tolerated. times: of points that have come, or are planned."""
         is_past = verb == "came"
         is_of_plan = bool(plan.late) and not is_past and not is_foreign(broken.early.behavior + broken.late.behavior)
-        if broken.seconds > (NOTICEABLE if is_of_plan else self._tolerance):
+        if broken.seconds > (UNNOTICED if is_of_plan else self._tolerance):
             point = broken.point
             late = point.behavior if broken.direction == "later" else ""
             why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""

@@ -66,16 +66,20 @@ class BlockPerformance:
         self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._dropped = reasons(plan)  # behaviors that were dropped, each with the reason
+        self._dropped = reasons(plan)
+        """Behaviors that were dropped, each with the reason."""
         self.interrupted: dict[str, str] = {}
         """Behaviors that are ended on request, each with the reason if one was given."""
         self.ties = Ties(self, shared.others, shared.live_blocks, live.elsewhere)
         self.spoken = Spoken(plan.block.behaviors)
         self._ending = live.ending
-        self._timer, self._soon, self._afterwards = Timer(self.take_in), Alarm(self.take_in), Afterwards(self.take_in)
+        self._timer = Timer(self.take_in)
+        self._afterwards = Afterwards(self.take_in)
+        self._soon = Alarm(self.take_in)
         self.rehearsing = Rehearsing(self, shared.others, shared.bus.now, shared.ask)
         self.leaders: Collection[str] = ()
-        self._untold, self._needs_replan = list[News](), False
+        self._untold: list[News] = []
+        self._needs_replan = False
 
     def containing(self) -> Containing:
         """Contain exceptions in the body of `with`: they end this block, and no other."""
@@ -202,8 +206,10 @@ class BlockPerformance:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
         await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort)
-        net = self.decisions.net
-        (net.let_go if self._outcome.status == "done" else net.clear)()
+        if self._outcome.status == "done":
+            self.decisions.net.let_go()
+        else:
+            self.decisions.net.clear()
         self._net.end()
         if ending.status == "failed":
             self._go_home(self.parts_used)
@@ -233,9 +239,10 @@ class BlockPerformance:
         self._afterwards.stop()
         if self._needs_replan:
             self.replan()
-        while not self._ending.done():
-            if not any([self.apply(each) for each in self.decisions.advance(self.bus.now())]):  # noqa: C419
-                break
+        again = True
+        while again and not self._ending.done():
+            made_news = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
+            again = any(made_news)
         foresight = self.decisions.foresight
         if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))

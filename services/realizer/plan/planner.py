@@ -38,7 +38,7 @@ from engage_hri.services.realizer.plan.relations import (
     as_dropped,
     at_line,
     relation_steps,
-)  # fmt: skip
+)
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
 from engage_hri.services.realizer.plan.sharing import naming_others, needless_turns, share, waits_elsewhere
@@ -96,16 +96,17 @@ class _Planner:
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
         self.estimates = estimates
         self.barred = barred
-        self.dropped = dict.fromkeys(
-            [*dropped, *(each.behavior for each in manner.lost)]
-        )  # in the order in which they were dropped; the values mean nothing
+        self.dropped = dict.fromkeys([*dropped, *(each.behavior for each in manner.lost)])
+        """Behaviors in the order in which they were dropped; the values mean nothing."""
         self.depending: dict[str, tuple[Chain, Loss, Problem]] = {}
         """Dropped behaviors that may be on time after all if a speech gives up a time, with why they were dropped."""
         self.given_up: dict[str, dict[str, Problem]] = {}  # see `Plan`
-        self.turns, self.parts = frozenset[Turn](), PartOrder()
+        self.turns = frozenset[Turn]()
         self.overlaps: set[Turn] = set()  # turns that there is no time to wait for
         self.pruned: set[Turn] = set()  # turns that were found to be needless, once
-        self.hands, self.chains = dict[str, Hand](), dict[str, Chain]()
+        self.parts = PartOrder()
+        self.hands: dict[str, Hand] = {}
+        self.chains: dict[str, Chain] = {}
 
     def read(self) -> Steps[None]:
         self.relations = yield from relation_steps(self.block, self.known.blocks)
@@ -246,7 +247,8 @@ class _Planner:
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
         assembler = yield from assembling(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
-        tried: list[Arrangement] = []  # since the last conflict
+        tried: list[Arrangement] = []
+        """Arrangements since the last conflict."""
         while True:
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)

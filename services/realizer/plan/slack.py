@@ -9,7 +9,7 @@ from engage_hri.services.realizer.points import Point
 BRIEF: Seconds = 0.05
 """Most seconds by which a behavior is slower on its way, so as not to stop."""
 UNNOTICED: Seconds = 0.008
-"""Seconds by which it may pass there too early."""
+"""Seconds by which it may pass there too early; and by which a plan may miss what its block says, untold."""
 BRAKING: Seconds = 0.1
 """Seconds before a hold point at which a movement that is to stop there begins to brake, at the most."""
 
