@@ -43,6 +43,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.torso.body import SimulatedBody
@@ -141,15 +142,16 @@ def perform(block: Block) -> Performed:
     return run_virtual(_perform(block))
 
 
-async def _perform(block: Block) -> Performed:
+async def fed_back(block: Block, world: World, body: Body) -> tuple[BlockOutcome | None, list[object]]:
+    """Perform a block on a body. Returns the outcome, None if the block was refused, and all feedback in order."""
+    told: list[object] = []
     async with MemoryHub() as hub:
         eyes, bus = hub.join("simulation"), hub.join("test")
-        eyes.publish(keys.WORLD, WORLD)
+        eyes.publish(keys.WORLD, world)
         services = {
-            "control": partial(embody, config=ControlConfig(), body=SimulatedBody()),
+            "control": partial(embody, config=ControlConfig(), body=body),
             "realizer": partial(realize, config=RealizerConfig()),
         }
-        told: list[object] = []
         async with running(hub, services), Requester(bus) as requests:
             with bus.subscribe(keys.FEEDBACK) as inbox:
                 request = PerformBlock(id=f"r-{block.id}", requester="test", block=block)
@@ -164,13 +166,19 @@ async def _perform(block: Block) -> Performed:
                     told.append(received.message)
         await bus.leave()
         await eyes.leave()
+    assert outcome is None or isinstance(outcome, BlockOutcome)
+    return outcome, told
+
+
+async def _perform(block: Block) -> Performed:
+    outcome, told = await fed_back(block, WORLD, SimulatedBody())
     at = {
         f"{each.behavior}:{each.sync}": (each.time, each.predicted)
         for each in told
         if isinstance(each, SyncPointProgress) and each.predicted is not None
     }
     warnings = [each.kind for each in told if isinstance(each, WarningFeedback)]
-    return Performed(block, outcome if isinstance(outcome, BlockOutcome) else None, at, warnings)
+    return Performed(block, outcome, at, warnings)
 
 
 def performed(blocks: int, *, shifts: bool, seed: int = 0) -> Iterator[Performed]:

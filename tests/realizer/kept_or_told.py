@@ -8,7 +8,6 @@ body and no plan.
 """
 
 import argparse
-import asyncio
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -17,23 +16,16 @@ from itertools import combinations
 from random import Random
 from typing import NamedTuple
 
-from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
-from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.body import Body
-from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.service import embody
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.service import realize
-from engage_hri.services.requests.ends import Requester, RequestRefused
-from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.judge.generate import story
 from tests.judge.reading import Reading, Term, read
 from tests.judge.story import WORLD
+from tests.realizer.exact_blocks import fed_back
 
 KEPT = 0.012
 """Seconds by which a constraint may be missed untold, or by another amount than told."""
@@ -77,29 +69,7 @@ def perform(xml: str, body: type[Body] | partial[Body] = SimulatedBody) -> Told:
 async def _perform(xml: str, body: type[Body] | partial[Body]) -> Told:
     block = decode_xml(xml)
     assert isinstance(block, Block)
-    told: list[object] = []
-    async with MemoryHub() as hub:
-        eyes, bus = hub.join("simulation"), hub.join("test")
-        eyes.publish(keys.WORLD, WORLD)
-        services = {
-            "control": partial(embody, config=ControlConfig(), body=body()),
-            "realizer": partial(realize, config=RealizerConfig()),
-        }
-        async with running(hub, services), Requester(bus) as requests:
-            with bus.subscribe(keys.FEEDBACK) as inbox:
-                request = PerformBlock(id="r", requester="test", block=block)
-                try:
-                    outcome = await asyncio.wait_for(requests.send(keys.BLOCK, request).outcome, 300.0)
-                except RequestRefused:
-                    outcome = None
-                await asyncio.sleep(0.0)
-                while len(inbox):
-                    received = await inbox.next()
-                    assert received is not None
-                    told.append(received.message)
-        await bus.leave()
-        await eyes.leave()
-    assert outcome is None or isinstance(outcome, BlockOutcome)
+    outcome, told = await fed_back(block, WORLD, body())
     times: dict[str, float] = {}
     warned: tuple[list[WarningFeedback], list[WarningFeedback]] = ([], [])
     for each in told:
