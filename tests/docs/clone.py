@@ -69,6 +69,7 @@ async def start(command: str, folder: Path) -> Process:
     settings = {
         "PATH": f"{folder / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}",
         "PYTHONUNBUFFERED": "1",
+        "PIP_DRY_RUN": "1",  # the python is that of the tests: a page that installs would break what they stand on
         "PYTHONDONTWRITEBYTECODE": "",  # every process would compile the copy anew
     }
     return await asyncio.create_subprocess_exec(

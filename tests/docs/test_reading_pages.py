@@ -124,7 +124,7 @@ def test_every_option_of_the_page_on_commands_is_there():
 def test_an_extra_that_a_page_installs_is_one():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 
-    asked = {extra for text in PAGES.values() for extra in re.findall(r"-e '\.\[(\w+)\]'", text)}
+    asked = {extra for text in PAGES.values() for extra in re.findall(r"-e '\.\[([\w-]+)\]'", text)}
     assert asked
     assert asked <= set(extras)
 
