@@ -56,7 +56,8 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     limit: Seconds | None = None
     """Time that the responder has, when `started`."""
     response: Action | None = None
-    """Adjacency pair: the action that answered."""
+    """Adjacency pair: the action that answered. Of a failed one: the answer that came after the limit, before anybody
+    began another turn; `delay` is then that of this answer."""
     confidence: Probability = 1.0
     """Least confidence of the observations by which it began and was answered; so far, when `started`."""
     block: str = ""
@@ -66,7 +67,8 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     words: str = ""
     """Words of the person that opened or answered the event, as far as they are known."""
     retold: bool = False
-    """True: the event itself was told before; only `words` have become known since then, or were corrected."""
+    """True: the event came to this state before. Since then `words` have become known or were corrected, or a failed
+    pair was answered late (`response`)."""
 
     def person(self, robot: str) -> str:
         """Actor id of the person who takes part in it. robot: the robot's own actor id."""

@@ -122,8 +122,8 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         ),
         eye_contact=next((each.eye_contact for each in reversed(outcomes) if each.eye_contact is not None), None),
         answer=_answer(pair, is_over=status != "done"),
-        answer_delay=_rounded(pair.delay) if pair and _decision(pair) else None,
-        answered_by=pair.responder if pair and _decision(pair) else "",
+        answer_delay=_rounded(pair.delay) if pair and pair.response else None,
+        answered_by=pair.responder if pair and pair.response else "",
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
         problems=_problems(
             text
@@ -160,12 +160,12 @@ def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal[
         return None
     if pair.state == "started":
         return "pending"
-    return (pair.response if _decision(pair) else None) or "none"
+    return pair.response or "none"
 
 
 def _heard(texts: Iterable[HeardText]) -> tuple[HeardWords, ...]:
     """Words in order; fragments of one turn tell some of them again."""
-    newest = {(each.actor, each.id): each for each in texts}
+    newest = {(each.actor, each.id, each.began): each for each in texts}
     said = sorted(newest.values(), key=lambda each: (each.began.seconds, each.actor, each.id))
     return tuple(HeardWords(who=each.actor, text=each.text, to=each.to) for each in said[-MOST_HEARD:])
 

@@ -115,8 +115,6 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Seconds that a hand moves before the head tracks it. Thesis 3.3.4 tracks hands; the number is ours."""
     hand_stillness: Seconds = 0.8
     """Seconds that a hand is still before the head leaves it. Ours."""
-    face_lost: Seconds = 2.0
-    """Seconds after which a lost face is no longer tracked; the head holds its direction. Ours."""
     report_grace: Seconds = REPORT_GRACE
     """Seconds for which what a participant said of people holds after it has gone from the bus, as in recognition."""
     retry: Seconds = 1.0
@@ -167,6 +165,6 @@ _POSITIVE = (
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
-    "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness", "face_lost",
+    "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness",
     "mtbce_events", "body_patience", "words_between", "words_patience", "report_grace",
 )  # fmt: skip

@@ -141,6 +141,10 @@ class FragmentRunner:
                         performance.hear(message)
             case Utterance():
                 self._heard.feed(message, now)
+                self._turns.hear(
+                    message.actor, message.text, began=self._bus.local(message.began), is_final=message.final,
+                    is_line=message.began == message.at,
+                )  # fmt: skip
 
     def recognition_gone(self, now: Seconds) -> None:
         """Start the grace after which the open events are lost: recognition may only be cut off."""

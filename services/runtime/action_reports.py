@@ -21,6 +21,9 @@ from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent
 from engage_hri.services.runtime.reporters import Reporters
 from engage_hri.services.runtime.reports import GoesOn, Told
 
+FACE_GRACE: Seconds = 2.0
+"""Time for which a person may be out of sight, and come back under the same id, before the person has gone. Trackers
+lose faces for 0.5 to 2 s all day."""
 REPORT_GRACE: Seconds = 4.0
 """Time for which what a reporter said holds after it has vanished, where no configuration says otherwise."""
 STRANGERS_KEPT = 256

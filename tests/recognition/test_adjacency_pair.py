@@ -130,10 +130,20 @@ the robot's question is the answer to a person who has finished
     human's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 2.5 lasting 0
     robot's ap-2: started 2.5
 
-the robot's question supersedes a turn that goes on
-    1 human +speak; 1.5 robot +speak; 1.5 asks ap turn=turn-1
-    human's ap-1: started 1, superseded 1.5
+the robot's question before the person has ended answers with a negative delay
+    1 human +speak; 1.5 robot +speak; 1.5 asks ap turn=turn-1; 2 human -speak; 4 robot -speak; 4 turn ended
+    human's ap-1: started 1, succeeded 2 after -0.5 by speak, completed 4 lasting 2.5
     robot's ap-2: started 1.5
+
+a robot that falls silent before the person has ended has answered, too
+    1 human +speak; 1.5 asks ap turn=turn-1; 1.5 robot +speak; 2 robot -speak; 2 turn ended; 3 human -speak; 4 time
+    human's ap-1: started 1, succeeded 3 after -1.5 by speak, completed 3 lasting 0.5
+    robot's ap-2: started 1.5, failed 3.5 after 2
+
+a person who leaves while the robot cuts in has been answered
+    1 human +speak; 1.5 robot +speak; 1.5 asks ap turn=turn-1; 2 lost human; 9 time
+    human's ap-1: started 1, succeeded 2.5 after -1 by speak, completed 2.5 lasting 0.5
+    robot's ap-2: started 1.5, failed 2.5 after 1
 
 robot that interrupts has answered when the person has finished
     1 human +speak; 1.5 robot +speak; 3 human -speak; 3.5 robot -speak

@@ -62,11 +62,11 @@ def test_every_event_ends_once_and_every_request_is_answered(seed, length):
             results += recognizer.advance(at)
             kind = ActorFound if at == 1000.0 else ActorLost
             results += recognizer.feed(kind(actor=actor, at=stamp(at)), at, at)
-    results += recognizer.advance(1002.0)
+    results += recognizer.advance(1001.0 + RecognitionConfig().lost_face_grace + 1.0)
 
     lives: dict[str, list[str]] = {}
     for event in results:
-        if isinstance(event, ConnectionEvent):
+        if isinstance(event, ConnectionEvent) and not event.retold:
             lives.setdefault(event.id, []).append(event.state)
     for states in lives.values():
         assert states[0] == "started"

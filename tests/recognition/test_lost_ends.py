@@ -36,7 +36,7 @@ speech that began before a gesture is the answer though it is known later
 after a lost end of speech the next answer is heard
     1 human +speak; 11 robot +speak next-words; 11 asks ap turn=turn-1; 14 robot -speak next-words; 14 turn ended
     14.4 human +speak; 15 human -speak
-    human's ap-1: started 1, superseded 11
+    human's ap-1: started 1, succeeded 14.4 after -3.4 by speak, completed 14.4 lasting 3
     robot's ap-2: started 11, succeeded 14.4 after 0.4 by speak, completed 15 lasting 0.6
 
 a new beginning ends the answer whose end was lost

@@ -19,8 +19,9 @@ PEOPLE = ("ann", "bob")
 CELL = 0.04
 """Within this from each full second things happen, and come in whatever order."""
 CONFIG = RecognitionConfig(
-    manipulation_limit=8.3, turn_patience=12.3, after_robot_directed=2.3, forgotten_after=600.3,
-    longest_speech=60.3, longest_gesture=10.3, longest_manipulation=120.3,
+    manipulation_limit=8.3, adjacency_pair_limit=4.3, lost_face_grace=2.3,
+    turn_patience=12.3, third_turn_limit=1.83, after_robot_directed=2.3,
+    forgotten_after=600.3, longest_speech=60.3, longest_gesture=10.3, longest_manipulation=120.3,
 )  # fmt: skip
 """No limit is a number of full seconds, so none passes between two observations of a cell."""
 

@@ -51,7 +51,8 @@ class Replay:
         return min((at for at in times if at is not None), default=None)
 
     def _tell(self, effects: list[Effect]) -> list[Statistics]:
-        events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
+        # As the service does: what is told again is not counted again.
+        events = [effect for effect in effects if isinstance(effect, ConnectionEvent) and not effect.retold]
         self.log += events
         self.busy = set(self._session.busy)
         told = self._published.feed(events, self.busy, self._now)

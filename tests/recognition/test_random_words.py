@@ -245,7 +245,7 @@ def test_words_change_nothing_but_words(seed: int) -> None:
     story = only_spoken(talk(random.Random(seed)))
     with_words = [replace(each, words="") for each in recognized(story) if not each.retold]
 
-    assert with_words == recognized(story, with_words=False)
+    assert with_words == [each for each in recognized(story, with_words=False) if not each.retold]
 
 
 @settings(max_examples=80, deadline=None)
@@ -268,9 +268,12 @@ def test_words_alone_are_told_with_the_speech_that_they_are(seed: int) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_an_event_is_told_again_only_with_other_words(seed: int) -> None:
+def test_an_event_is_told_again_only_with_other_words_or_a_late_answer(seed: int) -> None:
     for life in lives(recognized(talk(random.Random(seed)))):
         for before, after in pairwise(life):
-            if after.retold:
+            if after.retold and after.response != before.response:
+                assert (before.kind, before.state, after.state) == ("adjacency_pair", "failed", "failed")
+                assert before.response is None
+            elif after.retold:
                 assert replace(after, words="", at=before.at, retold=False) == replace(before, words="", retold=False)
                 assert after.words != before.words

@@ -14,6 +14,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 
 class _Hand(Struct):
@@ -162,12 +163,12 @@ class FaceWatch:
             person = self._people.get(id)
             return (math.hypot(person.position[0], person.position[1]) if person else math.inf, id)
 
-        here = [id for id in self._known if id not in self._lost or now < self._lost[id] + self._config.face_lost]
+        here = [id for id in self._known if id not in self._lost or now < self._lost[id] + FACE_GRACE]
         return sorted(here, key=distance)
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [lost + self._config.face_lost for lost in self._lost.values()]
+        due = [lost + FACE_GRACE for lost in self._lost.values()]
         return min((each for each in due if each > self._seen), default=None)
 
     def claim(self, now: Seconds) -> Claim | None:

@@ -27,8 +27,8 @@ class HeardWords:
     """The words of all people, as far as they are known."""
 
     def __init__(self) -> None:
-        self._said: dict[tuple[str, str], _Said] = {}
-        """By person and id, the last to become what they are at the end."""
+        self._said: dict[tuple[str, str, int], _Said] = {}
+        """By person, id and number of those of one id that do not overlap, the last to become so at the end."""
         self._told_of: dict[str, None] = {}
         self._since: dict[str, Seconds] = {}
         """Of each turn: from when on words count for it."""
@@ -40,7 +40,7 @@ class HeardWords:
         self._told_of[utterance.actor] = None
         if len(self._told_of) > PEOPLE:
             del self._told_of[next(iter(self._told_of))]
-        key = (utterance.actor, utterance.id)
+        key = (utterance.actor, utterance.id, self._number(utterance))
         known = self._said.get(key)
         if known is not None and _place(utterance) <= _place(known.utterance):
             return
@@ -48,6 +48,19 @@ class HeardWords:
         self._said[key] = _Said(utterance, now)
         if len(self._said) > MOST:
             del self._said[next(iter(self._said))]
+
+    def _number(self, utterance: Utterance) -> int:
+        """Number of an utterance among those of one id: some recognizers use one id for all that they understand.
+
+        Results of one utterance overlap; what began after the last of this id had ended is another one.
+        """
+        numbers = [n for actor, id, n in self._said if (actor, id) == (utterance.actor, utterance.id)]
+        if not numbers:
+            return 0
+        known = self._said[utterance.actor, utterance.id, max(numbers)].utterance
+        ended = known.ended or known.at
+        is_later = known.final and utterance.began.clock == ended.clock and utterance.began.seconds >= ended.seconds
+        return max(numbers) + (1 if is_later and utterance.began != known.began else 0)
 
     def expects(self, person: str) -> bool:
         """Tell whether somebody tells the words of this person: then those of an answer will come."""

@@ -15,6 +15,11 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns.listening import is_listening
+from engage_hri.services.runtime.action_reports import FACE_GRACE
+
+LONGEST_LISTENING: Seconds = 3.0
+"""Seconds of nothing but a listener's words, such as "yes, yes, okay", after which their speaker takes the floor."""
 
 
 class StatusRule(Struct, frozen=True):
@@ -100,6 +105,12 @@ class TurnPolicy:
         """People who are out of sight, and since when."""
         self._interrupters: dict[str, Seconds | None] = {}
         """People who began to speak within the robot's turn, and since when the robot speaks, too."""
+        self._spoke_since: Seconds = 0.0
+        """Time when the robot first spoke in the turn of its last words."""
+        self._listeners: set[str] = set()
+        """Those of the interrupters who have said nothing but a listener's words so far."""
+        self._taken_by = ""
+        """The person whose words have taken the floor; "": nobody's."""
 
     @property
     def open_turn(self) -> str:
@@ -159,7 +170,7 @@ class TurnPolicy:
         """Note that a turn is over: its end was signalled. Its last block may go on for a moment."""
         if turn in self._begun:
             self._begun[turn] = True
-            self._interrupters.clear()
+            self._forget_interrupters()
 
     def fragment_ended(self, id: str, *, complete: bool, now: Seconds, reason: str = "") -> Aborted | None:
         """End a fragment. Its turn is aborted unless the block was performed completely."""
@@ -201,13 +212,34 @@ class TurnPolicy:
         if message.actor == self._robot:
             self._robot_speaks = began
             if began and current is not None:
-                self._spoke_in = current.turn
+                if self._spoke_in != current.turn:
+                    self._spoke_in, self._spoke_since = current.turn, now
                 since = {actor: now if at is None else at for actor, at in self._interrupters.items()}
                 self._interrupters.update(since)
         elif not began:
             self._interrupters.pop(message.actor, None)
+            self._listeners.discard(message.actor)
         elif current is not None and current.addressee == message.actor and self._spoke_in == current.turn:
             self._interrupters[message.actor] = now if self._robot_speaks else None
+
+    def hear(self, actor: str, text: str, *, began: Seconds, is_final: bool, is_line: bool) -> None:
+        """Note words of a person who speaks into the robot's turn: they decide before the seconds of voice do.
+
+        Final words that are more than a listener's take the floor at once, also where nobody tells of a voice; so
+        does a line that was typed, whatever it says. While the words are a listener's, partial ones included, nobody
+        takes it. Partial words of any other kind leave it to the voice, for they may be wrong.
+        """
+        current = self._current
+        if current is None or current.addressee != actor or self._spoke_in != current.turn or not text.strip():
+            return
+        if began < self._spoke_since:
+            return  # words from before the turn, which are known only now
+        if is_listening(text) and not is_line:
+            self._listeners.add(actor)
+            return
+        self._listeners.discard(actor)
+        if is_final:
+            self._taken_by = actor
 
     def see(self, people: Collection[str], now: Seconds) -> None:
         """Note who is in sight."""
@@ -223,7 +255,7 @@ class TurnPolicy:
         """The turn whose addressee is out of sight, and when that has lasted so long that the person has left."""
         return next(
             (
-                (plan, self._away[plan.addressee] + self._config.face_lost)
+                (plan, self._away[plan.addressee] + FACE_GRACE)
                 for plan in self._turns_under_way
                 if plan.addressee in self._away
             ),
@@ -232,7 +264,7 @@ class TurnPolicy:
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [began + self._config.barge_in for began in self._talked_into.values()]
+        due = [self._takes_floor_at(actor, began) for actor, began in self._talked_into.items()]
         if self._silent_since is not None:
             due.append(self._silent_since + self._config.turn_silence)
         if (left := self._left_at) is not None:
@@ -246,6 +278,9 @@ class TurnPolicy:
             return {}
         return {actor: began for actor, began in self._interrupters.items() if began is not None}
 
+    def _takes_floor_at(self, actor: str, began: Seconds) -> Seconds:
+        return began + (LONGEST_LISTENING if actor in self._listeners else self._config.barge_in)
+
     def tick(self, now: Seconds) -> Aborted | None:
         """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
         if (left := self._left_at) is not None and now >= left[1]:
@@ -253,11 +288,11 @@ class TurnPolicy:
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
             return self._abort(self._open, f"silence for {self._config.turn_silence:g} s")
-        for actor, began in self._talked_into.items():
-            if now >= began + self._config.barge_in:
-                current = self._current
-                self._interrupters.clear()
-                return self._abort(current, f"{actor} took the floor") if current else None
+        by_voice = (each for each, began in self._talked_into.items() if now >= self._takes_floor_at(each, began))
+        if actor := self._taken_by or next(by_voice, ""):
+            current = self._current
+            self._forget_interrupters()
+            return self._abort(current, f"{actor} took the floor") if current else None
         return None
 
     def _abort(self, plan: TurnPlan, reason: str) -> Aborted:
@@ -276,7 +311,12 @@ class TurnPolicy:
         kept = {plan.turn for plan in self._live.values()} | {self.open_turn}
         self._begun = {turn: is_over for turn, is_over in self._begun.items() if turn in kept}
         if self._current is None or self._current.turn != self._spoke_in:
-            self._interrupters.clear()
+            self._forget_interrupters()
+
+    def _forget_interrupters(self) -> None:
+        self._interrupters.clear()
+        self._listeners.clear()
+        self._taken_by = ""
 
 
 def in_vain(fragment: TurnFragment) -> tuple[str, ...]:

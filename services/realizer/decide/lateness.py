@@ -91,12 +91,14 @@ class LatenessWatch:
 
 def event_deadline(
     event: Event, block: Block, reached: Mapping[Point, Seconds], config: RealizerConfig, *, is_received: bool
-) -> Seconds:
+) -> Seconds | None:
     """Time at which to give an event up as failed: its limit after its start, or after the last of its anchors.
 
     Anchors that are not reached by now do not count. is_received: recognition has the request; then it is given far
     more time, since deciding is its business.
     """
+    if is_received and event.limit is None:
+        return None  # The limit is recognition's, which alone knows it.
     limit = config.limit_of(event.kind) if event.limit is None else event.limit
     anchors = (reached.get(_point(text, block)) for text in event.anchors)
     since = max(time for time in (reached[Point(event.id, "start")], *anchors) if time is not None)

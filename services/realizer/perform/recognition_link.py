@@ -73,8 +73,9 @@ class RecognitionLink:
             is_received = pending is not None and "recognition" in self._peers
             now = self._bus.now()
             deadline = event_deadline(event, block, facts.reached, self._config, is_received=is_received)
-            remaining = deadline + facts.held_between(began, now, event.id) - now
-            if remaining <= EPSILON:
+            held = facts.held_between(began, now, event.id)
+            remaining = None if deadline is None else deadline + held - now
+            if remaining is not None and remaining <= EPSILON:
                 if pending is not None:
                     self._requests.cancel(pending.request.id, "no decision in time")
                 return Decision(self._bus.now(), False)

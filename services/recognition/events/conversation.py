@@ -14,6 +14,9 @@ from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
 
+WORDS_KNOWN: Seconds = 2.0
+"""Time after a short speech in which its words may show that it took the floor: a "stop" cuts the turn off."""
+
 
 class Conversation:
     """Conversation of one person with the robot."""
@@ -23,12 +26,26 @@ class Conversation:
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
         self.acts_since: Seconds | None = None
-        self.pair = AdjacencyPair(writer, limit=config.adjacency_pair_limit, patience=config.turn_patience)
+        self.pair = self._new_pair(writer, config)
+        self._cut_into: list[tuple[AdjacencyPair, str]] = []
+        """Pairs of the person whose first turn still goes on although the robot has answered with a first turn of its
+        own, each with the block of that turn."""
         self.own_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.robot_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self._speech_confidence: Probability = 1.0
+        self._brief_since: Seconds = 0.0
+        self._brief_until: Seconds | None = None
+        """End of the person's last speech, if that was short and within the robot's turn."""
         self._scene = scene
         self._config = config
+        self._writer = writer
+
+    @staticmethod
+    def _new_pair(writer: EventWriter, config: RecognitionConfig) -> AdjacencyPair:
+        return AdjacencyPair(
+            writer, limit=config.adjacency_pair_limit, third_turn=config.third_turn_limit,
+            patience=config.turn_patience,
+        )  # fmt: skip
 
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
@@ -51,7 +68,8 @@ class Conversation:
         return at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
-        self.pair.person_gone(at, until)
+        for pair in self._pairs():
+            pair.person_gone(at, until)
         self.own_backchannel.person_gone(at, until)
         self.robot_backchannel.person_gone(at, until)
         self.speaks_since = self.acts_since = None
@@ -77,6 +95,7 @@ class Conversation:
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
             event = self._backchannel(self._scene.robot, self.id, at, confidence)
             event.spoken = (at,)
+            self._brief_until = None
             self.own_backchannel.speaks(event)
         else:
             self._human_turn(at, "speak", confidence)
@@ -86,13 +105,17 @@ class Conversation:
             return
         self.speaks_since, self.silent_since = None, at
         self._scene.falls_silent(self.id, at)
+        self._brief_until = at if self.own_backchannel.state == UNDECIDED else None
+        self._brief_since = self.own_backchannel.undecided_since or at
         self._backchannel_speech_ends(self.own_backchannel, at)
         self._floor_is_free(at)
-        self.pair.ends("speak", at, by_robot=False)
+        self._ends("speak", at, by_robot=False)
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a nod or a shake of the person."""
-        if self.robot_holds_floor and self.own_backchannel.state != UNDECIDED:
+        if self.robot_holds_floor and self.own_backchannel.state == UNDECIDED:
+            return  # A nod beside an "uh-huh" is part of the same sign, whatever the words turn out to be.
+        if self.robot_holds_floor:
             self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at, confidence))
         else:
             self.pair.human_begins(action, at, confidence)
@@ -100,7 +123,7 @@ class Conversation:
     def gesture_ends(self, action: Action, at: Seconds) -> None:
         if self.own_backchannel.state == BRIEF:
             self.own_backchannel.ends(at)
-        self.pair.ends(action, at, by_robot=False)
+        self._ends(action, at, by_robot=False)
 
     def points(self, at: Seconds, confidence: Probability = 1.0) -> None:
         self.pair.human_begins("point", at, confidence)
@@ -112,7 +135,7 @@ class Conversation:
 
     def manipulation_ends(self, at: Seconds) -> None:
         self.acts_since = None
-        self.pair.ends("act", at, by_robot=False)
+        self._ends("act", at, by_robot=False)
 
     def goes_on(self, action: Action, since: Seconds, confidence: Probability) -> None:
         """Take an action of the person that goes on, known only now. It may be the answer, or more of a turn."""
@@ -141,28 +164,30 @@ class Conversation:
             )  # fmt: skip
             pair.human_asks(event, action)
         if action == "speak" and self.speaks_since is None and self.silent_since is not None:
-            pair.ends("speak", self.silent_since, by_robot=False)
+            self._ends("speak", self.silent_since, by_robot=False)
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
-    def robot_speaks(self, at: Seconds) -> None:
+    def robot_speaks(self, at: Seconds, behavior: str) -> None:
         self.pair.robot_heard(None)
-        if self.holds_floor:
+        if self.holds_floor and not self.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF:
                 self.robot_backchannel.speaks(self._backchannel(self.id, self._scene.robot, at))
-        else:
+        elif not self._scene.is_listening(behavior):
             self.pair.robot_begins("speak", at)
+            self.pair.forget_unanswered()
 
     def robot_falls_silent(self, at: Seconds) -> None:
         self.pair.robot_heard(at)
         self._backchannel_speech_ends(self.robot_backchannel, at)
-        self.pair.ends("speak", at, by_robot=True)
+        self._ends("speak", at, by_robot=True)
         self._floor_is_free(at)
 
-    def robot_gestures(self, action: Action, at: Seconds) -> None:
+    def robot_gestures(self, action: Action, at: Seconds, behavior: str) -> None:
         """Take a nod, a shake or a point of the robot."""
         if not self.holds_floor or action == "point":
-            self.pair.robot_begins(action, at)
+            if not self._scene.is_listening(behavior):
+                self.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
             self.robot_backchannel.gestures(self._backchannel(self.id, self._scene.robot, at))
 
@@ -176,9 +201,12 @@ class Conversation:
     def robot_gesture_ends(self, action: Action, at: Seconds) -> None:
         if self.robot_backchannel.state == BRIEF and action != "point":
             self.robot_backchannel.ends(at)
-        self.pair.ends(action, at, by_robot=True)
+        self._ends(action, at, by_robot=True)
 
     def turn_ends(self, at: Seconds) -> None:
+        # Before the pair is decided: of several answers during the turn the one that began first counts.
+        if self._scene.robot_speaks_since is None:
+            self._keep_floor(at)
         self.pair.turn_ends(at)
         self._floor_is_free(at)
 
@@ -189,10 +217,15 @@ class Conversation:
 
     def _floor_is_free(self, at: Seconds) -> None:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
-        if self.own_backchannel.state == UNDECIDED and not self.robot_holds_floor:
-            self._takes_floor(at, "outlasts_turn")
+        if not self.robot_holds_floor:
+            self._keep_floor(at)
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self._robot_takes_floor(at, "outlasts_turn")
+
+    def _keep_floor(self, at: Seconds) -> None:
+        """Leave the floor to a person whose undecided speech goes on while the robot gives it up."""
+        if self.own_backchannel.state == UNDECIDED:
+            self._takes_floor(at, "outlasts_turn")
 
     def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
         self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
@@ -212,12 +245,25 @@ class Conversation:
         self.pair.robot_begins("speak", at)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
-        """Withdraw the pair of a robot's turn that was cut off."""
+        """End the pair of a robot's turn that was cut off.
+
+        Who speaks into the turn at that moment has taken the floor, and so has answered, however long the speech was
+        until then. Else the limit of a backchannel and the robot's own limit for giving way would be two judges.
+        """
         if self.pair.is_turn(turn):
+            self._keep_floor(at)
+            # Its words may have been known only after the short speech was over, and told as a backchannel.
+            asked, until = self.pair.event, self._brief_until
+            if asked and until is not None and self._brief_since >= asked.started and at <= until + WORDS_KNOWN:
+                self.pair.human_begins("speak", self._brief_since, self._speech_confidence)
+                self.pair.ends("speak", until, by_robot=False)
             self.pair.abort(at)
             self._floor_is_free(at)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
+        for pair, answer in self._cut_into:
+            if answer == block:
+                pair.answered_block_ended(at)
         self.pair.block_ended(block, at, aborted=aborted)
         announced = self.robot_backchannel.event
         if announced is not None and announced.block == block:
@@ -227,9 +273,22 @@ class Conversation:
     def robot_asks(self, event: OngoingEvent) -> None:
         if self.robot_backchannel.state == UNDECIDED:
             self.robot_backchannel.takes_floor("outlasts_turn", event.started)
+        if self.pair.robot_cuts_into_turn(event.started):
+            self._cut_into = [each for each in self._cut_into if each[0].state != IDLE]
+            self._cut_into.append((self.pair, event.block))
+            self.pair = self._new_pair(self._writer, self._config)
         self.pair.robot_asks(event)
         if self._scene.robot_speaks_since is not None:
             self.pair.robot_heard(None)
+
+    def _pairs(self) -> Iterator[AdjacencyPair]:
+        yield from (pair for pair, _ in self._cut_into)
+        yield self.pair
+
+    def _ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
+        """End an action for all pairs, those that the robot cut into and the present one."""
+        for pair in self._pairs():
+            pair.ends(action, at, by_robot=by_robot)
 
     def _backchannel(self, speaker: str, listener: str, at: Seconds, confidence: Probability = 1.0) -> OngoingEvent:
         cause: Cause = "human" if listener == self.id else "turn"

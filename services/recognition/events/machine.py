@@ -130,13 +130,16 @@ class EventWriter:
     def stamp(self, at: Seconds) -> Stamp:
         return Stamp(self._clock, at)
 
-    def publish(self, event: OngoingEvent, state: EventState, at: Seconds) -> None:
-        """Write a change, and answer the event's request if this decides it. An event's times never run backwards."""
+    def publish(self, event: OngoingEvent, state: EventState, at: Seconds, *, retold: bool = False) -> None:
+        """Write a change, and answer the event's request if this decides it. An event's times never run backwards.
+
+        retold: the event came to this state before; something else of it is new.
+        """
         if not event.id:
             self._count[event.kind] += 1
             event.id = f"{self._session}{PREFIX[event.kind]}-{self._count[event.kind]}"
         at = event.changed = max(at, event.started if event.changed is None else event.changed)
-        if state == "failed":
+        if state == "failed" and not retold:
             event.delay = at - event.started
         begins, ends = state == "started", state == "completed"
         told = ConnectionEvent(
@@ -146,6 +149,7 @@ class EventWriter:
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, confidence=event.confidence,
                 block=event.block, behavior=event.behavior, turn=event.turn, words=self._words_of(event),
+                retold=retold,
         )  # fmt: skip
         self.effects.append(told)
         if event.spoken:

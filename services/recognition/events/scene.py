@@ -11,6 +11,8 @@ from engage_hri.services.recognition.config import GazeResolution
 from engage_hri.services.recognition.events.history import Latest
 
 LINES_KEPT = 256
+BLOCKS_KEPT = 64
+"""Number of announced backchannels that are remembered, should the ends of their blocks be lost."""
 SAME_INSTANT: Seconds = 0.001
 """Longest gap between two looks at the same target that count as one."""
 
@@ -100,6 +102,8 @@ class SessionScene:
         self._speakers: set[str] = set()
         self.lines: Latest[str, Seconds] = Latest(LINES_KEPT)
         """When each person last sent a line that was typed."""
+        self.listening_blocks: Latest[str, None] = Latest(BLOCKS_KEPT)
+        """Blocks under way that the robot has announced as backchannels: they answer nobody."""
         self.speech = 0
         """Number of times that speech of any actor has begun or ended."""
         self._fell_silent: list[tuple[Seconds, str]] = []
@@ -119,6 +123,10 @@ class SessionScene:
         """Forget the people and hands that have not been seen since `before`."""
         while self._others and (oldest := next(iter(self._others))) and self._others[oldest] < before:
             del self._others[oldest]
+
+    def is_listening(self, behavior: str) -> bool:
+        """True if a behavior of the robot, `block:behavior`, is part of an announced backchannel."""
+        return behavior.rpartition(":")[0] in self.listening_blocks
 
     def speaks(self, actor: str) -> None:
         self._speakers.add(actor)

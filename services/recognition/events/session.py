@@ -186,10 +186,12 @@ class Session:
                 if self.scene.robot_speaks_since is None:
                     self.scene.robot_speaks_since = at
                     self.scene.speaks(self.robot)
-                    self._people.apply_to_all(at, lambda person: person.conversation.robot_speaks(at))
+                    self._people.apply_to_all(at, lambda person: person.conversation.robot_speaks(at, began.behavior))
             case "nod" | "shake" | "point":
                 self._robot_actions[began.behavior, began.action] = began
-                self._people.apply_to_all(at, lambda person: person.conversation.robot_gestures(began.action, at))
+                self._people.apply_to_all(
+                    at, lambda person: person.conversation.robot_gestures(began.action, at, began.behavior)
+                )
 
     def _robot_goes_on(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
         """Take an action of the robot that goes on: it answers a person who waits, and begins nothing else."""
@@ -326,6 +328,7 @@ class Session:
     def _announce_backchannel(self, person: Person, event: OngoingEvent) -> None:
         """Begin the robot's backchannel, unless noticed already. The person holds the floor: it is the initiator."""
         event.initiator, event.responder = person.id, self.robot
+        self.scene.listening_blocks[event.block] = None
         backchannel = person.conversation.robot_backchannel
         noticed = backchannel.last
         if noticed is not None and abs(event.started - noticed[0]) <= self._config.backchannel_limit:
@@ -378,6 +381,7 @@ class Session:
 
     def _block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.blocks.ended[block] = at
+        self.scene.listening_blocks.pop(block, None)
         self._robot_stops(at, f"{block}:")
         self._people.apply_to_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
         answered = self._answering_blocks.pop(block, None)
