@@ -38,7 +38,7 @@ MEASURES = {"started": "since", "completed": "lasting"}
 
 def check(story: Story) -> None:
     """Play the story: all its events become what it says, and each request is answered as its event was decided."""
-    log = Log(**story.config)
+    log = Log(**{name: float(value) if value[0].isdigit() else value for name, value in story.config.items()})
     known = play(log, story.steps)
     becomes = lives(log, known)
     if any(line.startswith("deadline") for line in story.becomes):

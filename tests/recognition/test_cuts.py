@@ -184,7 +184,7 @@ async def test_a_reporter_that_is_restarted_tells_anew_what_it_sees(monkeypatch:
         stage.goes(stage.bob)
         await asyncio.sleep(0.7)
         stage.start("cameras")
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(2.1)
 
         assert stage.believed(stage.ann) == Belief(True, looks=ROBOT)
         assert stage.believed(stage.bob) == Belief(False)
