@@ -236,6 +236,10 @@ class Mark(Struct, frozen=True, omit_defaults=True):
     position: int
 
 
+LONGEST_SPEECH = 5000
+"""Characters of one speech, some five minutes; one with more is refused."""
+
+
 class Speech(Behavior, frozen=True, kw_only=True, tag="speech", omit_defaults=True):
     """Say a text.
 

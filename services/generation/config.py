@@ -7,7 +7,6 @@ from msgspec import Struct
 
 from engage_hri.schemas.ranges import inner_shares, not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Radians, Seconds
-from engage_hri.services.runtime.action_reports import REPORT_GRACE
 
 Channel = Literal["sum", "independent"]
 Profile = Literal["check-back", "figure-3.3"]
@@ -87,8 +86,6 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Seconds that a fragment waits for a first report of the world, or for a person to speak to. Ours."""
     fragments: int = 200
     """Number of fragments that may be waiting or performed at once; one more is refused. Ours."""
-    utterance: int = 5000
-    """Characters of one speech, some five minutes; a longer one is refused. Ours."""
     body_patience: Seconds = 5.0
     """Seconds that a reference waits for a body to say what motions cost. Ours."""
 
@@ -115,8 +112,6 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Seconds that a hand moves before the head tracks it. Thesis 3.3.4 tracks hands; the number is ours."""
     hand_stillness: Seconds = 0.8
     """Seconds that a hand is still before the head leaves it. Ours."""
-    report_grace: Seconds = REPORT_GRACE
-    """Seconds for which what a participant said of people holds after it has gone from the bus, as in recognition."""
     retry: Seconds = 1.0
     """Pause before a gaze shift that failed is tried again. Ours."""
 
@@ -166,5 +161,5 @@ _POSITIVE = (
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",
     "figure_lead", "this_within", "dwell", "hand_speed", "hand_onset", "hand_stillness",
-    "mtbce_events", "body_patience", "words_between", "words_patience", "report_grace",
+    "mtbce_events", "body_patience", "words_between", "words_patience",
 )  # fmt: skip

@@ -3,13 +3,20 @@
 A bad fragment is refused as a whole, and the fault says where it is wrong.
 """
 
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift, Pointing, Reference, Speech
+from engage_hri.schemas.behaviors import (
+    LONGEST_SPEECH,
+    Gaze,
+    GazeShift,
+    HeadDirectionShift,
+    Pointing,
+    Reference,
+    Speech,
+)
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
@@ -22,14 +29,14 @@ EMPTY = "the world is empty"
 """Advice where there is nothing that could be named."""
 
 
-def checked(fragment: TurnFragment, world: World, robot: str, longest: int = sys.maxsize) -> TurnFragment:
+def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     """The fragment with addressee and delay target filled in, and marks that look like offsets made explicit.
 
-    robot: its actor id, which may be a target too. longest: the most characters that one speech may have. Raises
+    robot: its actor id, which may be a target too. Raises
     InputRefused with JSON path and XML line of the first thing that is wrong, by itself or with regard to the world.
     """
     with _places_as_written(fragment):
-        return _checked(fragment, world, robot, longest)
+        return _checked(fragment, world, robot)
 
 
 def check_world(fragment: TurnFragment, world: World, robot: str) -> None:
@@ -48,12 +55,12 @@ def _places_as_written(fragment: TurnFragment) -> Iterator[None]:
         raise InputRefused(fault, error.block) from error
 
 
-def _checked(fragment: TurnFragment, world: World, robot: str, longest: int) -> TurnFragment:
+def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     fragment = validated(fragment)
     for index, behavior in enumerate(fragment.behaviors):
-        if isinstance(behavior, Speech) and len(behavior.text) > longest:
-            reason = f"{len(behavior.text)} characters of speech, at most {longest} can be said in one go"
-            advice = "say it in several fragments; `generation.utterance` is the limit"
+        if isinstance(behavior, Speech) and len(behavior.text) > LONGEST_SPEECH:
+            reason = f"{len(behavior.text)} characters of speech, at most {LONGEST_SPEECH} can be said in one go"
+            advice = "say it in several fragments"
             raise _refused(fragment, f"$.behaviors[{index}].text", reason, behavior.line, advice)
     _check_targets(fragment, world, robot)
     for index, behavior in enumerate(fragment.behaviors):

@@ -91,7 +91,7 @@ class FragmentRunner:
 
     def admit(self, request: PerformFragment, world: World) -> None:
         """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
-        fragment = checked(request.fragment, world, self._bus.robot, self._config.utterance)
+        fragment = checked(request.fragment, world, self._bus.robot)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
         performance.known = named_objects(fragment, world)

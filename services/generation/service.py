@@ -27,7 +27,7 @@ from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.requests.serving import GONE, LAPSED
-from engage_hri.services.runtime.action_reports import ActionReports
+from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.runtime.publisher import Publisher
 from engage_hri.services.runtime.reports import GoesOn, Told
 from engage_hri.services.runtime.service import Ready
@@ -77,9 +77,9 @@ class _Generation:
             bus, config, self._desk, self._requests, self._arbiter, self._leases, self._after
         )
         self._objects = objects
-        self._reports = ActionReports(bus.robot, config.report_grace, bus.clock, self._instant)
+        self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
         self._perception = Publisher()
-        self._seen = WorldReport(config.report_grace)
+        self._seen = WorldReport(REPORT_GRACE)
         self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
         """Fragments that wait for a report of the world, or for a person, and until when; by request id."""
         self._changed = asyncio.Event()

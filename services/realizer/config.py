@@ -2,7 +2,6 @@
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.ranges import not_negative
 from engage_hri.schemas.units import Seconds
 
@@ -24,14 +23,10 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     does. It hears of it three times as often. 0: for as long as it has authority.
     lease: how long movement authority lasts that is not renewed; then the body ends what it holds, and goes home.
     Longer than that, and at least three pulses.
-    utterance: characters of one speech, some five minutes; a block with a longer one is refused.
     blocks: number of live blocks; one more is refused. The default is the most with which a command follows its sync
         point within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py).
-    event_grace: how long after its limit an event ends as failed if recognition is not there to decide it.
-    event_patience: how long after its limit an event ends as failed if recognition is there, but says nothing.
     longest_hold: what is held for longer is stopped, so that no arm stays in the air when whoever held it has gone.
     most: behaviors, marks and sync references in a block; more is refused. Planning takes 0.1 ms each.
-    *_limit: limit of an event that names none: recognition's own (its design page), the longer for a pair.
     """
 
     late: Seconds = 0.5
@@ -46,16 +41,9 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     pulse: Seconds = 1.0
     held_after: Seconds = 0.5
     lease: Seconds = 4.0
-    utterance: int = 5000
     blocks: int = 300
-    event_grace: Seconds = 0.5
-    event_patience: Seconds = 10.0
     longest_hold: Seconds = 60.0
     most: int = 2000
-    directed_gaze_limit: Seconds = 2.5
-    mutual_facial_gaze_limit: Seconds = 1.9
-    adjacency_pair_limit: Seconds = 8.0
-    backchannel_limit: Seconds = 0.8
 
     def __post_init__(self) -> None:
         not_negative(self, self.__struct_fields__)
@@ -67,7 +55,3 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             raise ValueError(
                 f"lease {self.lease} s must be at least three times pulse {self.pulse} s, which is above 0"
             )
-
-    def limit_of(self, kind: EventKind) -> Seconds:
-        """Limit of an event of this kind that names none."""
-        return float(getattr(self, f"{kind}_limit"))

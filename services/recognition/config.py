@@ -7,7 +7,7 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.ranges import not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
-from engage_hri.services.runtime.action_reports import FACE_GRACE, REPORT_GRACE
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 GazeResolution = Literal["object", "table"]
 
@@ -100,10 +100,6 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Settings for raw perception."""
     lost_face_grace: Seconds = FACE_GRACE
     """Time for which a face may be lost before the person has gone."""
-    report_grace: Seconds = REPORT_GRACE
-    """Time for which what a participant said of people, or of the robot, holds after it has gone from the bus: a
-    link that was cut looks like a death. After that it has ended when the participant went. As long as a requester
-    waits for its server."""
     look_break: Seconds = 0.15
     """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
     meanwhile waits for the decision."""
@@ -137,7 +133,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
             "longest_speech", "longest_gesture", "longest_manipulation",
         ))  # fmt: skip
         not_negative(self, (
-            "after_robot_directed", "lost_face_grace", "report_grace", "hysteresis", "words_margin", "words_patience",
+            "after_robot_directed", "lost_face_grace", "hysteresis", "words_margin", "words_patience",
         ))  # fmt: skip
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")

@@ -33,7 +33,7 @@ from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.words import HeardWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.runtime.action_reports import ActionReports, Read
+from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, Read
 from engage_hri.services.runtime.reporters import OLDEST
 from engage_hri.services.runtime.reports import GoesOn, Told
 
@@ -110,7 +110,7 @@ class Intake:
         self._clock = clock
         self._now: Seconds = -inf
         self._bad_ids: set[str] = set()
-        self._reports = ActionReports(robot, config.report_grace, clock.name, self._instant)
+        self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._clock_errors = ClockErrors(robot)
         self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
         self._open_events = OpenEventTracker(robot, session)

@@ -286,7 +286,8 @@ class Asking:
         self._deadlines.set((_SWALLOW, asked.request.id), now + self._patience.swallow)
 
     def _tell_accepted(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        self._effects.append(TellAccepted(asked.request.id))
+        assert isinstance(answer, Accepted)
+        self._effects.append(TellAccepted(asked.request.id, answer))
 
     def _tell_outcome(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         assert isinstance(answer, Outcome)

@@ -3,7 +3,7 @@
 from msgspec import Struct
 
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.requests import Kept, Outcome, Request
+from engage_hri.schemas.requests import Accepted, Kept, Outcome, Request
 
 
 class Publish(Struct, frozen=True):
@@ -24,6 +24,7 @@ class TellAccepted(Struct, frozen=True):
     """Tell the caller that the server has accepted the request."""
 
     id: str
+    answer: Accepted
 
 
 class TellEnd(Struct, frozen=True):

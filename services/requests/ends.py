@@ -141,7 +141,7 @@ class Requester:
                     effects += self._could_not_send(effect.message.id, error)
             elif isinstance(effect, asking_effects.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
-                    pending.accept()
+                    pending.accept(effect.answer)
             elif isinstance(effect, asking_effects.TellEnd):
                 if (ended := self._pending.pop(effect.id, None)) is not None:
                     ended.end(effect.end)
@@ -319,9 +319,9 @@ class RequestDesk:
         """Tell the requester that it is not accepted, but may have begun: no other life is to begin it."""
         self._answer(name, Heard(id=name))
 
-    def accept(self, name: str) -> None:
-        """Tell the requester that the request is being performed."""
-        self._answer(name, Accepted(id=name))
+    def accept(self, name: str, limit: Seconds | None = None) -> None:
+        """Tell the requester that the request is being performed. limit: that of an event."""
+        self._answer(name, Accepted(id=name, limit=limit))
 
     def refuse(self, name: str, fault: Fault) -> None:
         """End the request: it will not be performed."""

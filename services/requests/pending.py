@@ -4,7 +4,8 @@ import asyncio
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.requests import Accepted, Outcome, Request
+from engage_hri.schemas.units import Seconds
 
 
 class Pending:
@@ -17,16 +18,24 @@ class Pending:
         loop = asyncio.get_running_loop()
         self.key = key
         self.request = request
-        self.accepted: asyncio.Future[None] = loop.create_future()
+        self.accepted: asyncio.Future[Accepted | None] = loop.create_future()
         self.outcome: asyncio.Future[Outcome] = loop.create_future()
 
     @property
     def server(self) -> str:
         return keys.server_of(self.key)
 
-    def accept(self) -> None:
+    @property
+    def limit(self) -> Seconds | None:
+        """Limit of an event, as its server has told; None if it has told none so far."""
+        is_known = self.accepted.done() and not self.accepted.cancelled() and self.accepted.exception() is None
+        answer = self.accepted.result() if is_known else None
+        return answer.limit if answer is not None else None
+
+    def accept(self, answer: Accepted | None = None) -> None:
+        """Note that the server has accepted the request. answer: None if that was lost, and its end has come."""
         if not self.accepted.done():
-            self.accepted.set_result(None)
+            self.accepted.set_result(answer)
 
     def end(self, end: Outcome | EngageError) -> None:
         if isinstance(end, Outcome):

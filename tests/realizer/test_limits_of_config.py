@@ -1,11 +1,9 @@
 """Limits of the realizer: what may be set, and what is refused with the name of the field."""
 
-from typing import get_args
-
 import pytest
 from msgspec.structs import fields
 
-from engage_hri.schemas.behaviors import EventKind, Wait
+from engage_hri.schemas.behaviors import Wait
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.stage import block, stage
@@ -58,13 +56,6 @@ def test_movement_authority_outlives_two_pulses_that_are_lost(pulse: float, leas
             RealizerConfig(pulse=pulse, lease=lease)
 
 
-def test_each_kind_of_event_has_its_own_limit() -> None:
-    kinds = get_args(EventKind)
-    config = RealizerConfig(**{f"{kind}_limit": 10.0 + number for number, kind in enumerate(kinds)})
-
-    assert [config.limit_of(kind) for kind in kinds] == [10.0 + number for number in range(len(kinds))]
-
-
 def test_what_is_documented_as_noticed_late_or_stalled_holds_of_the_defaults() -> None:
     """A motor that is up to four times as slow passes; what people notice is told; authority is renewed in time."""
     limits = RealizerConfig()
@@ -73,7 +64,6 @@ def test_what_is_documented_as_noticed_late_or_stalled_holds_of_the_defaults() -
         assert 4 * natural <= natural + limits.stall + limits.stall_factor * natural
         assert limits.late + limits.late_factor * natural < limits.stall + limits.stall_factor * natural
     assert limits.skew == 0.1
-    assert limits.event_grace < limits.event_patience
     assert limits.pulse * 3 <= limits.lease < limits.longest_hold
 
 

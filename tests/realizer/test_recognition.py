@@ -64,7 +64,7 @@ async def test_an_event_is_decided_when_recognition_says_it_was_and_not_when_tha
 async def test_an_event_that_is_not_decided_in_time_is_asked_for_no_more() -> None:
     """Recognition is there, and is given two seconds beyond the limit."""
     recognition = FakeRecognition({"e": None})
-    async with stage(recognition=recognition, config=RealizerConfig(event_patience=2.0)) as seen:
+    async with stage(recognition=recognition, config=RealizerConfig()) as seen:
         await seen.perform(WAITING)
 
     assert source(seen) == (4.0, "clock")

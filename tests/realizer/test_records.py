@@ -378,9 +378,3 @@ def test_limits_that_contradict_each_other_are_refused(values: dict[str, float],
         return
     with pytest.raises(ValueError, match=words):
         RealizerConfig(**values)  # type: ignore[arg-type]
-
-
-def test_an_event_without_a_limit_has_that_of_its_kind() -> None:
-    config = RealizerConfig(backchannel_limit=7.0, directed_gaze_limit=3.0)
-
-    assert (config.limit_of("backchannel"), config.limit_of("directed_gaze")) == (7.0, 3.0)

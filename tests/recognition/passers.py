@@ -14,6 +14,7 @@ from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from engage_hri.services.runtime.action_reports import REPORT_GRACE
 from engage_hri.services.runtime.ongoing_actions import ActionEvent, OngoingActionTracker
 from engage_hri.services.runtime.reporters import Reporters
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
@@ -39,7 +40,7 @@ class Lobby(Struct):
         self.recognizer = Recognizer(ROBOT, self.config)
         self.published = PublishedStatistics(ROBOT, self.config)
         self.book = OpenEventTracker(ROBOT, "session")
-        self.reporters = Reporters(ROBOT, self.config.report_grace, "loop", lambda stamp: stamp.seconds)
+        self.reporters = Reporters(ROBOT, REPORT_GRACE, "loop", lambda stamp: stamp.seconds)
         self.feed(world("host"), 0.0)
 
     def feed(self, observation: Perceived, at: Seconds) -> None:

@@ -17,6 +17,7 @@ from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import Requester, RequestRefused
+from engage_hri.services.runtime.action_reports import REPORT_GRACE
 from engage_hri.services.runtime.service import Service, running
 from tests.commanding import command
 from tests.recognition.observations import HUMAN, ROBOT, world
@@ -194,7 +195,7 @@ async def test_the_death_of_perception_closes_what_is_open_with_the_people_it_re
     assert received is not None
     assert isinstance(received.message, ConnectionEvent)
     assert (received.message.id, received.message.state, received.message.duration) == ("4-mfg-1", "completed", 1.0)
-    assert received.at == 1.0 + RecognitionConfig().report_grace
+    assert received.at == 1.0 + REPORT_GRACE
 
 
 async def test_a_block_that_ends_stops_the_wait_for_its_anchors(hub: MemoryHub):

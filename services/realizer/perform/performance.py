@@ -57,7 +57,7 @@ class BlockPerformance:
         self._live, self.id = live, live.id
         self.plan, self._shared = plan, shared
         self.bus, self._config = shared.bus, shared.config
-        self.recognition = RecognitionLink(shared.bus, shared.requests, shared.config, shared.peers)
+        self.recognition = RecognitionLink(shared.bus, shared.requests, shared.peers)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Hand, Speech
+from engage_hri.schemas.behaviors import LONGEST_SPEECH, Hand, Speech
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Estimates
 from engage_hri.schemas.check import validated
@@ -44,9 +44,9 @@ class Planning:
         """Plan a block. Of the blocks that it may refer to (`elsewhere`), those stay that it does refer to."""
         block = live.block
         for each in block.behaviors:
-            if isinstance(each, Speech) and len(each.text) > self._config.utterance:
-                reason = f"{len(each.text)} characters of speech, at most {self._config.utterance} are said in one go"
-                advice = "say it in several; `realizer.utterance` is the limit"
+            if isinstance(each, Speech) and len(each.text) > LONGEST_SPEECH:
+                reason = f"{len(each.text)} characters of speech, at most {LONGEST_SPEECH} are said in one go"
+                advice = "say it in several"
                 raise BlockRefused(
                     Fault(reason=reason, where=f"{block.id}: {each.id}", line=each.line, advice=advice)
                 )

@@ -12,7 +12,6 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.perform.shared_context import Presence
@@ -30,10 +29,9 @@ class Decision(Struct, frozen=True):
 class RecognitionLink:
     """Asks recognition for the events of one block."""
 
-    def __init__(self, bus: Bus, requests: Requester, config: RealizerConfig, peers: Presence) -> None:
+    def __init__(self, bus: Bus, requests: Requester, peers: Presence) -> None:
         self._bus = bus
         self._requests = requests
-        self._config = config
         self._peers = peers
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
@@ -72,14 +70,14 @@ class RecognitionLink:
                 return Decision(at, True)
             is_received = pending is not None and "recognition" in self._peers
             now = self._bus.now()
-            deadline = event_deadline(event, block, facts.reached, self._config, is_received=is_received)
-            held = facts.held_between(began, now, event.id)
-            remaining = None if deadline is None else deadline + held - now
-            if remaining is not None and remaining <= EPSILON:
+            told = pending.limit if pending is not None else None
+            deadline = event_deadline(event, block, facts.reached, told, is_received=is_received)
+            remaining = deadline + facts.held_between(began, now, event.id) - now
+            if remaining <= EPSILON:
                 if pending is not None:
                     self._requests.cancel(pending.request.id, "no decision in time")
                 return Decision(self._bus.now(), False)
-            # The deadline is computed again after this: the limit counts from an anchor that was reached meanwhile.
+            # The deadline is computed again after this: meanwhile points were reached, or the limit was told.
             news: list[asyncio.Future[Any]] = [self._peers.changed]
             if pending is not None:
                 news.append(pending.outcome)

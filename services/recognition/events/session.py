@@ -259,13 +259,13 @@ class Session:
         if fault is not None:
             self._writer.effects.append(Refused(id=request.id, fault=fault))
             return
-        self._writer.effects.append(Accepted(id=request.id))
         wanted = request.event
         event = OngoingEvent(
             kind=wanted.kind, initiator=self.robot, responder=wanted.responder, started=at, objects=wanted.objects,
             cause=wanted.cause, optional=wanted.optional, block=request.block, behavior=wanted.id, turn=wanted.turn,
-            request=request.id,
+            request=request.id, limit=self._limit(wanted),
         )  # fmt: skip
+        self._writer.effects.append(Accepted(id=request.id, limit=event.limit))
         self._live[request.id] = event
         self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, wanted))
         if event.request and not event.id:  # a bug has shown before the event could be published
@@ -276,9 +276,9 @@ class Session:
         """Begin the robot's event with this person."""
         match wanted.kind:
             case "directed_gaze":
-                person.robot_directs(event, self._clock(event, wanted, self._config.directed_gaze_limit))
+                person.robot_directs(event, self._clock(event, wanted))
             case "mutual_facial_gaze":
-                person.robot_looks_at_face(event, self._clock(event, wanted, self._config.mutual_facial_gaze_limit))
+                person.robot_looks_at_face(event, self._clock(event, wanted))
             case "adjacency_pair":
                 self._ask(person, event, wanted)
             case "backchannel":
@@ -305,8 +305,23 @@ class Session:
             return Fault(reason=f"limit must be greater than 0 s, not {event.limit}", where=where)
         return None
 
-    def _clock(self, event: OngoingEvent, wanted: Event, default: Seconds) -> LimitClock:
-        event.limit = wanted.limit or default
+    def _limit(self, wanted: Event) -> Seconds | None:
+        """Time that the responder has; None: nobody has to respond, for the responder's sign is the event."""
+        match wanted.kind:
+            case "directed_gaze":
+                return wanted.limit or self._config.directed_gaze_limit
+            case "mutual_facial_gaze":
+                return wanted.limit or self._config.mutual_facial_gaze_limit
+            case "adjacency_pair":
+                by_acting = "act" in (wanted.accept or self._config.accept)
+                return wanted.limit or (
+                    self._config.manipulation_limit if by_acting else self._config.adjacency_pair_limit
+                )
+            case "backchannel":
+                return None
+
+    def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock:
+        assert event.limit is not None
         clock = LimitClock(event.started, event.limit, wanted.anchors, self._config.turn_patience)
         for name in clock.waiting:
             if (realised := self.blocks.point(event.block, name)) is not None:
@@ -317,9 +332,6 @@ class Session:
 
     def _ask(self, person: Person, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or self._config.accept
-        by_acting = "act" in event.accept
-        default = self._config.manipulation_limit if by_acting else self._config.adjacency_pair_limit
-        event.limit = wanted.limit or default
         person.conversation.robot_asks(event)
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         if turn_end is not None:
