@@ -113,7 +113,8 @@ class Heard(Answer, frozen=True, kw_only=True, tag="heard", omit_defaults=True):
 class Accepted(Answer, frozen=True, kw_only=True, tag="accepted", omit_defaults=True):
     """The request is being carried out, or will be.
 
-    limit: events: time that the responder has, from the end of the turn or the last anchor. Recognition alone knows it.
+    limit: of an event, the time that the responder has, from the end of the turn or the last anchor. Only recognition
+    knows it.
     """
 
     limit: Seconds | None = None

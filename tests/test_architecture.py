@@ -46,21 +46,22 @@ VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
 """Packages of `services` that are no service: they put services together and may import all of them."""
-SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording"}
+SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording", "text"}
 """Packages of `services` that are no service, and that services may import."""
-PURE_SHARED = {"recording"}
+PURE_SHARED = {"recording", "text"}
 """Those of them whose files are pure, as those of a service are."""
 LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
-    " simulation study > client > recording > requests > runtime > bus > tangram",
+    " simulation study > client > recording > requests > runtime > bus > tangram text",
+    "services/text": "ear > marks > brackets > pieces > acts patterns ends > abbreviations",
     "services/bus": "memory zenoh > interface > payloads subscription > samples > answering config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions blame estimates refusals switching told unheard waiting > live warned > body"
     " > calibration > extras fitting > variability > config",
     "services/generation": "service > fragment_runner > reconsideration > performance > body_link choosing_again"
-    " fragment_check > acts pipeline > block head > references turns > permits > config",
+    " fragment_check > acts lost pipeline > block head > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
 }

@@ -5,16 +5,21 @@
         for chunk in chunks.feed(piece): ...  # parts for a turn fragment
     chunks.rest()
 
-In the text `[blue-square]` refers to the object of that id, and `[blue-square!]` does so with high certainty. The
-words of a `Say` part are cut as text is, but brackets are words there. A part begins and ends between words. Pure.
+In the text `[blue-square]` refers to the object of that id, and `[blue-square!]` does so with high certainty. What is
+for the eye is left out (services/text). The words of a `Say` part are read and cut as text is, but brackets are words
+there. A part begins and ends between words. Pure.
 """
 
 import re
 import unicodedata
 from collections.abc import Iterator
 
-from engage_hri.schemas.speakable import UNSPACED, joined, word_count
+from engage_hri.schemas.speakable import joined, word_count
 from engage_hri.schemas.tool import Part, Refer, Say
+from engage_hri.services.text.ear import heard
+from engage_hri.services.text.ends import next_end
+from engage_hri.services.text.marks import Reader
+from engage_hri.services.text.pieces import Ids, Piece, problems
 
 Chunk = tuple[Part, ...]
 """Parts that are spoken without a pause."""
@@ -23,24 +28,11 @@ CLAUSE_WORDS = 4
 """A chunk of fewer words does not end at a comma: so short a fragment would be over before the next one comes."""
 WORDS_OF_REFERENCE = 2
 """Words that a reference counts as, such as "the square": which ones will be chosen is not known yet."""
-_REFERENCE = r"\[(?P<id>[^\[\]\s!]+)(?P<certain>!?)\]"
-_ABBREVIATED = "".join(rf"(?<!\b{word})" for word in ("Mr", "Mrs", "Ms", "Dr", "Prof", "St", "vs", "[A-Z]"))
-_CLOSING = "\"'”’)\\]"
-_CLOSING_WIDE = f"{_CLOSING}」』）】》〉］｝〕"
-_STOPS_WIDE = "。！？｡။។"
-_WIDE = f"(?<=[{UNSPACED}])"
-"""Behind a character of a script without spaces a stop needs no space after it, either."""
-_SENTENCE = rf"{_ABBREVIATED}[.!?…।؟۔]+[{_CLOSING}]*(?=\s)"
-_SENTENCE_WIDE = (
-    rf"(?:[{_STOPS_WIDE}]|{_WIDE}[.!?])[{_STOPS_WIDE}.!?…]*[{_CLOSING_WIDE}]*(?=[^{_STOPS_WIDE}.!?…{_CLOSING_WIDE}])"
-)
-_CLAUSE = rf"[,;:–—،؛][{_CLOSING}]*(?=\s)"
-_CLAUSE_WIDE = rf"(?:[，、；：､]|{_WIDE}[,;:])[{_CLOSING_WIDE}]*(?=[^\d{_CLOSING_WIDE}])"
-_CLAUSE_THAI = "(?<=[\u0e01-\u0ecd])(?=\\s+[\u0e01-\u0ecd])"
-"""Thai and Lao have spaces where others have commas and full stops."""
-_END = rf"(?P<sentence>{_SENTENCE}|{_SENTENCE_WIDE}|\n\s*\n)|(?P<clause>{_CLAUSE}|{_CLAUSE_WIDE}|{_CLAUSE_THAI})"
-_CUT = re.compile(rf"{_REFERENCE}|{_END}")
-_CUT_OF_WORDS = re.compile(_END)
+_AT_ONCE = 4096
+"""Characters that are looked through for ends at once: so the time to read a long text grows with its length only."""
+_LITERAL = frozenset("*_[]<>`~&\\|#()!")
+UNKNOWN = Ids(None)
+NONE = Ids(())
 
 
 class Chunker:
@@ -48,48 +40,103 @@ class Chunker:
 
     def __init__(self, clause_words: int = CLAUSE_WORDS) -> None:
         self._clause_words = clause_words
+        self._reader = Reader()
         self._text = ""
-        """Text that may still become a reference, or the end of a clause, with what comes."""
+        """Text for the ear that may still become the end of a clause with what comes. A backslash stands before a
+        character that is no mark, though it looks like one."""
+        self._since = 0
+        """Characters of it in which there is no end."""
         self._is_between_words = True
         """True if the next text begins a new word, even without a space before it."""
         self._parts: list[Part] = []
+        self._left: list[Piece] = []
 
-    def feed(self, piece: str | Part) -> Iterator[Chunk]:
-        """Take a piece; returns the chunks that are complete now. A part completes the words before it."""
+    def feed(self, piece: str | Part, ids: Ids = UNKNOWN) -> Iterator[Chunk]:
+        """Take a piece; returns the chunks that are complete now. A part completes the words before it.
+
+        ids: of the objects in the world as it is now. Where nobody knows them, a bracket with one word is taken for a
+        reference, if it is not clearly something else.
+        """
         if isinstance(piece, str):
-            self._text += piece
-            yield from self._cut(_CUT)
+            yield from self._take(self._reader.feed(piece, ids))
             return
-        yield from self._complete(_CUT)
+        yield from self._complete(self._reader.finish(ids))
         if isinstance(piece, Say):
-            self._text = piece.say
-            yield from self._complete(_CUT_OF_WORDS)
+            part = Reader()
+            yield from self._complete([*part.feed(piece.say, NONE), *part.finish(NONE)])
         else:
             self._parts.append(piece)
 
-    def rest(self) -> Chunk:
+    def rest(self, ids: Ids = UNKNOWN) -> Chunk:
         """Take out all that is left, when nothing more comes; may be empty."""
+        *chunks, last = *self._take(self._reader.finish(ids)), ()
         self._say(self._text)
-        self._text = ""
-        return self._taken()
+        self._text, self._since = "", 0
+        before = tuple(part for chunk in chunks for part in chunk)
+        return (*before, *self._taken(), *last)
 
-    def _cut(self, pattern: re.Pattern[str]) -> Iterator[Chunk]:
-        while cut := pattern.search(self._text):
-            found = cut.groupdict()
-            id = found.get("id")
-            self._say(self._text[: cut.start() if id else cut.end()])
-            self._text = self._text[cut.end() :]
-            if id:
-                self._parts.append(Refer(refer=id, certainty="high" if found["certain"] else "normal"))
-            elif self._parts and (found["sentence"] or self._words >= self._clause_words):
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Say what of the text was not said, or otherwise than it may have been meant; then forget it."""
+        told, self._left = problems(self._left), []
+        return told
+
+    def _take(self, pieces: list[Piece]) -> Iterator[Chunk]:
+        run: list[str] = []
+        for piece in pieces:
+            if piece.kind == "say":
+                run.append(piece.text)
+            elif piece.kind == "symbol":
+                run.append(f"\\{piece.text}" if piece.text in _LITERAL else piece.text)
+            elif piece.kind == "silent":
+                run.append(piece.text if piece.text.isprintable() else " ")
+            elif piece.kind == "left":
+                self._left.append(piece)
+            else:
+                yield from self._add("".join(run))
+                run.clear()
+                yield from self._end_at(piece)
+        yield from self._add("".join(run))
+
+    def _end_at(self, piece: Piece) -> Iterator[Chunk]:
+        """Take a reference, or the end of a paragraph, an item or a cell."""
+        if piece.text == "," and piece.kind == "break":
+            self._text = self._text.rstrip()
+            self._text += "," if self._text[-1:].isalnum() else ""
+            return
+        if piece.kind == "refer" or self._text.strip() or self._parts:
+            self._say(self._text)
+            self._text, self._since = "", 0
+        if piece.kind == "refer":
+            self._parts.append(Refer(refer=piece.text, certainty="high" if piece.certain else "normal"))
+        elif self._parts:
+            self._is_between_words = True
+            yield self._taken()
+
+    def _add(self, text: str) -> Iterator[Chunk]:
+        for at in range(0, len(text), _AT_ONCE):
+            self._text += text[at : at + _AT_ONCE]
+            yield from self._cut()
+
+    def _cut(self) -> Iterator[Chunk]:
+        while True:
+            end, self._since = next_end(self._text, self._since)
+            if end is None:
+                return
+            words = self._words + word_count(self._text[: end.place])
+            if end.kind == "clause" and words < self._clause_words:
+                continue
+            self._say(self._text[: end.place])
+            self._text, self._since = self._text[end.place :], 0
+            if self._parts:
                 yield self._taken()
 
-    def _complete(self, pattern: re.Pattern[str]) -> Iterator[Chunk]:
-        """Cut the text to its end: the last word is complete, too."""
-        self._text += " "
-        yield from self._cut(pattern)
+    def _complete(self, pieces: list[Piece]) -> Iterator[Chunk]:
+        """Take pieces to their end: the last word is complete, too."""
+        yield from self._take(pieces)
+        yield from self._add(" ")
         self._say(self._text)
-        self._text = ""
+        self._text, self._since = "", 0
         self._is_between_words = True
 
     @property
@@ -97,10 +144,11 @@ class Chunker:
         return sum(word_count(part.say) if isinstance(part, Say) else WORDS_OF_REFERENCE for part in self._parts)
 
     def _say(self, text: str) -> None:
-        if not (said := " ".join(text.split())):
+        if not (said := " ".join(_plain(text).split())):
             return
         before = self._parts[-1] if self._parts else None
         if isinstance(before, Say):
+            text = f"{' ' * text[:1].isspace()}{said}"
             together = joined((before.say, text)) if self._is_between_words else f"{before.say}{text}"
             self._parts[-1] = Say(say=" ".join(together.split()))
         elif _means_something(said) or isinstance(before, Refer):
@@ -110,6 +158,14 @@ class Chunker:
     def _taken(self) -> Chunk:
         taken, self._parts = tuple(self._parts), []
         return taken
+
+
+def _plain(text: str) -> str:
+    """The text without backslashes, unless they are needed: whoever says it reads it as any other text."""
+    if "\\" not in text:
+        return text
+    plain = re.sub(r"\\([^\w\s])", r"\1", text)
+    return plain if heard(plain).text == plain else text
 
 
 def _means_something(text: str) -> bool:

@@ -10,25 +10,31 @@ the other.
 """
 
 import asyncio
-from collections.abc import AsyncIterable
+from collections.abc import AsyncIterable, Callable
 from contextlib import suppress
 from typing import Any
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
 from engage_hri.schemas.summary import Summary, refusal, summary, unknown
 from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.client.chunking import Chunk, Chunker
+from engage_hri.schemas.world import World
+from engage_hri.services.client.chunking import UNKNOWN, Chunk, Chunker
+from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.inputs import call_in
 from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot
+from engage_hri.services.text.pieces import Ids
 
 Piece = str | Part
 """A bit of text, however short, in which `[id]` refers to an object; or a part by itself."""
+WORLD_PATIENCE: Seconds = 0.3
+"""Time from the start of a stream for which a bracket waits for the world: it alone says what a reference is."""
 PLAIN_TURN = ToolInput(turn_status="full", parts=())
 
 
@@ -88,7 +94,8 @@ async def stream(
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
         async with asyncio.TaskGroup() as tasks:
-            reading = tasks.create_task(_read(pieces, chunker or Chunker(), speaking), name=f"read {id}")
+            read = _read(robot, pieces, chunker or Chunker(), speaking)
+            reading = tasks.create_task(read, name=f"read {id}")
             speaking.begin(tasks, reading)
     except BaseException as error:
         speaking.break_off()
@@ -108,13 +115,41 @@ def _unreadable(reason: str, id: str) -> Fault:
     return Fault(reason=shown, where=id, advice="an `async def` that yields text; or `perform_call`")
 
 
-async def _read(pieces: AsyncIterable[Piece], chunker: Chunker, speaking: "_Speaking") -> None:
-    async for piece in pieces:
-        if not isinstance(piece, Piece):
-            raise _NoPiece(_unreadable(f"the piece {piece!r} is neither text nor a `Part`", speaking.id))
-        for chunk in chunker.feed(piece):
-            speaking.go_on(chunk)
-    speaking.finish(chunker.rest())
+async def _read(robot: Robot, pieces: AsyncIterable[Piece], chunker: Chunker, speaking: "_Speaking") -> None:
+    with robot.worlds() as worlds:
+        objects = _Objects(worlds, robot.now)
+        try:
+            async for piece in pieces:
+                if not isinstance(piece, Piece):
+                    raise _NoPiece(_unreadable(f"the piece {piece!r} is neither text nor a `Part`", speaking.id))
+                ids = await objects.ids(is_needed=isinstance(piece, str) and "[" in piece)
+                for chunk in chunker.feed(piece, ids):
+                    speaking.go_on(chunk)
+            speaking.finish(chunker.rest(await objects.ids(is_needed=False)))
+        finally:
+            speaking.left_out = chunker.left_out
+
+
+class _Objects:
+    """Ids of the objects in the world as it is, with those that are covered for a moment."""
+
+    def __init__(self, worlds: Feed[World], now: Callable[[], Seconds]) -> None:
+        self._worlds = worlds
+        self._now = now
+        self._objects = CoveredObjects(COVERED_FOR)
+        self._ids = UNKNOWN
+        self._until = now() + WORLD_PATIENCE
+
+    async def ids(self, *, is_needed: bool) -> Ids:
+        """Return the ids, or `UNKNOWN`. is_needed: wait for a world that nobody has told yet."""
+        patience = max(0.0, self._until - self._now()) if is_needed and self._ids.is_unknown else 0.0
+        while (world := await self._worlds.next(patience)) is not None:
+            self._objects.see(world, self._now())
+            patience = 0.0
+        if (known := self._objects.at(self._now())) is not None:
+            found = frozenset(each.id for each in known.objects)
+            self._ids = self._ids if not self._ids.is_unknown and found == self._ids.ids else Ids(found)
+        return self._ids
 
 
 class _Speaking:
@@ -126,6 +161,8 @@ class _Speaking:
         self._turn = turn
         self._await_answer = await_answer
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
+        self.left_out: tuple[str, ...] = ()
+        """What of the text was not said, or otherwise than it may have been meant."""
         self._refused: set[str] = set()
         self._sent: set[str] = set()
         """Ids of the fragments with a task that has begun, and so has sent its request."""
@@ -138,7 +175,11 @@ class _Speaking:
 
     @property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
-        return tuple(task.result() for task in self._performing)
+        outcomes = [task.result() for task in self._performing]
+        if outcomes and self.left_out:
+            told = tuple(dict.fromkeys((*outcomes[-1].warnings, *self.left_out)))
+            outcomes[-1] = replace(outcomes[-1], warnings=told)
+        return tuple(outcomes)
 
     def go_on(self, chunk: Chunk) -> None:
         self._send(chunk, "middle" if self._performing else "beginning")

@@ -21,6 +21,7 @@ from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.block.parts import Made
 from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.text.ear import said
 
 DECIDED = ("succeeded", "completed", "failed")
 """States of an event that a person has decided, for good or not."""
@@ -45,9 +46,20 @@ class Act(Struct):
             (each, len(each.text) if self.came(each.id, "end") else self.heard.get(each.id, 0)) for each in speeches
         ]
         return tuple(
-            SpokenText(behavior=each.id, text=each.text[:said], complete=said >= len(each.text))
-            for each, said in told
-            if said
+            SpokenText(behavior=each.id, text=each.text[:count], complete=count >= len(each.text))
+            for each, count in told
+            if count
+        )
+
+    @property
+    def words(self) -> tuple[SpokenText, ...]:
+        """Words that were spoken, without what is for the eye in a text."""
+        texts = {each.id: each.text for each in self.plan.block.behaviors if isinstance(each, Speech)}
+        return tuple(
+            replace(each, text=said(text, len(each.text)))
+            if (text := texts.get(each.behavior, "")).startswith(each.text)
+            else each
+            for each in self.spoken
         )
 
     @property

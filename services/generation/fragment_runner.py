@@ -26,6 +26,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.generation.lost import bearable, unsaid
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, planning, targets
@@ -91,9 +92,11 @@ class FragmentRunner:
 
     def admit(self, request: PerformFragment, world: World) -> None:
         """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
-        fragment = checked(request.fragment, world, self._bus.robot)
+        fragment, lost = bearable(request.fragment, world)
+        fragment = checked(fragment, world, self._bus.robot)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
+        performance.warn((*lost, *unsaid(fragment)))
         performance.known = named_objects(fragment, world)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)
@@ -266,6 +269,8 @@ class FragmentRunner:
                     return None
                 assert self._world is not None
                 world = remembered(self._world, performance.known)
+                fragment, lost = bearable(fragment, world)
+                performance.warn(lost)
                 check_world(fragment, world, self._bus.robot)  # it may have changed while the fragment waited
                 bars = barred(targets(fragment), self._world, performance.known, performance.barred)
                 body = self._body.capabilities

@@ -1,6 +1,6 @@
 """One fragment from its acceptance to its outcome: what is under way, and which events it still waits for."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from msgspec import Struct
@@ -39,6 +39,7 @@ from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.events import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.text.ear import is_spoken
 
 MOST_TRIES = 5
 """Number of blocks after which the gestures of a reference that is to be chosen again are not tried any more."""
@@ -117,8 +118,12 @@ class FragmentPerformance:
             self.acts.pop()
         self.plan = plan
         self.acts.append(Act(plan))
-        self._warnings += [each for each in plan.warnings if each not in self._warnings]
+        self.warn(plan.warnings)
         self._behaviors = {behavior.id: behavior for behavior in plan.block.behaviors}
+
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Take warnings for the outcome, each once."""
+        self._warnings += [each for each in dict.fromkeys(warnings) if each not in self._warnings]
 
     def feed(self, progress: SyncPointProgress) -> None:
         """Take a sync point of this fragment's block."""
@@ -259,7 +264,7 @@ class FragmentPerformance:
         return outcome.status == "done" or (outcome.status == "failed" and self._none_left(why))
 
     def _speaks(self, id: str) -> bool:
-        return isinstance(it := self._behaviors.get(id), Speech) and has_words(it.text)
+        return isinstance(it := self._behaviors.get(id), Speech) and is_spoken(it.text)
 
     def _silence(self) -> Fault | None:
         """Fault that names the dropped speeches of a fragment of which no word was spoken; None: there are none."""
@@ -296,7 +301,7 @@ class FragmentPerformance:
             id=self.request.id,
             fragment=self.fragment.id,
             status=self._ended.status,
-            spoken=tuple(each for act in self.acts for each in act.spoken),
+            spoken=tuple(each for act in self.acts for each in act.words),
             references=made,
             eye_contact=eye_contact(self.acts, mine),
             replaced_by=self._ended.replaced_by,

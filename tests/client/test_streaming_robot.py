@@ -79,16 +79,16 @@ async def test_who_takes_the_floor_stops_the_writer_and_the_model_learns_how_far
     assert ended < 6.0
 
 
-async def test_a_misspelled_object_ends_the_turn_with_a_proper_look_and_the_nearest_id() -> None:
+async def test_a_misspelled_object_is_said_as_words_and_the_nearest_id_is_told() -> None:
     async with stage() as here:
         with here.robot.turns() as turns:
             result = await told(here.robot, writing("Hello there. ", "See [blue-squere]? ", "Then go. "))
             closed = await turns.next()
 
-    assert (result.status, result.said) == ("failed", "Hello there.")
+    assert (result.status, result.said) == ("done", "Hello there. See blue-squere? Then go.")
     assert "did you mean 'blue-square'" in result.problems[0]
     assert closed is not None
-    assert (closed.status, closed.fragments) == ("done", ("t-1", "t-3"))
+    assert (closed.status, closed.fragments) == ("done", ("t-1", "t-2", "t-3", "t-4"))
 
 
 async def test_a_writer_who_is_silent_for_too_long_has_lost_the_turn() -> None:
@@ -181,3 +181,23 @@ async def test_a_stream_that_is_cancelled_as_a_piece_comes_leaves_no_turn_open(h
         outcome = await robot.perform({"turn_status": "full", "parts": [{"say": "hello"}]})
 
     assert outcome.status == "done"
+
+
+async def test_what_is_for_the_eye_is_not_said_and_told_in_one_line_a_reason() -> None:
+    async with stage() as here:
+        text = (
+            "[smiles] See **array[0]** and [sic]",
+            " here. <think>hm</think>",
+            "Then take [Blue-Square]. [laughs]",
+        )
+        result = await told(here.robot, writing(*text))
+
+    assert result.status == "done"
+    assert result.said.startswith("See array 0 and sic here. Then take ")
+    assert [each.object for each in result.references] == ["blue-square"]
+    assert result.problems == (
+        "thoughts were not said: <think>",
+        "stage directions were not said: [smiles], [laughs]",
+        "brackets that name no object were said as words: [0], [sic]",
+        "ids were written in other letters than the world has: [Blue-Square]",
+    )

@@ -162,7 +162,7 @@ class _Objects:
 
     def _may_hold(self, entity: Entity, known: Property) -> bool:
         if known.attribute is None:
-            names = _names(entity) or {_noun_in(entity.id)} - {""}
+            names = _names(entity) or {noun_in(entity.id)} - {""}
             return not known.word or not names or known.word in names
         said = self._words(entity, known.attribute)
         return known.word in said or (not said and known.attribute != "feature")
@@ -181,14 +181,14 @@ class _Objects:
 
 
 def _noun(entity: Entity) -> str:
-    return entity.category or entity.shape or entity.name or _noun_in(entity.id)
+    return entity.category or entity.shape or entity.name or noun_in(entity.id)
 
 
 def _names(entity: Entity) -> set[str]:
     return {entity.category, entity.shape, entity.name} - {""}
 
 
-def _noun_in(id: str) -> str:
+def noun_in(id: str) -> str:
     """Noun in an id that a person has chosen: `cup` of `cup-2`, `coffee cup` of `coffeeCup`; "" of `obj-17`."""
     words = [word.lower() for part in _ID_SEPARATORS.split(id) if (word := part.rstrip("0123456789"))]
     telling = [word for word in words if word.isalpha() and (len(word) >= SHORTEST_NOUN or not word.isascii())]

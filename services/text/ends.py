@@ -1,0 +1,123 @@
+"""Ends of sentences and clauses in a text of which the rest may still come.
+
+A full stop ends a sentence, unless the word before it is an abbreviation, an initial or an ordinal. Some of these are
+decided only by the word after it (`etc. and`, `etc. Then`): then the answer waits for one character of that word, and
+for all others it is known as soon as there is white space. So nothing waits that needs not to.
+
+The rule knows no language: the writer of a stream names none. tests/text/sentences.txt is what it is judged by, and
+docs/decisions/0080 says why it is no library.
+"""
+
+import re
+from typing import Literal, NamedTuple
+
+from engage_hri.schemas.speakable import UNSPACED
+from engage_hri.services.text.abbreviations import BEFORE_A_NUMBER, BEFORE_A_WORD, BEFORE_EITHER, ORDINAL_AFTER
+
+CLOSING = "\"'”’»)\\]"
+_CLOSING_WIDE = f"{CLOSING}」』）】》〉］｝〕"
+_STOPS_WIDE = "。！？｡။។"
+_STOPS = ".!?…।؟۔։።፧"
+_WIDE = f"(?<=[{UNSPACED}])"
+"""Behind a character of a script without spaces a stop needs no space after it, either."""
+_SENTENCE = rf"(?P<stops>[{_STOPS}]+|(?<=[\u0370-\u03ff\u1f00-\u1fff]);)(?P<closing>[{CLOSING}]*)(?=\s)"
+_SENTENCE_WIDE = (
+    rf"(?:[{_STOPS_WIDE}]|{_WIDE}[.!?…])[{_STOPS_WIDE}.!?…]*(?P<closing_wide>[{_CLOSING_WIDE}]*)"
+    rf"(?=[^{_STOPS_WIDE}.!?…{_CLOSING_WIDE}])"
+)
+_CLAUSE = rf"[,;:–—،؛·][{CLOSING}]*(?=\s)"
+_CLAUSE_WIDE = rf"(?:[，、；：､]|{_WIDE}[,;:])[{_CLOSING_WIDE}]*(?=[^\d{_CLOSING_WIDE}])"
+_CLAUSE_THAI = "(?<=[\u0e01-\u0ecd])(?=\\s+[\u0e01-\u0ecd])"
+"""Thai and Lao have spaces where others have commas and full stops."""
+_END = re.compile(rf"(?P<sentence>{_SENTENCE}|{_SENTENCE_WIDE})|(?P<clause>{_CLAUSE}|{_CLAUSE_WIDE}|{_CLAUSE_THAI})")
+_LAST_WORDS = re.compile(r"(?:(?P<before>[^\s]+)\s+)?[(\"'“„«‘\[]*(?P<word>[^\s]*)$")
+_LOOK_BACK = 80
+"""Characters before a full stop that are looked at: longer than any two words that matter."""
+_ROMAN = re.compile("[IVX]+$")
+_SAYS_GO_ON = "と"
+"""Japanese has what was said before `と`: the sentence goes on behind the closing bracket."""
+
+
+class End(NamedTuple):
+    """An end of a sentence or a clause. place: characters before it."""
+
+    place: int
+    kind: Literal["sentence", "clause"]
+
+
+def next_end(text: str, since: int = 0) -> tuple[End | None, int]:
+    """Find the first end in a text from a place on; returns it, and from where to look again when there is more text.
+
+    text: begins with a sentence. since: as it was returned for the same text, when there was less of it.
+    """
+    for found in _END.finditer(text, since):
+        if found["clause"] is not None:
+            return End(found.end(), "clause"), max(found.end(), found.start() + 1)
+        answer = _is_sentence(text, found)
+        if answer is None:
+            return None, found.start()
+        if answer:
+            return End(found.end(), "sentence"), found.end()
+    return None, max(since, _settled(text))
+
+
+def ends(text: str, place: int) -> bool:
+    """Tell whether a sentence ends with the character before a place in a text that is known as a whole."""
+    begin = max(0, place - 12)
+    whole = f"{text} "
+    found = next((each for each in _END.finditer(whole, begin) if each.end() == place), None)
+    return found is not None and found["sentence"] is not None and _is_sentence(whole, found) is not False
+
+
+def _settled(text: str) -> int:
+    """The place from which on more text may make an end: the punctuation at its end, and one before."""
+    place = len(text)
+    while place and not text[place - 1].isalnum() and len(text) - place < _LOOK_BACK:
+        place -= 1
+    return max(0, place - 1)
+
+
+def _is_sentence(text: str, found: re.Match[str]) -> bool | None:
+    """Tell whether a sentence ends at a match of `_END`; None: the word after it will tell."""
+    after = text[found.end() : found.end() + _LOOK_BACK].lstrip()[:1]
+    if found["closing_wide"] is not None:
+        return not (found["closing_wide"] and after and after in _SAYS_GO_ON)
+    if found["closing"] and found["closing"] != "]":
+        # `"Stop!" he said`: the quoted sentence is over, the one around it is not.
+        return None if not after else not after.islower()
+    if found["stops"] != ".":
+        return True
+    return _is_over(text[max(0, found.start() - _LOOK_BACK) : found.start()], after)
+
+
+def _is_over(before: str, after: str) -> bool | None:
+    """Tell whether a full stop ends a sentence. before: the text before it. after: the next letter, if known."""
+    words = _LAST_WORDS.search(before)
+    assert words is not None
+    word, earlier = words["word"], (words["before"] or "").lower()
+    is_first = not before[: words.start("word")].strip()
+    tail = word.rpartition("-")[2] if "-" in word and word not in BEFORE_A_WORD else word
+    if tail.isdigit():
+        if len(word) <= 4 and (earlier in ORDINAL_AFTER or is_first):
+            return False  # an ordinal, or the number of an item of a list
+        return _if_small(after) if len(tail) <= 2 else True
+    if is_first and tail[1:] and tail[0].lower() + tail[1:] in BEFORE_A_WORD:
+        return False  # `Vgl. S. 12`
+    if tail in BEFORE_A_WORD or (len(tail) == 1 and tail.isalpha() and not _is_unspaced(tail)):
+        return False
+    if tail in BEFORE_A_NUMBER:
+        return None if not after else not (after.isdigit() or after.islower())
+    if tail in BEFORE_EITHER or "." in tail or (_ROMAN.match(tail) and tail != "I"):
+        parts = tail.split(".")
+        if len(parts) > 1 and not (all(len(each) <= 4 for each in parts) and parts[-1].isalpha()):
+            return True  # an address, a number with a decimal point
+        return _if_small(after)
+    return True
+
+
+def _if_small(after: str) -> bool | None:
+    return None if not after else not (after.islower() or after.isdigit())
+
+
+def _is_unspaced(letter: str) -> bool:
+    return re.match(f"[{UNSPACED}\uac00-\ud7a3]", letter) is not None

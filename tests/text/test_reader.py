@@ -1,0 +1,171 @@
+"""What is said of a text with marks, what is referred to, and what is told of the rest."""
+
+from collections.abc import Iterable
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engage_hri.services.text.ear import heard, is_spoken, said
+from engage_hri.services.text.marks import Reader
+from engage_hri.services.text.pieces import Ids, Piece, problems
+from tests.random_cases import share_of
+from tests.text.mixtures import OBJECTS, Maker, letters, plain_text
+
+
+def read(bits: Iterable[str], ids: Ids) -> list[Piece]:
+    reader = Reader()
+    return [*(piece for bit in bits for piece in reader.feed(bit, ids)), *reader.finish(ids)]
+
+
+def words(pieces: Iterable[Piece]) -> str:
+    return "".join(each.text for each in pieces if each.kind in ("say", "symbol"))
+
+
+def bits(text: str, random: Random) -> list[str]:
+    found, at = [], 0
+    while at < len(text):
+        size = random.choice([1, 2, 3, 5, 8, 40])
+        found.append(text[at : at + size])
+        at += size
+    return found
+
+
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+def test_letters_are_those_of_a_parser_of_commonmark_in_whatever_bits_a_text_comes(seed: int) -> None:
+    for number in range(seed * 50, seed * 50 + 50):
+        random = Random(number)
+        mixture = Maker(random).mixture()
+        pieces = read(bits(mixture.text, random), Ids(OBJECTS))
+
+        assert letters(words(pieces)) == letters(plain_text(mixture.plain)), (number, mixture.text)
+        assert tuple(each.text for each in pieces if each.kind == "refer") == mixture.named, (number, mixture.text)
+
+
+@pytest.mark.parametrize(
+    ("text", "spoken"),
+    [
+        ("**Bold** words and `code` here", "Bold words and code here"),
+        ("* star\n* moon", "star, moon"),
+        ("* star * moon", "star, moon"),
+        ("* star * 5 * 3", "star, 5 * 3"),
+        ("# Heading\ntext", "Heading, text"),
+        ("***very*** _good_ ~~old~~", "very good old"),
+        ("See the [docs](https://example.com) now", "See the docs now"),
+        ("![a cat](cat.png) sleeps", "a cat sleeps"),
+        ("> quoted", "quoted"),
+        ("- [x] done\n- [ ] to do", "done, to do"),
+        ("| a | b |\n|---|---|\n| 1 | 2 |", "a, b, 1, 2,"),
+        ("```python\nprint(1)\n```\nafter", "print(1) after"),
+        ("H<sub>2</sub>O, caf&eacute;", "H2O, café"),
+        ("one<br>two", "one, two"),
+        ("[laughs] That is funny. *waves* Hello (sighs)", "That is funny. Hello"),
+        (
+            "It is *very* nice, and *Waves* crash (looks like rain)",
+            "It is very nice, and Waves crash (looks like rain)",
+        ),
+        ("As said [1], [2, 3] and [^4] 【5†source】 show", "As said , and show"),
+        ("<think>no\n\nno</think>Yes", "Yes"),
+        ("Yes <thinking>never closed", "Yes"),
+        ("Go to https://www.example.com/a?b=c. Now", "Go to example.com. Now"),
+        ("Write to ann@example.org", "Write to ann@example.org"),
+        ('<speed ratio="1.05"/>Hello', "Hello"),
+        ("5 * 3, a < b, 5 - 3, 3 > 2, 2^3, ~5", "5 * 3, a < b, 5 - 3, 3 > 2, 2^3, ~5"),
+        ("x_1, snake_case, C#, #1, 2*x, $3.50", "x_1, snake_case, C#, #1, 2*x, $3.50"),
+        ("1. First\n2. Second", "1. First, 2. Second"),
+        ("\\*not emphasis\\* and \\[sic\\]", "*not emphasis* and [sic]"),
+        ("Great 👍🏽 ℹ️ 20 °C", "Great 20 °C"),
+        ("`<b>` is bold", "<b> is bold"),
+        ("[docs][ref]\n\n[ref]: https://example.org 'title'\nend", "docs, end"),
+        ("Title\n=====\n\n---\ntext", "Title, text"),
+    ],
+)
+def test_what_is_for_the_eye_is_not_said(text: str, spoken: str) -> None:
+    assert " ".join(heard(text).text.split()) == spoken
+
+
+@pytest.mark.parametrize(
+    ("text", "named", "spoken"),
+    [
+        ("Take [blue square].", [("blue square", False)], "Take ."),
+        ("Take [cup!].", [("cup!", False)], "Take ."),
+        ("Take [cup!!].", [("cup!", True)], "Take ."),
+        ("Take [a[b]].", [("a[b]", False)], "Take ."),
+        ("Take [x1!] [x1]", [("x1", True), ("x1", False)], "Take  "),
+        ("Take [blue-box].", [("Blue-Box", False)], "Take ."),
+        ("array[0] and [sic] [ann] [x]", [], "array 0  and sic ann x"),
+        ("[cup](https://example.com)", [("cup", False)], "(https://example.com)"),
+        ("[Note]: this is it", [], "Note: this is it"),
+        ("a [b [c] d] e", [], "a b c d e"),
+        ("an [open bracket", [], "an open bracket"),
+    ],
+)
+def test_a_bracket_is_a_reference_only_if_it_names_an_object(
+    text: str, named: list[tuple[str, bool]], spoken: str
+) -> None:
+    ids = Ids(("blue square", "cup", "cup!", "a[b]", "x1", "Blue-Box"))
+    for pieces in (read([text], ids), read(text, ids)):
+        assert [(each.text, each.certain) for each in pieces if each.kind == "refer"] == named
+        if "https" not in text:
+            assert words(pieces) == spoken
+
+
+def test_what_was_left_out_is_told_in_one_line_a_reason() -> None:
+    text = "[laughs] See [sic] and [smiles] [1]. https://example.org/x <b>so</b> <think>hm</think>"
+
+    assert problems(read([text], Ids(()))) == (
+        "thoughts were not said: <think>",
+        "stage directions were not said: [laughs], [smiles]",
+        "citations were not said: [1]",
+        "addresses were not said in full: https://example.org/x",
+        "tags were not said: <b>, </b>",
+        "brackets that name no object were said as words: [sic]",
+    )
+
+
+def test_the_world_is_asked_anew_at_each_piece() -> None:
+    reader = Reader()
+    first = reader.feed("Take [cup] or ", Ids(("cup",)))
+    second = [*reader.feed("[cup].", Ids(())), *reader.finish()]
+
+    assert [each.text for each in (*first, *second) if each.kind == "refer"] == ["cup"]
+    assert words(second) == "cup."
+
+
+def test_words_that_were_said_keep_the_spelling_of_their_author() -> None:
+    text = "**Bold** 😊 and [laughs] `code`"
+
+    assert " ".join(said(text, len(text)).split()) == "Bold 😊 and code"
+    assert said(text, 8) == "Bold"
+
+
+def test_an_emoji_alone_is_no_words() -> None:
+    assert not is_spoken("😊 👍🏽 ℹ️")
+    assert not is_spoken("[laughs]")
+    assert is_spoken("*very*")
+
+
+odd = st.lists(
+    st.sampled_from([*"ab1 *_[]()<>`~#!&|\\\n.-+=:/^@\"'{}", "<think>", "https://", "😊", "【1†"]), max_size=80
+).map("".join)
+
+
+@settings(max_examples=300)
+@given(odd, st.data())
+def test_any_text_is_read_and_the_bits_do_not_matter(text: str, data: st.DataObject) -> None:
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(text)), max_size=8)))
+    parts = [text[start:end] for start, end in zip([0, *cuts], [*cuts, len(text)], strict=True)]
+    whole = read([text], Ids(("a", "b]")))
+
+    assert words(read(parts, Ids(("a", "b]")))) == words(whole)
+    assert [each.place for each in whole if each.kind == "say"] == sorted(
+        each.place for each in whole if each.kind == "say"
+    )
+
+
+@pytest.mark.parametrize("unit", ["[", "[a ", "<a ", "*a ", "`x ", "|", "\n", "(a ", "&", "【", "[x](", "<!--", "# "])
+def test_a_long_row_of_marks_is_read_to_its_end(unit: str) -> None:
+    text = unit * 10_000
+
+    assert letters(words(read([text], Ids(("cup",))))) == letters(text)
