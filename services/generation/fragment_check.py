@@ -33,7 +33,8 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     """The fragment with addressee and delay target filled in, and marks that look like offsets made explicit.
 
     robot: its actor id, which may be a target too.
-    Raises InputRefused with JSON path and XML line of the first thing that is wrong, by itself or with regard to the world.
+    Raises InputRefused with JSON path and XML line of the first thing that is wrong, by itself or with regard to the
+    world.
     """
     with _places_as_written(fragment):
         return _checked(fragment, world, robot)

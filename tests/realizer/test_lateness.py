@@ -69,12 +69,21 @@ def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> Non
 def test_the_time_of_an_event_runs_from_its_start_or_the_last_anchor(
     reached: dict[tuple[str, str], float], since: float
 ) -> None:
-    """An anchor that has not come by now does not count. Recognition, if it has the request, is given longer."""
+    """An anchor that has not come by now does not count."""
     beat, words = Gesture(id="g", lexeme="BEAT"), Speech(id="s", text="one two", marks=(Mark("m", 3),))
     event = Event(id="e", kind="backchannel", responder="human", limit=4.0, anchors=("s:m", "g:stroke"))
     points = {Point("e", "start"): 2.0, **{Point(*point): at for point, at in reached.items()}}
-    config = RealizerConfig(event_grace=0.5, event_patience=10.0)
     said = block((words, beat, event))
 
-    assert event_deadline(event, said, points, config, is_received=False) == since + 4.5
-    assert event_deadline(event, said, points, config, is_received=True) == since + 14.0
+    assert event_deadline(event, said, points, None, is_received=False) == since + 4.5
+
+
+@pytest.mark.parametrize(("wanted", "told", "limit"), [(None, None, 4.0), (3.0, None, 3.0), (None, 30.0, 30.0)])
+def test_recognition_is_trusted_while_anything_happens_and_for_its_own_limit(
+    wanted: float | None, told: float | None, limit: float
+) -> None:
+    event = Event(id="e", kind="backchannel", responder="human", limit=wanted)
+    points = {Point("e", "start"): 2.0, Point("s", "end"): 20.0}
+    said = block((Speech(id="s", text="one two"), event))
+
+    assert event_deadline(event, said, points, told, is_received=True) == 20.0 + limit + 10.0
