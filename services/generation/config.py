@@ -156,7 +156,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 _POSITIVE = (
     "turn_silence", "barge_in", "decision_patience", "longest_answer", "world_patience", "glance_factor",
     "mtbce_prior", "mtbce_low",
-    "glance_duration", "response_hold", "retry", "fragments", "utterance",
+    "glance_duration", "response_hold", "retry", "fragments",
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight", "expected_delay",

@@ -48,7 +48,7 @@ class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Greatest age at which a head pose or a voice level that arrives still counts."""
     settling: Seconds = 0.35
     """Longest time for which events wait for raw perception that is undecided. Shorter than the realizer's
-    `event_grace`."""
+    grace (0.5 s)."""
 
     def __post_init__(self) -> None:
         place = "sensing."

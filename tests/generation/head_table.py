@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 TICK = 0.125
 TIMES = {
     "dwell": 0.25, "hand_onset": 0.25, "hand_stillness": 0.75, "response_hold": 0.75, "glance_duration": 1.0,
-    "mtbce_prior": 5.75, "face_lost": 2.0,
+    "mtbce_prior": 5.75,
 }  # fmt: skip
 """The configuration of both sides."""
+FACE_LOST = 2.0
+"""Seconds for which the head stays with a face that is out of sight."""
 ROWS = ("inhibition", "fragment", "glance", "response", "hands", "face")
 
 Owner = tuple[str, str]
@@ -98,7 +100,7 @@ class HeadTable:
             wants["inhibition"] = self.inhibited[1]
         if self.fragment is not None:
             wants["fragment"] = self.fragment
-        there = self.seen or self.now - self.seen_until < TIMES["face_lost"]
+        there = self.seen or self.now - self.seen_until < FACE_LOST
         running = self.glance_until is not None and self.now < self.glance_until
         due = self.glance_until is None and not self.on_face and self.now - self.quiet_since >= self.pace
         if there and (running or due):

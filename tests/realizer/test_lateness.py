@@ -78,7 +78,7 @@ def test_the_time_of_an_event_runs_from_its_start_or_the_last_anchor(
     assert event_deadline(event, said, points, None, is_received=False) == since + 4.5
 
 
-@pytest.mark.parametrize(("wanted", "told", "limit"), [(None, None, 4.0), (3.0, None, 3.0), (None, 30.0, 30.0)])
+@pytest.mark.parametrize(("wanted", "told", "limit"), [(None, None, 2.5), (3.0, None, 3.0), (None, 30.0, 30.0)])
 def test_recognition_is_trusted_while_anything_happens_and_for_its_own_limit(
     wanted: float | None, told: float | None, limit: float
 ) -> None:

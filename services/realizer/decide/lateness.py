@@ -89,9 +89,9 @@ class LatenessWatch:
         return found
 
 
-UNTOLD: Seconds = 4.0
-"""Limit of an event where neither the block nor recognition names one, because recognition is not there: in that time
-96 of 100 people have answered a robot."""
+UNTOLD: Seconds = 2.5
+"""Limit of an event where neither the block nor recognition names one, because recognition is not there. Nobody can
+say then what the person does: the robot leaves the time in which most people follow a point or begin to answer."""
 GRACE: Seconds = 0.5
 """Time after its limit at which an event ends as failed if recognition is not there to decide it."""
 PATIENCE: Seconds = 10.0
