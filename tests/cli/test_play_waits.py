@@ -114,7 +114,8 @@ async def test_a_fragment_is_played_right_after_the_start_before_anybody_is_seen
                 asyncio.get_running_loop().call_later(0.5, bus.publish, keys.WORLD, world)
                 _, err = await play.communicate()
 
-        assert (play.returncode, err) == (0, b"")
+        # A machine that is busy for a moment makes the robot late, and that is told truly; nothing else may be told.
+        assert (play.returncode, [told for told in err.splitlines() if b"LATE" not in told]) == (0, [])
     finally:
         for program in programs:
             await stopped(program)
