@@ -29,7 +29,7 @@ from tests.bus.faulty import Faults, FaultyHub
 LIMIT = 900.0
 """Seconds of virtual time: nothing in the scenario takes so long."""
 LAST_ANSWER = 5.0
-"""Seconds after the goodbye in which the last events end: an answer may come for 4 s; who has left is gone after 2."""
+"""Seconds after the goodbye in which the last events end: an answer may come for 4 s, who has left is gone in 2."""
 
 
 class Record:
