@@ -28,14 +28,14 @@ def spoken_items(items: Sequence[EstimateItem]) -> list[EstimateItem]:
 
 
 def progress_of(behavior: BlockBehavior, progress: Progress) -> Progress:
-    """What a body tells of `spoken(behavior)`, told of the behavior."""
+    """Progress that a body tells of `spoken(behavior)`, as progress of the behavior."""
     if isinstance(behavior, Speech) and isinstance(progress, Spoke):
         return replace(progress, position=heard(behavior.text).written(int(progress.position)))
     return progress
 
 
 def estimate_of(behavior: BlockBehavior, estimate: Estimate) -> Estimate:
-    """The estimate of `spoken(behavior)` as one of the behavior; what will not be said is told in it."""
+    """Estimate of `spoken(behavior)` as one of the behavior; what will not be said is told in it."""
     if not isinstance(behavior, Speech) or (ear := heard(behavior.text)).text == behavior.text:
         return estimate
     words = tuple(replace(each, position=ear.written(each.position)) for each in estimate.words)

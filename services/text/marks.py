@@ -19,6 +19,7 @@ from string import digits
 
 import regex
 
+from engage_hri.schemas.suggestion import meant
 from engage_hri.services.text import patterns as mark
 from engage_hri.services.text.acts import LISTS
 from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason
@@ -237,10 +238,10 @@ class Reader:
         self._literally(found.end() - 1, found.end())
 
     def _entity(self, found: Found) -> bool:
-        meant = unescape(found[0])
-        for each in meant if meant != found[0] else "":
+        character = unescape(found[0])
+        for each in character if character != found[0] else "":
             self._character(each, found.start(), len(found[0]), is_literal=True)
-        return meant != found[0]
+        return character != found[0]
 
     def _address(self, found: Found) -> None:
         """Take an address such as `https://example.org/page`: its host is said, for a person can remember that."""
@@ -320,7 +321,7 @@ class Reader:
             self._spaces(found)
             return
         words, is_index = self._pop()
-        self._leave("bracket", f"[{words}]{self._ids.hint(words)}")
+        self._leave("bracket", f"[{words}]{meant(words, self._ids.ids)}")
         if is_index or self._text[found.end()].isalnum():
             self._spaces(found)
 

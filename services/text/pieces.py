@@ -5,8 +5,6 @@ from typing import Literal, NamedTuple
 
 import regex
 
-from engage_hri.schemas.suggestion import suggestion
-
 Kind = Literal["say", "symbol", "silent", "break", "refer", "left"]
 Reason = Literal["", "address", "citation", "direction", "tag", "thought", "definition", "bracket", "case"]
 """Why something was left out, or said otherwise than it may have been meant. `bracket`: names no object, and is said
@@ -84,8 +82,3 @@ class Ids:
         """Find the one id that was written in other letters; empty: there are several."""
         found = [each for each in self.ids if each.lower() == written.lower()]
         return found[0] if len(found) == 1 else ""
-
-    def hint(self, written: str) -> str:
-        """Tell which id was meant, if one is near."""
-        hint = suggestion(written, self.ids) if self.ids else ""
-        return f" ({hint})" if hint.startswith("did you mean") else ""
