@@ -5,6 +5,8 @@ A speaker says the words all the same. Only a fragment of which nothing at all c
 of a turn never is, for that would cost the rest of the turn.
 """
 
+from string import ascii_letters, digits
+
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import (
@@ -15,12 +17,16 @@ from engage_hri.schemas.behaviors import (
     Pointing,
     Reference,
     Speech,
+    Wait,
 )
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.suggestion import meant
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.references.phrases import noun_in
 from engage_hri.services.text.ear import heard, is_spoken
+
+_NAME = f"{ascii_letters}{digits}_"
+"""Characters of the name of a sync point; an offset may follow it."""
 
 
 def bearable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFragment, tuple[str, ...]]:
@@ -32,19 +38,19 @@ def bearable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFrag
     objects = {each.id for each in world.objects}
     warnings: list[str] = []
     behaviors = [_bearable(each, objects, known, warnings) for each in fragment.behaviors]
-    kept = tuple(each for each in behaviors if each is not None)
     is_piece = fragment.turn_status in ("beginning", "middle", "end")
     pairs = zip(fragment.behaviors, behaviors, strict=True)
     if not is_piece and not any(_is_performed(after) for before, after in pairs if type(after) is type(before)):
         return fragment, ()  # what it names is refused, if that is wrong
-    gone = {before.id for before, after in zip(fragment.behaviors, behaviors, strict=True) if after is None}
-    if gone:
-        kept = tuple(_untied(each, gone) for each in kept)
     delay = fragment.delay_target
     if delay and delay not in known:
         warnings.append(f"{_unknown(delay, known)}; the robot looks elsewhere while it is silent")
         delay = ""
-    return (replace(fragment, behaviors=kept, delay_target=delay) if warnings else fragment), tuple(warnings)
+    if not warnings:
+        return fragment, ()
+    left_out = {each.id for each in set(behaviors) - set(fragment.behaviors) if isinstance(each, Wait)}
+    changed = replace(fragment, behaviors=tuple(behaviors), delay_target=delay)
+    return _retied(changed, left_out) if left_out else changed, tuple(warnings)
 
 
 def unsaid(fragment: TurnFragment) -> tuple[str, ...]:
@@ -59,14 +65,15 @@ def _is_performed(behavior: FragmentBehavior) -> bool:
 
 def _bearable(
     behavior: FragmentBehavior, objects: set[str], known: set[str], warnings: list[str]
-) -> FragmentBehavior | None:
-    """The behavior, or what is done in its place; None: nothing."""
+) -> FragmentBehavior:
+    """The behavior, or what is done in its place; a wait takes no time, but others may be tied to it."""
     if isinstance(behavior, Reference):
         behavior = _with_words(behavior, objects, warnings)
         return behavior if behavior.target in objects else _as_speech(behavior, objects, warnings)
     if isinstance(behavior, Gaze | GazeShift | Pointing | HeadDirectionShift) and behavior.target not in known:
         warnings.append(f"{behavior.id}: {_unknown(behavior.target, known)}; left out")
-        return None
+        begins = tuple(each for each in behavior.timing if each.sync == "start")
+        return Wait(id=behavior.id, duration=0.0, timing=begins, line=behavior.line)
     return behavior
 
 
@@ -92,10 +99,27 @@ def _as_speech(reference: Reference, objects: set[str], warnings: list[str]) -> 
     return Speech(id=reference.id, text=text, timing=reference.timing, line=reference.line)
 
 
-def _untied(behavior: FragmentBehavior, gone: set[str]) -> FragmentBehavior:
-    """The behavior without ties to those that are left out."""
-    kept = tuple(each for each in behavior.timing if each.ref.partition(":")[0] not in gone)
-    return behavior if kept == behavior.timing else replace(behavior, timing=kept)
+def _retied(fragment: TurnFragment, gone: set[str]) -> TurnFragment:
+    """The fragment tied to the start of what is left out where it was tied to another point of that."""
+
+    def to_start(ref: str) -> str:
+        id, _, rest = ref.partition(":")
+        return f"{id}:start{rest.lstrip(_NAME)}" if id in gone else ref
+
+    behaviors = [
+        replace(each, timing=tuple(replace(tie, ref=to_start(tie.ref)) for tie in each.timing))
+        for each in fragment.behaviors
+    ]
+    constraints = [
+        replace(
+            each,
+            operators=tuple(
+                replace(one, ref=to_start(one.ref), syncs=tuple(map(to_start, one.syncs))) for one in each.operators
+            ),
+        )
+        for each in fragment.constraints
+    ]
+    return replace(fragment, behaviors=tuple(behaviors), constraints=tuple(constraints))
 
 
 def _unknown(id: str, known: set[str], kind: str = "") -> str:

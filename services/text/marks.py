@@ -395,6 +395,7 @@ _INLINE = _table(
     ("_", "_+(?=[^_])", Reader._skips),
     ("~", "~~+(?=[^~])", Reader._skips),
     ("#", mark.HEADING_ENDS, Reader._ends_heading),
+    ("|", r"\|(?:[ \t]*:?-+:?[ \t]*\|)+", Reader._break),  # XML makes one line of a table
     ("|", r"\|", Reader._bar),
     ("!", mark.IMAGE, Reader._skips),
     ("(", mark.IN_ROUND, Reader._directed),
