@@ -63,7 +63,7 @@ ten seconds after the turn a person begins a turn of their own
     human's ap-2: started 12.1
 
 who leaves and comes back begins anew
-    1 asked; 4 lost human; 5 time; 6 found human; 6.5 human +speak
+    1 asked; 4 lost human; 6 time; 6.1 found human; 6.5 human +speak
     robot's ap-1: started 1, failed 3.5 after 2.5
     human's ap-2: started 6.5
 
