@@ -211,7 +211,8 @@ class _PlannedObservations:
                 turn_ends,
             )
         if not event.succeeds:
-            yield from self._does(EXPLAINER, "speak", *(event.decided + each for each in GOES_ON))
+            since, until = GOES_ON
+            yield from self._does(EXPLAINER, "speak", event.decided + since, event.decided + until)
             return
         responder = self._other(event.initiator)
         if event.task_until is not None:
