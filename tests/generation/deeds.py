@@ -1,12 +1,14 @@
-"""An independent reader of what a robot did: from feedback, the voice's words and told events alone.
+"""An independent reader of what a robot did: from feedback, the body's log and the voice's words alone.
 
-It takes nothing of generation, and nothing that computes summaries: `by`, `looked`, `eye_contact`, `said` and status
-are decided once more from messages that the realizer, the body and recognition have sent, for turns in worlds
-that change at random. `python -m tests.generation.deeds --turns 10000` tries many, and prints each difference.
+It takes nothing of generation, and nothing that computes summaries. Object, `by`, `looked`, `eye_contact`, `said` and
+status are decided once more from what the realizer and recognition have told, from where the eyes and forearms of
+the body really pointed at that instant, and from which programs were alive, for turns in worlds that change at
+random. `python -m tests.generation.deeds --turns 10000` tries many, and prints each difference.
 """
 
 import argparse
 import asyncio
+import math
 import random
 import sys
 from contextlib import AsyncExitStack, suppress
@@ -18,7 +20,8 @@ from engage_hri import perceive
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.summary import Referred, Summary, summary
+from engage_hri.schemas.summary import Summary, summary
+from engage_hri.schemas.tool import ToolInput
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call, stream
@@ -32,32 +35,51 @@ PLACES = ((0.5, 0.2, 0.8), (0.45, -0.2, 0.8), (0.6, 0.0, 0.8), (-1.0, 0.2, 0.8),
 """Places of objects: three within reach, one behind the robot, one above its shoulder, one far away."""
 SERVICES = (*roster.ROBOT, "simulation")
 DYING = ("generation", "realizer", "control", "recognition")
+SAMPLE = 0.06
+"""Seconds from an instant within which the body's log has a sample."""
+SEEN = 1.0
+"""Seconds for which a gesture that is under way may still go to where its object was."""
+WIDEST = {"pointing": 12.0, "a look": 6.0}
+"""Degrees that a gesture may miss its object by."""
+Vector = tuple[float, float, float]
 
 
 class Reader:
     """What was seen on the bus, as plain values."""
 
     def __init__(self) -> None:
-        self.points: set[tuple[str, str, str]] = set()
-        self.ends: dict[str, str] = {}
-        """The last end of each block; empty: it goes on."""
-        self.words: list[tuple[str, str, str]] = []
+        self.points: dict[tuple[str, str, str], float] = {}
+        """When each sync point came the last time."""
+        self.ends: dict[str, list[str]] = {}
+        """The ends of the blocks of each name, in order; the last is empty while it goes on."""
+        self.words: list[tuple[str, str, str, float]] = []
         self.events: dict[str, dict[str, Any]] = {}
-        self.silent: set[str] = set()
-        """Blocks of which something was dropped."""
+        self.places: list[tuple[float, dict[str, Vector]]] = []
+        """Where things were, from which time on."""
+        self.rays: list[tuple[float, dict[str, tuple[Vector, Vector]]]] = []
+        """The body's log: origin and direction of eyes and forearms."""
+        self.gone: list[tuple[float, str]] = []
+        """Programs that have vanished, and when."""
 
-    def take(self, message: dict[str, Any]) -> None:
+    def take(self, message: dict[str, Any], now: float = 0.0) -> None:
         match message.get("type"):
             case "sync_point_progress":
-                self.points.add((message["block"], message["behavior"], message["sync"]))
+                self.points[message["block"], message["behavior"], message["sync"]] = now
             case "block_progress" if message["progress"] == "start":
-                self.ends[message["block"]] = ""
+                self.ends.setdefault(message["block"], []).append("")
             case "block_progress":
-                self.ends[message["block"]] = message["status"]
+                self.ends.setdefault(message["block"], [""])[-1] = message["status"]
             case "word_spoken":
-                self.words.append((message["block"], message["behavior"], message["word"]))
+                self.words.append((message["block"], message["behavior"], message["word"], now))
             case "connection_event" if message.get("block"):
                 self.events[message["id"]] = message
+            case "world":
+                self.places.append((now, {each["id"]: each["position"] for each in message["entities"]}))
+            case "robot_state":
+                rays = {name: message[name] for name in ("gaze", "left_arm", "right_arm") if message.get(name)}
+                self.rays.append((now, {name: (ray["origin"], ray["axis"]) for name, ray in rays.items()}))
+            case "peer_gone":
+                self.gone.append((now, message["participant"]))
 
     def decision(self, block: str, behavior: str) -> bool | None:
         told = [each for each in self.events.values() if (each["block"], each.get("behavior")) == (block, behavior)]
@@ -66,6 +88,12 @@ class Reader:
             return True
         return False if "failed" in states else None
 
+    def references(self, block: str) -> list[str]:
+        """Ids of the references of a block of which anything came."""
+        behaviors = {each[1] for each in (*self.points, *self.words) if each[0] == block}
+        names = {name.rpartition("-")[0] for name in behaviors if name.endswith(("-gaze", "-point", "-phrase"))}
+        return sorted(names - {"turn"})
+
     def by(self, block: str, reference: str) -> str:
         if (block, f"{reference}-point", "stroke") in self.points:
             return "pointing"
@@ -73,10 +101,26 @@ class Reader:
             return "a look"
         return "words alone" if any(word[:2] == (block, f"{reference}-phrase") for word in self.words) else ""
 
-    def judged(self, blocks: list[str], references: list[tuple[str, str, str]]) -> dict[str, Any]:
-        """What a summary of these fragments has to say. references: fragment, id of the behavior, object."""
+    def miss(self, block: str, reference: str, thing: str, by: str) -> float:
+        """Angle in degrees between a thing and what the body pointed at it, at the stroke: the least of both arms."""
+        part, names = ("point", ("left_arm", "right_arm")) if by == "pointing" else ("gaze", ("gaze",))
+        at = self.points[block, f"{reference}-{part}", "stroke"]
+        shown = [rays for time, rays in self.rays if abs(time - at) <= SAMPLE]
+        known = [places for time, places in self.places if time <= at]
+        while_under_way = [places for time, places in self.places if at - SEEN <= time <= at]
+        places = [each[thing] for each in (*known[-1:], *while_under_way, *known[-2:-1]) if thing in each]
+        return min(
+            (angle(*rays[name], place) for rays in shown for name in names if name in rays for place in places),
+            default=math.inf,
+        )
+
+    def judged(self, blocks: list[str], written: dict[tuple[str, str], str], until: float) -> dict[str, Any]:
+        """What a summary of these fragments has to say.
+
+        written: the object of each reference, in order. until: when it was told.
+        """
         made = []
-        for block, reference, thing in references:
+        for (block, reference), thing in written.items():
             if by := self.by(block, reference):
                 looked = self.decision(block, f"{reference}-event") if by != "words alone" else None
                 made.append((thing, by, looked))
@@ -85,14 +129,34 @@ class Reader:
             for block in blocks
             if (block, "turn-gaze", "stroke") in self.points
         ]
-        said = "".join(word for block, _, word in self.words if block in blocks)
+        said = "".join(word for block, _, word, at in self.words if block in blocks and at <= until)
         return {
             "said": letters(said), "references": made,
             "eye_contact": next((each for each in reversed(contact) if each is not None), None),
         }  # fmt: skip
 
+    def status(self, blocks: list[str], since: float) -> set[str]:
+        """What may be told of a turn of these fragments, from the ends of blocks and the deaths of programs."""
+        ends = [self.ends.get(block, []) for block in blocks]
+        gone = {name for time, name in self.gone if time >= since}
+        if not any(ends):
+            return {"unknown", "refused", "failed"} if gone & {"generation", "realizer", "control"} else {"refused"}
+        last = [each[-1] if each else "never begun" for each in ends]
+        if "generation" in gone:
+            return {"unknown", "done" if all(each == "done" for each in last) else "failed"}
+        if "realizer" in gone and not all(each == "done" for each in last):
+            return {"unknown", "failed", "interrupted"} if "" not in last else {"unknown"}
+        for worst in ("failed", "interrupted"):
+            if worst in last:
+                return {worst}
+        return {"done"} if all(each == "done" for each in last) else {"failed", "interrupted"}
 
-__all__ = ["Reader", "Referred", "compared", "run", "summary"]
+
+def angle(origin: Vector, axis: Vector, place: Vector) -> float:
+    """Degrees between a ray and the direction from its origin to a place."""
+    way = [there - here for there, here in zip(place, origin, strict=True)]
+    cosine = sum(a * b for a, b in zip(way, axis, strict=True)) / math.hypot(*way)
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
 
 
 def letters(text: str) -> str:
@@ -129,9 +193,10 @@ async def turns(seed: int, number: int) -> list[str]:
 
 async def read(hub: MemoryHub, reader: Reader) -> None:
     bus = hub.join("reader")
-    with bus.subscribe(keys.FEEDBACK, keys.SYNC_POINT, keys.ANY_CONNECTION_EVENT) as inbox:
+    told = (keys.FEEDBACK, keys.SYNC_POINT, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.ROBOT_MOTION, keys.ANY_ALIVE)
+    with bus.subscribe(*told) as inbox:
         async for received in inbox:
-            reader.take(msgspec.to_builtins(received.message))
+            reader.take(msgspec.to_builtins(received.message), bus.now())
 
 
 async def one_turn(
@@ -156,22 +221,35 @@ async def one_turn(
         texts = [chance.choice(("Please take", "Look at", "This is about", "")) for _ in range(2)]
         shown = chance.sample(things, min(len(things), chance.randint(1, 2)))
         is_stream = chance.random() < 0.4
+        since = robot.now()
+        written: dict[tuple[str, str], str] = {}
         try:
             async with asyncio.timeout(120):
                 if is_stream:
-                    written = " ".join(f"{text} [{thing}] now." for text, thing in zip(texts, shown, strict=False))
-                    outcomes = await stream(robot, pieces(written), id=id)
+                    text = " ".join(f"{text} [{thing}] now." for text, thing in zip(texts, shown, strict=False))
+                    outcomes = await stream(
+                        robot, pieces(text), id=id, turn=ToolInput(turn_status="full", parts=(), addressee="ann")
+                    )
                     result, blocks = summary(*outcomes), [each.fragment for each in outcomes]
+                    # Each sentence is a fragment, and has one reference.
+                    written = {
+                        (f"{id}-{number}", name): thing
+                        for number, thing in enumerate(shown, start=1)
+                        for name in reader.references(f"{id}-{number}")
+                    }
                 else:
                     parts: list[dict[str, Any]] = []
                     for text, thing in zip(texts, shown, strict=False):
                         parts += [{"say": text}] if text else []
                         parts.append({"refer": thing, "certainty": chance.choice(("normal", "high"))})
                     parts.append({"say": "for me, it is very nice."})
+                    named = {f"refer-{n}": part["refer"] for n, part in enumerate(parts, start=1) if "refer" in part}
                     before = {*reader.ends}
                     call = {"turn_status": "full", "parts": parts, "addressee": "ann"}
                     result = await perform_call(robot, call)
                     blocks = [each for each in reader.ends if each not in before and "-@" in each]
+                    written = {(block, name): thing for block in blocks for name, thing in named.items()}
+            until = robot.now()
         finally:
             happening.cancel()
             await asyncio.gather(happening, return_exceptions=True)
@@ -179,7 +257,7 @@ async def one_turn(
         with suppress(EngageError):
             await robot.switch_faults(timeout=2.0)
         await asyncio.sleep(3.0)
-    return compared(id, result, blocks, reader)
+    return compared(id, result, blocks, reader, written, since, until)
 
 
 async def pieces(text: str) -> Any:
@@ -231,33 +309,32 @@ async def revive(lives: dict[str, AsyncExitStack], hub: MemoryHub, config: Any) 
         await lives[name].enter_async_context(running(hub, {name: roster.service(name, config)}))
 
 
-def compared(id: str, result: Summary, blocks: list[str], reader: Reader) -> list[str]:
-    told = told_by(result)
-    references = [
-        (block, behavior.removesuffix(end), "")
-        for block in blocks
-        for behavior in sorted({each[1] for each in reader.points if each[0] == block})
-        for end in ("-gaze", "-point", "-phrase")
-        if behavior.endswith(end) and not behavior.startswith("turn-")
-    ]
-    judged = reader.judged(blocks, list(dict.fromkeys(references)))
-    if result.status == "unknown" and not result.said and not result.references:
-        return []  # whoever could have told is gone
+def compared(
+    id: str,
+    result: Summary,
+    blocks: list[str],
+    reader: Reader,
+    written: dict[tuple[str, str], str],
+    since: float,
+    until: float,
+) -> list[str]:
+    told, judged = told_by(result), reader.judged(blocks, written, until)
     found = []
-    for name in ("said", "eye_contact"):
+    allowed = reader.status(blocks, since)
+    if result.status not in allowed:
+        ends = [reader.ends.get(block) for block in blocks]
+        found.append(f"{id}: status: told {result.status}, seen {sorted(allowed)}: {ends} {reader.gone} {result}")
+    if result.status == "unknown" and not result.said and not result.references:
+        return found  # Whatever could have told is gone.
+    for name in ("said", "eye_contact", "references"):
         if told[name] != judged[name]:
-            found.append(f"{id}: {name}: told {told[name]!r}, seen {judged[name]!r} ({result.status})")
-    ours, seen = (
-        sorted(map(str, (each[1:] for each in told["references"]))),
-        sorted(map(str, (each[1:] for each in judged["references"]))),
-    )
-    if ours != seen:
-        found.append(f"{id}: references: told {ours}, seen {seen} ({result.status}) {result.problems}")
-    ends = [reader.ends.get(block) for block in blocks]
-    if result.status == "done" and any(end != "done" for end in ends):
-        found.append(f"{id}: status: done, but blocks ended {ends}")
-    if result.status == "refused" and any(end is not None for end in ends):
-        found.append(f"{id}: status: refused, but blocks began")
+            found.append(
+                f"{id}: {name}: told {told[name]!r}, seen {judged[name]!r} ({result.status}) {result.problems}"
+            )
+    for (block, reference), thing in written.items():
+        by = reader.by(block, reference)
+        if by in ("pointing", "a look") and (miss := reader.miss(block, reference, thing, by)) > WIDEST[by]:
+            found.append(f"{id}: {reference}: {by}, but {miss:.0f} degrees off {thing}")
     return found
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from engage_hri import perceive
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.summary import Summary
+from engage_hri.schemas.summary import Referred, Summary, summary
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call, stream
@@ -156,7 +156,7 @@ async def test_a_stream_whose_first_fragment_is_refused_is_refused(hub: MemoryHu
         await asyncio.sleep(1.0)
         outcomes = await stream(client, pieces(), id="s")
 
-    told = deeds.summary(*outcomes)
+    told = summary(*outcomes)
     assert told.status == "refused"
     assert not told.cut_short
 
@@ -167,16 +167,27 @@ def test_an_independent_reader_of_the_robot_finds_no_difference(seed: int) -> No
 
 
 def test_the_reader_finds_what_is_told_wrongly() -> None:
+    place, eyes = (0.5, 0.0, 0.8), (0.0, 0.0, 1.2)
     reader = deeds.Reader()
-    reader.take({"type": "block_progress", "block": "f", "progress": "end", "status": "done"})
-    reader.take({"type": "sync_point_progress", "block": "f", "behavior": "r-gaze", "sync": "stroke"})
-    reader.take({"type": "word_spoken", "block": "f", "behavior": "r-phrase", "word": "this"})
-    right = deeds.Referred(object="cup", phrase="this", by="a look")
-    wrong = deeds.Referred(object="cup", phrase="this", by="pointing")
+    for message in (
+        {"type": "world", "entities": [{"id": "cup", "position": place}, {"id": "hat", "position": (0.5, 0.4, 0.8)}]},
+        {"type": "robot_state", "gaze": {"origin": eyes, "axis": (0.780869, 0.0, -0.624695)}},
+        {"type": "block_progress", "progress": "start", "block": "f"},
+        {"type": "sync_point_progress", "block": "f", "behavior": "r-gaze", "sync": "stroke"},
+        {"type": "word_spoken", "block": "f", "behavior": "r-phrase", "word": "this"},
+        {"type": "block_progress", "progress": "end", "block": "f", "status": "done"},
+    ):
+        reader.take(message, 1.0)
 
-    def told(references: tuple[Any, ...], said: str = "this") -> list[str]:
-        return deeds.compared("t", Summary(status="done", said=said, references=references), ["f"], reader)
+    def told(object: str = "cup", by: str = "a look", said: str = "this", status: Any = "done") -> list[str]:
+        references = (Referred(object=object, phrase="this", by=by),)
+        result = Summary(status=status, said=said, references=references)
+        return deeds.compared("t", result, ["f"], reader, {("f", "r"): object}, 0.0, 2.0)
 
-    assert told((right,)) == []
-    assert len(told((wrong,))) == 1
-    assert len(told((right,), "this one")) == 1
+    assert told() == []
+    assert [len(told(by="pointing")), len(told(said="this one")), len(told(status="failed"))] == [1, 1, 1]
+    assert told(object="hat") == ["t: r: a look, but 32 degrees off hat"]
+    assert (
+        len(deeds.compared("t", Summary(status="done", said="this"), ["f"], reader, {("f", "r"): "cup"}, 0.0, 2.0))
+        == 1
+    )

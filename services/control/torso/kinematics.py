@@ -151,7 +151,8 @@ def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, 
 
     reserve: kept free before the joints' limits, for a nod. Raises Unreachable.
     """
-    if math.dist(_to_torso(target, pose), NECK) <= EYES_ABOVE:
+    # What is nearer than the eyes may lie on the gaze axis, but behind them.
+    if math.dist(_to_torso(target, pose), NECK) <= math.hypot(EYES_AHEAD, EYES_ABOVE):
         raise Unreachable("it is inside the head")
     angles = neck_angles(target, pose)
     for joint, angle in zip(("neck_yaw", "neck_pitch"), angles, strict=True):
