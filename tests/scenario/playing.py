@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.collaboration.config import CollaborationConfig
@@ -69,11 +70,12 @@ async def play(
     habits: Habits | None = None,
     sensors: SimulationConfig | None = None,
     control: ControlConfig | None = None,
+    after: Seconds = 0.0,
     **manager: Any,
 ) -> Record:
     """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
     sensors: how person and table are perceived; exactly, by default. control: in place of the torso with `noise`.
-    manager: its configuration.
+    after: how long the robot and the person go on then. manager: its configuration.
     """
     received: list[Received] = []
     finished = asyncio.Event()
@@ -98,6 +100,7 @@ async def play(
             async with running(hub, services):
                 async with asyncio.timeout(LIMIT):
                     await finished.wait()
+                    await asyncio.sleep(after)
             while len(inbox) and (it := await inbox.next()):
                 received.append(it)
     return Record(received)
