@@ -86,23 +86,23 @@ def test_a_voice_teaches_what_the_definition_says(seed: int) -> None:
     pace = chance.choice((1.0, 1.0, chance.uniform(0.7, 1.6)))
     utterances.pass_point(chain(Speech(id="s", text="x"), estimate), words, 1, began)
     definition = Definition([*(word.end for word in words), end + 0.1], began)
-    slip, shown = chance.choice((0.0, 0.0005, 0.1)), began
+    slip, at, shown = chance.choice((0.0, 0.0005, 0.1)), began, began
     for number, word in enumerate(words):
         if chance.random() < 0.1:
             continue
-        at = max(shown, began + pace * word.end + chance.uniform(-slip, slip))
+        at = max(at, began + pace * word.end + chance.uniform(-slip, slip))
         for _ in range(chance.choice((0, 0, 1, 2))):
             shown = chance.uniform(shown, at + lag)
             utterances.settle("s", shown)
             definition.settled.append((len(definition.heard), shown))
-        shown = max(shown, at)
         assert utterances.hear("s", word.position, at, at + lag)
         definition.heard.append((number, at, at + lag))
         if (interval := utterances.interval("s")) is not None:
             experience.learn_words("s", interval.natural, at - interval.since)
             utterances.teach("s")
-        utterances.settle("s", at + lag)
-        definition.settled.append((len(definition.heard), at + lag))
+        shown = at + lag
+        utterances.settle("s", shown)
+        definition.settled.append((len(definition.heard), shown))
         assert experience.factor("s") == pytest.approx(definition.pace(len(definition.heard)), abs=1e-9)
         assert utterances.since["s"] == pytest.approx(definition.since(), abs=1e-9)
     assert pace != 1.0 or slip or experience.factor("s") == 1.0, "an exact voice has taught something"
