@@ -52,7 +52,7 @@ class Reader:
         """When each sync point came the last time."""
         self.ends: dict[str, list[str]] = {}
         """The ends of the blocks of each name, in order; the last is empty while it goes on."""
-        self.words: list[tuple[str, str, str]] = []
+        self.words: list[tuple[str, str, str, float]] = []
         self.events: dict[str, dict[str, Any]] = {}
         self.places: list[tuple[float, dict[str, Vector]]] = []
         """Where things were, from which time on."""
@@ -70,7 +70,7 @@ class Reader:
             case "block_progress":
                 self.ends.setdefault(message["block"], [""])[-1] = message["status"]
             case "word_spoken":
-                self.words.append((message["block"], message["behavior"], message["word"]))
+                self.words.append((message["block"], message["behavior"], message["word"], now))
             case "connection_event" if message.get("block"):
                 self.events[message["id"]] = message
             case "world":
@@ -114,8 +114,11 @@ class Reader:
             default=math.inf,
         )
 
-    def judged(self, blocks: list[str], written: dict[tuple[str, str], str]) -> dict[str, Any]:
-        """What a summary of these fragments has to say. written: the object of each reference, in order."""
+    def judged(self, blocks: list[str], written: dict[tuple[str, str], str], until: float) -> dict[str, Any]:
+        """What a summary of these fragments has to say.
+
+        written: the object of each reference, in order. until: when it was told.
+        """
         made = []
         for (block, reference), thing in written.items():
             if by := self.by(block, reference):
@@ -126,7 +129,7 @@ class Reader:
             for block in blocks
             if (block, "turn-gaze", "stroke") in self.points
         ]
-        said = "".join(word for block, _, word in self.words if block in blocks)
+        said = "".join(word for block, _, word, at in self.words if block in blocks and at <= until)
         return {
             "said": letters(said), "references": made,
             "eye_contact": next((each for each in reversed(contact) if each is not None), None),
@@ -246,6 +249,7 @@ async def one_turn(
                     result = await perform_call(robot, call)
                     blocks = [each for each in reader.ends if each not in before and "-@" in each]
                     written = {(block, name): thing for block in blocks for name, thing in named.items()}
+            until = robot.now()
         finally:
             happening.cancel()
             await asyncio.gather(happening, return_exceptions=True)
@@ -253,7 +257,7 @@ async def one_turn(
         with suppress(EngageError):
             await robot.switch_faults(timeout=2.0)
         await asyncio.sleep(3.0)
-    return compared(id, result, blocks, reader, written, since)
+    return compared(id, result, blocks, reader, written, since, until)
 
 
 async def pieces(text: str) -> Any:
@@ -306,9 +310,15 @@ async def revive(lives: dict[str, AsyncExitStack], hub: MemoryHub, config: Any) 
 
 
 def compared(
-    id: str, result: Summary, blocks: list[str], reader: Reader, written: dict[tuple[str, str], str], since: float
+    id: str,
+    result: Summary,
+    blocks: list[str],
+    reader: Reader,
+    written: dict[tuple[str, str], str],
+    since: float,
+    until: float,
 ) -> list[str]:
-    told, judged = told_by(result), reader.judged(blocks, written)
+    told, judged = told_by(result), reader.judged(blocks, written, until)
     found = []
     allowed = reader.status(blocks, since)
     if result.status not in allowed:

@@ -182,9 +182,12 @@ def test_the_reader_finds_what_is_told_wrongly() -> None:
     def told(object: str = "cup", by: str = "a look", said: str = "this", status: Any = "done") -> list[str]:
         references = (Referred(object=object, phrase="this", by=by),)
         result = Summary(status=status, said=said, references=references)
-        return deeds.compared("t", result, ["f"], reader, {("f", "r"): object}, 0.0)
+        return deeds.compared("t", result, ["f"], reader, {("f", "r"): object}, 0.0, 2.0)
 
     assert told() == []
     assert [len(told(by="pointing")), len(told(said="this one")), len(told(status="failed"))] == [1, 1, 1]
     assert told(object="hat") == ["t: r: a look, but 32 degrees off hat"]
-    assert len(deeds.compared("t", Summary(status="done", said="this"), ["f"], reader, {("f", "r"): "cup"}, 0.0)) == 1
+    assert (
+        len(deeds.compared("t", Summary(status="done", said="this"), ["f"], reader, {("f", "r"): "cup"}, 0.0, 2.0))
+        == 1
+    )

@@ -1,6 +1,13 @@
 """Who has the floor when both speak, or when a sign is small: no answer is lost, and no uh-huh is an answer."""
 
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from tests.recognition.event_stories import check
+from tests.recognition.observations import HUMAN, ROBOT, Log
 from tests.stories import Story, each
 
 STORIES = """
@@ -57,13 +64,12 @@ after other words of the robot nothing answers the turn before
     robot's ap-1: started 1, failed 3.5 after 2.5
     human's ap-2: started 6
 
-ten seconds after the turn a person begins a turn of their own
-    1 asked; 12.1 human +speak
-    robot's ap-1: started 1, failed 3.5 after 2.5
-    human's ap-2: started 12.1
+an answer may come a minute late
+    1 asked; 62.9 human +speak; 64 human -speak
+    robot's ap-1: started 1, failed 3.5 after 2.5, failed 62.9 after 60.9
 
 who leaves and comes back begins anew
-    1 asked; 4 lost human; 5 time; 6 found human; 6.5 human +speak
+    1 asked; 4 lost human; 6 time; 6.1 found human; 6.5 human +speak
     robot's ap-1: started 1, failed 3.5 after 2.5
     human's ap-2: started 6.5
 
@@ -83,3 +89,38 @@ def test_a_late_answer(story: Story) -> None:
 @each(STORIES)
 def test_a_sign(story: Story) -> None:
     check(story)
+
+
+@given(
+    spoken=st.integers(2, 60), offset=st.integers(-59, 39), answered=st.integers(2, 60), announced=st.booleans(),
+)  # fmt: skip
+def test_the_delay_of_a_robots_answer_is_its_start_less_the_end_of_what_it_answers(
+    spoken: int, offset: int, answered: int, *, announced: bool
+) -> None:
+    """Tenths of a second. offset: of the robot's start from the person's end; negative: it cuts in."""
+    offset = max(offset, 1 - spoken)
+    answered = answered if announced else max(answered, 9)  # else it is a backchannel, which answers nobody
+    end = (10 + spoken) / 10
+    start, stop = end + offset / 10, end + (offset + answered) / 10
+    log = Log(adjacency_pair_limit=4.0)
+    steps: list[tuple[float, int, Callable[[], object]]] = [
+        (1.0, 0, lambda: log.begins(HUMAN, "speak", 1.0)),
+        (end, 2, lambda: log.ends(HUMAN, "speak", end)),
+        (start, 1, lambda: log.begins(ROBOT, "speak", start, behavior="block-1:s")),
+        (stop, 3, lambda: log.ends(ROBOT, "speak", stop, behavior="block-1:s")),
+    ]
+    if announced:
+        steps.append((start, 0, lambda: log.requests_event("adjacency_pair", start, turn="turn-1")))
+        steps.append((stop, 4, lambda: log.signals("ended", stop)))
+    for _, _, step in sorted(steps, key=lambda each: each[:2]):
+        step()
+    log.until(100.0)
+
+    pairs = {each.id: each for each in log.events if each.kind == "adjacency_pair"}
+    persons = [id for id, each in pairs.items() if each.initiator == HUMAN]
+    assert len(persons) == 1
+    told = log.succeeded(persons[0])
+    assert told.delay == pytest.approx(start - end)
+    assert told.at.seconds == pytest.approx(max(start, end))
+    assert log.states(persons[0]) == ["started", "succeeded", "completed"]
+    assert len(pairs) == 1 + announced

@@ -1,6 +1,7 @@
 """Laws of ends: aborted, dropped, or called home, a body brakes within its limits and comes to its safe pose."""
 
 import asyncio
+import math
 from random import Random
 
 from msgspec.structs import replace
@@ -12,7 +13,7 @@ from engage_hri.services.control.body import AbortMode, Body, Spoke
 from engage_hri.services.control.testing.cases import Connection, still_running
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
 from engage_hri.services.control.testing.laws import broken, degrees, listed, ms
-from engage_hri.services.control.testing.motions import Recording, recorded, violations
+from engage_hri.services.control.testing.motions import Recording, Violation, recorded, violations
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
 from engage_hri.services.control.testing.suite import Suite, does_not_apply, trials
 
@@ -243,6 +244,7 @@ class EndingLaws(Suite):
                 behavior,
                 expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{unit}",
                 measured=f"{degrees(each.measured)}{unit}, {ms(when)} after it was asked for",
+                advice=_encoders(each) if each.what != "range" else "",
             )
 
     async def test_leaves_no_task_once_it_is_disconnected(self) -> None:
@@ -305,6 +307,12 @@ class EndingLaws(Suite):
             )
         if saying := body.state().speaking:
             broken(speech, expected="silence once it has ended", measured=f"`speaking` is {saying!r}")
+
+
+def _encoders(violation: Violation) -> str:
+    """Advice for encoders that count in steps: they look like motion that comes in jerks."""
+    noise = math.ceil(math.degrees(violation.explained) * 100.0) / 100.0
+    return f"if its encoders count in steps or are noisy, `--noise {noise:g}` explains this" if noise < 1.0 else ""
 
 
 def _timers() -> set[asyncio.TimerHandle]:
