@@ -1,18 +1,19 @@
 """Agreement of a plan with what the body says about it: each answer may make another plan, with another answer.
 
-A plan is made with what the body promises of each phase: its natural time, and how short and how long it can be. What
-a phase takes in truth depends on how the behavior comes to it, so on the plan. The body rehearses each plan, and its
-answer is what the next plan is made with. Two things can happen.
+A plan is made with what the body promises of each phase: its natural time, and how short and how long it can be.
+What a phase takes in truth depends on how the behavior comes to it, so on the plan. The body rehearses each plan, and
+its answer is what the next plan is made with. Two things can happen.
 
 - They agree: the answer is what the plan was made with. The body can keep this plan.
 - They never agree: each answer makes the plan that calls for the other. Then what each plan comes to is computed from
   the answer to it (`as_told`), and with it what that plan would miss.
 
-The search goes from later to faster, from there to told late, and from there to dropped. The net lets behaviors wait and
-dawdle before any hurries (`predict`). If the best plan misses what the block says, the block is planned in the next
-manner (`manner.py`): times may be missed by as little as can be, then behaviors also stand before they hurry. Of all
-plans in all manners the one is taken that misses least, where the doubt that is left counts as missed. It is told LATE
-before anything moves. A behavior is dropped only if the first promise left no time for it, or if there is no such plan.
+The search goes from later to faster, from there to told late, and from there to dropped. The net lets behaviors wait
+and dawdle before any hurries (`predict`). If the best plan misses what the block says, the block is planned in the
+next manner (`manner.py`): times may be missed by as little as can be, then behaviors also stand before they hurry. Of
+all plans in all manners the one is taken that misses least, where the doubt that is left counts as missed. It is told
+LATE before anything moves. A behavior is dropped only if the first promise left no time for it, or if there is no
+such plan.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
