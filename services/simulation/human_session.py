@@ -39,6 +39,8 @@ LEAD: Seconds = 0.5
 """Time for which the explainer has been speaking when a backchannel comes."""
 THIRD_TURN: Seconds = 1.6
 """Time after the answer until the asker's next words can no longer be the third turn of that pair (1.5 s)."""
+GOES_ON: tuple[Seconds, Seconds] = (0.02, 0.08)
+"""Beginning and end of the explainer's "well" after a pair failed: what the listener says then is no late answer."""
 BETWEEN: Seconds = 0.6
 """Least time from the end of an event to the start of the next; longer than `LEAD`."""
 
@@ -209,6 +211,7 @@ class _PlannedObservations:
                 turn_ends,
             )
         if not event.succeeds:
+            yield from self._does(EXPLAINER, "speak", *(event.decided + each for each in GOES_ON))
             return
         responder = self._other(event.initiator)
         if event.task_until is not None:

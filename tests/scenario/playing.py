@@ -28,6 +28,8 @@ from tests.bus.faulty import Faults, FaultyHub
 
 LIMIT = 900.0
 """Seconds of virtual time: nothing in the scenario takes so long."""
+LAST_ANSWER = 5.0
+"""Seconds after the goodbye in which the last events end: an answer may come for 4 s, who has left is gone in 2."""
 
 
 class Record:
@@ -98,6 +100,7 @@ async def play(
             async with running(hub, services):
                 async with asyncio.timeout(LIMIT):
                     await finished.wait()
+                await asyncio.sleep(LAST_ANSWER)
             while len(inbox) and (it := await inbox.next()):
                 received.append(it)
     return Record(received)

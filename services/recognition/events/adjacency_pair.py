@@ -12,10 +12,6 @@ from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Ma
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
 
-LATEST_ANSWER: Seconds = 10.0
-"""Time from the end of the robot's turn after which what a person does is no late answer, but a turn of its own.
-People who answered a product robot after its limit did so within 6 s, but for one of 70."""
-
 TABLE = table(
     Row(IDLE, "robot_asks", ROBOT_WAITING, ("started",)),
     Row(IDLE, "human_asks", HUMAN_WAITING, ("started",)),
@@ -202,8 +198,6 @@ class AdjacencyPair(Machine):
         """
         event = self._unanswered
         if event is None or self._turn_end is None or action not in event.accept:
-            return False
-        if not in_time(at, self._turn_end + LATEST_ANSWER):
             return False
         self.forget_unanswered()
         event.rests_on(confidence)

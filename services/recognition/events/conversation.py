@@ -243,6 +243,7 @@ class Conversation:
         if repairs:
             self.pair.repaired(at)
         self.pair.robot_begins("speak", at)
+        self.pair.forget_unanswered()
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         """End the pair of a robot's turn that was cut off.
