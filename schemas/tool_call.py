@@ -103,7 +103,7 @@ def _behavior(part: Part, number: int) -> tuple[FragmentBehavior, str]:
     """Behavior of a part, and its sync point at which the next behavior may start; empty: at once."""
     match part:
         case Say(say=text):
-            return Speech(id=f"say-{number}", text=" ".join(text.split())), "end"
+            return Speech(id=f"say-{number}", text=_in_lines(text)), "end"
         case Refer(refer=target, phrases=phrases, certainty=certainty):
             reference = Reference(
                 id=f"refer-{number}",
@@ -155,3 +155,8 @@ def _allowed(field: str, kind: type[Any]) -> str:
 
 def _place(source: str, path: str) -> str:
     return f"{source}: {path}" if source else path
+
+
+def _in_lines(text: str) -> str:
+    """The text with single blanks. Its lines stay: they tell what is an item, a quotation or a row of a table."""
+    return "\n".join(" ".join(line.split()) for line in text.strip().splitlines())

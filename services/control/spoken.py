@@ -61,8 +61,11 @@ def _markup(speech: Speech, ear: Heard) -> str:
     if not speech.markup or "".join("".join(map(str, root.itertext())).split()) != "".join(speech.text.split()):
         return speech.markup
     said: dict[int, str] = {}
+    last = 0
     for letter, place in zip(ear.text, ear.places, strict=True):
-        said[place] = said.get(place, "") + letter
+        # A pause where a line ends has the place of the line break. It belongs to the letter before.
+        last = place if letter.isspace() or not speech.text[place].isspace() else last
+        said[last] = said.get(last, "") + letter
     places = iter([place for place, letter in enumerate(speech.text) if not letter.isspace()])
 
     def words(text: str | None) -> str:

@@ -8,7 +8,8 @@ import re
 
 BY_LANGUAGE = {
     "en": "uh-huh, mhm, mm-hmm, mm, hm, huh, uh, um, ah, oh, aha, yes, yeah, yep, yup, ok, okay, right, all right, "
-    "alright, sure, of course, exactly, true, good, fine, great, nice, wow, really, i see, got it, i know, indeed",
+    "alright, sure, of course, exactly, true, good, fine, great, nice, wow, really, i see, got it, i know, indeed, "
+    "interesting, cool, haha, ha, lol",
     "de": "ja, jaja, jo, genau, okay, aha, ach, ach so, achso, mhm, hm, stimmt, gut, klar, na klar, verstehe, "
     "ich verstehe, richtig, sicher, natürlich, schön, echt, eben, alles klar",
     "fr": "oui, ouais, d'accord, ah, ah bon, bon, bien, hum, exact, exactement, voilà, je vois, bien sûr, c'est ça",
@@ -16,6 +17,7 @@ BY_LANGUAGE = {
     "it": "sì, certo, va bene, ho capito, capisco, esatto, già, bene, bello, d'accordo",
     "pt": "sim, certo, pois, pois é, claro, tá, tá bom, bem, entendi, exato",
     "nl": "ja, oké, precies, klopt, juist, goed, inderdaad, ik snap het, natuurlijk, tuurlijk",
+    "ru": "да, ага, угу, хорошо, понятно, ясно, точно, конечно, верно, ладно",
     "ja": "うん, はい, ええ, そう, そうですね, そうですか, へえ, なるほど, ほう",
     "zh": "嗯, 对, 好, 是, 哦, 好的, 是的, 对对, 啊",
 }  # fmt: skip

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from engage_hri import embedded
 from engage_hri.schemas.behaviors import BlockBehavior, Mark, Speech
 from engage_hri.schemas.body import BodyPose, Estimate, WordTime
-from engage_hri.schemas.documents.prosody import spans
+from engage_hri.schemas.documents.prosody import marked_up, spans, unread
 from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority, Progress, Spoke
 from engage_hri.services.control.spoken import estimate_of, progress_of, spoken
@@ -43,6 +43,18 @@ def test_markup_stays_around_its_words() -> None:
 
     assert found.text == "One two three & four five"
     assert (found.text[span.start : span.end], span.rate) == ("three & four", 0.75)
+
+
+@given(
+    st.lists(st.sampled_from(["word", "**two**", "- item", "# Head", "| a | b |", "\n", "\n\n", " ", "x < y", "&"]))
+)
+def test_the_last_words_that_generation_marks_keep_their_markup(parts: list[str]) -> None:
+    """Generation asks for a low voice at the end of a turn."""
+    text = " ".join((*parts, "end"))
+    start = text.rfind(" ") + 1
+    found = given_to(text, markup=marked_up(text, (), start, len(text), pitch="low"))
+
+    assert unread(found) == ()
 
 
 def test_places_are_told_as_the_author_wrote() -> None:

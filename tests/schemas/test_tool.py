@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.check import problems
 from engage_hri.schemas.documents.json_codec import decode_json, encode_json, read
 from engage_hri.schemas.export import EXPORTED
@@ -257,3 +258,9 @@ def test_calls_in_an_array_are_numbered() -> None:
     things = read(json.dumps([CALL, CALL]).encode(), "talk.json", "talk")
 
     assert [thing.id for thing in things] == ["talk-1", "talk-2"]
+
+
+def test_the_lines_of_what_is_said_stay_and_blanks_are_single() -> None:
+    (speech,) = decoded({"turn_status": "full", "parts": [{"say": " - one  item\n\n-  two "}]}).behaviors
+
+    assert speech == Speech(id="say-1", text="- one item\n\n- two")
