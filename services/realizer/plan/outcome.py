@@ -29,7 +29,7 @@ def as_told(plan: Plan, told: Sequence[Estimate]) -> Plan:
 
 
 def _times(plan: Plan, told: Mapping[tuple[str, str], Phase]) -> dict[Point, Seconds]:
-    """When points come. told: phases, by behavior and sync point.
+    """Time at which each point comes. told: phases, by behavior and sync point.
 
     A behavior hurries and dawdles where it is planned to, as far as the body can, and waits at its hold points. No
     instant is earlier than planned; what passes of itself may be.
