@@ -54,11 +54,11 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > recording > requests > runtime > bus > tangram text",
-    "services/text": "ear > marks > brackets > pieces > acts patterns ends listening > abbreviations",
+    "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
     "services/bus": "memory zenoh > interface > payloads subscription > samples > answering config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"
-    " > actions blame estimates refusals switching told unheard waiting > live warned > body"
+    " > actions blame estimates refusals spoken switching told unheard waiting > live warned > body"
     " > calibration > extras fitting > variability > config",
     "services/generation": "service > fragment_runner > reconsideration > performance > body_link choosing_again"
     " fragment_check > acts lost pipeline > block head > references turns > permits > config",

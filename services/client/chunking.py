@@ -160,6 +160,18 @@ class Chunker:
         return taken
 
 
+def parts_of(text: str, ids: Ids) -> tuple[Chunk, tuple[str, ...]]:
+    """Read a text that is known as a whole. Returns its parts, and what of it was left out, in words."""
+    chunker = Chunker()
+    parts: list[Part] = []
+    for part in (*(each for chunk in chunker.feed(text, ids) for each in chunk), *chunker.rest(ids)):
+        if isinstance(part, Say) and parts and isinstance(parts[-1], Say):
+            parts[-1] = Say(say=joined((parts[-1].say, part.say)))
+        else:
+            parts.append(part)
+    return tuple(parts), chunker.left_out
+
+
 def _plain(text: str) -> str:
     """The text without backslashes, unless they are needed: whoever says it reads it as any other text."""
     if "\\" not in text:

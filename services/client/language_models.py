@@ -125,9 +125,11 @@ async def _read(robot: Robot, pieces: AsyncIterable[Piece], chunker: Chunker, sp
                 ids = await objects.ids(is_needed=isinstance(piece, str) and "[" in piece)
                 for chunk in chunker.feed(piece, ids):
                     speaking.go_on(chunk)
-            speaking.finish(chunker.rest(await objects.ids(is_needed=False)))
-        finally:
+            chunk = chunker.rest(await objects.ids(is_needed=False))
             speaking.left_out = chunker.left_out
+            speaking.finish(chunk)
+        finally:
+            speaking.left_out += chunker.left_out
 
 
 class _Objects:
@@ -185,8 +187,8 @@ class _Speaking:
         self._send(chunk, "middle" if self._performing else "beginning")
 
     def finish(self, chunk: Chunk) -> None:
-        """Send the last chunk, with which the turn ends. Without any chunk there is no turn."""
-        if self._performing or chunk:
+        """Send the last chunk, with which the turn ends. Where nobody has written anything there is no turn."""
+        if self._performing or chunk or self.left_out:
             self._send(chunk, "end" if self._performing else "full")
 
     async def leave_no_turn_open(self) -> None:

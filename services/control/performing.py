@@ -9,6 +9,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.body import Body, DriverBroken, Progress
 from engage_hri.services.control.live import LiveBehavior
+from engage_hri.services.control.spoken import progress_of, spoken
 from engage_hri.services.control.told import Told
 from engage_hri.services.runtime.alarm import Timer
 
@@ -29,7 +30,8 @@ class Performing:
         self.is_broken_off = False
         self._live, self._body, self._give_up = live, body, give_up
         self._loop = asyncio.get_running_loop()
-        self._told = Told(live.request.behavior, live.authority, self._loop.time())
+        self._behavior = spoken(live.request.behavior)
+        self._told = Told(self._behavior, live.authority, self._loop.time())
         self._task: asyncio.Task[object] | None = None
         self._overdue = Timer(self._break_off)
         self._is_over = False
@@ -38,13 +40,13 @@ class Performing:
     async def progress(self) -> AsyncGenerator[Progress, None]:
         """Tell what the body tells. Raises what it raises, and DriverBroken: what it tells cannot be."""
         self._task = asyncio.current_task()
-        async with aclosing(self._body.perform(self._live.request.behavior, self._live.authority)) as stream:
+        async with aclosing(self._body.perform(self._behavior, self._live.authority)) as stream:
             async for progress in stream:
                 if self._is_over:
                     return
                 if flaw := self._told.flaw(progress, self._loop.time()):
                     raise DriverBroken(self._fault(f"tells {flaw}"))
-                yield progress
+                yield progress_of(self._live.request.behavior, progress)
         if not self._is_over and (flaw := self._told.missing()):
             raise DriverBroken(self._fault(f"tells {flaw}"))
 

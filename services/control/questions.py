@@ -17,6 +17,7 @@ from engage_hri.services.control.calibration import Calibration
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.estimates import IncomingEstimates
 from engage_hri.services.control.refusals import refusal
+from engage_hri.services.control.spoken import estimate_of, spoken, spoken_items
 from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.runtime.unhurried import InTurns
 
@@ -36,7 +37,7 @@ class Questions:
         """Answer `EstimateBehaviors`; what its behaviors need is prepared before. Raises InputRefused."""
         if not isinstance(question, EstimateBehaviors):
             raise InputRefused(Fault(reason="expected EstimateBehaviors", where=keys.ESTIMATE, service="control"))
-        preparing = self._body.prepare([item.behavior for item in question.items])
+        preparing = self._body.prepare([spoken(item.behavior) for item in question.items])
         if preparing is not None:
             return self._prepared(preparing, question)
         return self._rehearsals.answer(self._estimated(question, self._world()))
@@ -50,8 +51,9 @@ class Questions:
         refused = [self.refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
         others = [item for item in question.others if self.refused(item.behavior) is None]
-        told = yield from self._body.rehearse_in_steps(known, world, others)
-        estimates = map(self._calibration.stated, self._estimates.take(known, told))
+        told = yield from self._body.rehearse_in_steps(spoken_items(known), world, spoken_items(others))
+        taken = zip(known, self._estimates.take(known, told), strict=True)
+        estimates = iter([self._calibration.stated(estimate_of(item.behavior, each)) for item, each in taken])
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
 
     def refused(self, behavior: BlockBehavior) -> Estimate | None:

@@ -92,7 +92,7 @@ class FragmentRunner:
 
     def admit(self, request: PerformFragment, world: World) -> None:
         """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
-        fragment, lost = bearable(request.fragment, world)
+        fragment, lost = bearable(request.fragment, world, self._bus.robot)
         fragment = checked(fragment, world, self._bus.robot)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
@@ -269,7 +269,7 @@ class FragmentRunner:
                     return None
                 assert self._world is not None
                 world = remembered(self._world, performance.known)
-                fragment, lost = bearable(fragment, world)
+                fragment, lost = bearable(fragment, world, self._bus.robot)
                 performance.warn(lost)
                 check_world(fragment, world, self._bus.robot)  # it may have changed while the fragment waited
                 bars = barred(targets(fragment), self._world, performance.known, performance.barred)

@@ -4,9 +4,7 @@ from bisect import bisect_left
 from functools import lru_cache
 
 from msgspec import Struct
-from msgspec.structs import replace
 
-from engage_hri.schemas.documents.prosody import Prosody
 from engage_hri.services.text.marks import NO_IDS, Reader
 from engage_hri.services.text.patterns import is_silent
 from engage_hri.services.text.pieces import problems
@@ -15,27 +13,30 @@ from engage_hri.services.text.pieces import problems
 class Heard(Struct, frozen=True):
     """A text for the ear. places: for each character the number of characters of the author's text before it.
 
-    problems: what was left out, in words.
+    length: characters of the author's text. problems: what was left out, in words.
     """
 
     text: str
     places: tuple[int, ...]
+    length: int
     problems: tuple[str, ...] = ()
 
     def place(self, written: int) -> int:
         """Convert a place in the author's text to the one in this text."""
         return bisect_left(self.places, written)
 
-    def span(self, span: Prosody) -> Prosody:
-        """Convert a span of the author's text to one of this text."""
-        return replace(span, start=self.place(span.start), end=self.place(span.end))
+    def written(self, place: int) -> int:
+        """Convert a place in this text to the one in the author's; with the last word all of it is over."""
+        if not any(map(str.isalnum, self.text[place:])):
+            return self.length
+        return self.places[place - 1] + 1 if place > 0 else 0
 
 
 @lru_cache(256)
 def heard(text: str) -> Heard:
     """Read a text for the ear: without what is for the eye. A bracket in it is words, whatever objects there are."""
     if text.isascii() and text.replace(" ", "").replace(",", "").isalpha():
-        return Heard(text, tuple(range(len(text))))
+        return Heard(text, tuple(range(len(text))), len(text))
     reader = Reader()
     pieces = [*reader.feed(text), *reader.finish(NO_IDS)]
     said: list[str] = []
@@ -55,7 +56,7 @@ def heard(text: str) -> Heard:
             last = len(said) - len(each.text) + len(text_of)
     # A bracket is words here for everybody: a fragment refers to objects by elements of their own.
     told = [each for each in pieces if each.reason != "bracket"]
-    return Heard("".join(said), tuple(places), problems(told))
+    return Heard("".join(said), tuple(places), len(text), problems(told))
 
 
 def said(text: str, written: int) -> str:

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 from engage_hri.schemas.speakable import UNSPACED
 from engage_hri.services.text.abbreviations import BEFORE_A_NUMBER, BEFORE_A_WORD, BEFORE_EITHER, ORDINAL_AFTER
 
-CLOSING = "\"'”’»)\\]"
+CLOSING = "\"'”’“‘»)\\]"
 _CLOSING_WIDE = f"{CLOSING}」』）】》〉］｝〕"
 _STOPS_WIDE = "。！？｡။។"
 _STOPS = ".!?…।؟۔։።፧"

@@ -1,107 +1,69 @@
-"""Patterns of marks: those of CommonMark and HTML that the reader of `marks.py` looks for."""
+"""Patterns of marks: those of CommonMark, GitHub and HTML that the reader of `marks.py` looks for.
 
-import re
+Each is to end with something that shows its end, so that a text which still comes may match in part.
+"""
+
 import unicodedata
 
-LOOK = 1000
-"""Characters that a mark may have from its start to its end: a text is not held back for longer."""
-BRACKET = 80
-"""Characters of what stands in brackets, if it is more than the words of a link."""
+from engage_hri.schemas.speakable import UNSPACED
+from engage_hri.services.text.acts import IN_ASTERISKS, IN_BRACKETS, IN_PARENTHESES
+
 THOUGHTS = frozenset({"think", "thinking", "thought", "thoughts", "reasoning", "reflection", "scratchpad"})
 """Elements in which models think, so that what is in them is not meant for the person."""
 UNSAID = THOUGHTS | {"script", "style", "template", "svg", "math"}
-BLOCKS = frozenset(
-    [
-        "address",
-        "article",
-        "aside",
-        "blockquote",
-        "body",
-        "br",
-        "dd",
-        "details",
-        "div",
-        "dl",
-        "dt",
-        "figure",
-        "figcaption",
-        "footer",
-        "form",
-        "h1",
-        "h2",
-        "h3",
-        "h4",
-        "h5",
-        "h6",
-        "head",
-        "header",
-        "hr",
-        "html",
-        "li",
-        "main",
-        "nav",
-        "ol",
-        "p",
-        "pre",
-        "section",
-        "summary",
-        "table",
-        "tbody",
-        "td",
-        "tfoot",
-        "th",
-        "thead",
-        "tr",
-        "ul",
-        "s",
-        "speak",
-        "break",
-        "paragraph",
-        "sentence",
-        "title",
-    ]
-) - {"s"}
+_BLOCKS = """
+address article aside blockquote body br dd details div dl dt figure figcaption footer form h1 h2 h3 h4 h5 h6 head
+header hr html li main nav ol p pre section summary table tbody td tfoot th thead tr ul speak break paragraph
+sentence title
+"""
+BLOCKS = frozenset(_BLOCKS.split())
 """Elements that separate the words before and after them."""
 
-_ATTRIBUTE = r"\s+[A-Za-z_:][\w.:-]*(?:\s*=\s*(?:\"[^\"]*\"|'[^']*'|[^\s\"'=<>`]+))?"
-TAG = re.compile(rf"<(?:(?P<name>[A-Za-z][\w:-]*)(?:{_ATTRIBUTE})*\s*/?|/(?P<closed>[A-Za-z][\w:-]*)\s*)>")
-_VALUE_BEGUN = r"(?:\s*=\s*(?:\"[^\"]*|'[^']*|[^\s\"'=<>`]*)?)?"
-TAG_BEGUN = re.compile(
-    rf"<(?:/?(?:[A-Za-z][\w:-]*)?|[A-Za-z][\w:-]*(?:{_ATTRIBUTE})*(?:\s*/?|\s+[A-Za-z_:][\w.:-]*{_VALUE_BEGUN}|/\s*)"
-    r"|/[A-Za-z][\w:-]*\s*)\Z"
+_LETTER = r"[^\W_]"
+_ATTRIBUTE = r"\s+[A-Za-z_:][\w:-]*(?:\s*=\s*(?:\"[^\"]*\"|'[^']*'|[^\s\"'=<>`]+))?"
+TAG = rf"</?(?P<name>[A-Za-z][\w:-]*)(?:{_ATTRIBUTE})*\s*/?>"
+COMMENT = r"<(?:!--[\s\S]*?--|!\[CDATA\[[\s\S]*?\]\]|\?[\s\S]*?\?|![A-Za-z][^>]*)>"
+AUTOLINK = r"<(?P<address>[A-Za-z][A-Za-z0-9+.-]{1,31}:[^\s<>]*|[\w.+-]+@[\w-]+(?:\.[\w-]+)+)>"
+_NO_ADDRESS, _STOPS = r"\s<>\[\]*`|{}\"", ".,;:!?'_~&"
+ADDRESS = (
+    rf"(?i)(?<![\w@.])(?P<address>(?:(?:https?|ftps?|file|mailto|tel):(?://)?|(?=www\.))"
+    rf"(?:[^{_NO_ADDRESS}()]|\([^{_NO_ADDRESS}()]*\))+(?<![{_STOPS}]))(?=[{_STOPS}]*[{_NO_ADDRESS}()])"
 )
-SENTENCE_IN_TAG = re.compile(r"[^\"']*[.!?]\s")
-AUTOLINK = re.compile(r"<(?P<address>[A-Za-z][A-Za-z0-9+.-]{1,31}:[^\s<>]*|[\w.+-]+@[\w-]+(?:\.[\w-]+)+)>")
-AUTOLINK_BEGUN = re.compile(r"<[A-Za-z][A-Za-z0-9+.-]*(?::[^\s<>]*|@?[\w.-]*)\Z")
-ADDRESS = re.compile(r"(?:(?:https?|ftps?|file|mailto|tel):(?://)?|(?=www\.))[^\s<>\[\]*`|{}\"]+", re.IGNORECASE)
-SCHEMES = ("https:/", "http:/", "ftps:/", "ftp:/", "file:/", "mailto:", "tel:", "www.")
-"""Beginnings of an address. One letter may follow before it is known where it ends."""
-HOST = re.compile(r"(?:[a-z]+:/*)?(?:[^/@\s]*@)?(?:www\.)?(?P<host>[^/?#:\s]*)", re.IGNORECASE)
-ENTITY = re.compile(r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#[0-9]{1,7}|#[xX][0-9A-Fa-f]{1,6});")
-ENTITY_BEGUN = re.compile(r"&(?:[A-Za-z][A-Za-z0-9]{0,31}|#[0-9]{0,7}|#[xX][0-9A-Fa-f]{0,6})?\Z")
-_TITLE = r"\"[^\"]*\"|'[^']*'|\([^()]*\)"
-_DESTINATION = r"<[^<>\n]*>|(?!<)(?:[^\s()]|\([^\s()]*\))*"
-LINK = re.compile(rf"\(\s*(?P<to>{_DESTINATION})(?:\s+(?:{_TITLE}))?\s*\)")
-LINK_BEGUN = re.compile(
-    r"\(\s*(?:<[^<>\n]*|(?:<[^<>\n]*>|(?!<)(?:[^\s()]|\([^\s()]*\))*)(?:\([^\s()]*|\s*|\s+(?:\"[^\"]*|'[^']*|\([^()]*)"
-    r"|\s+(?:\"[^\"]*\"|'[^']*'|\([^()]*\))\s*))\Z"
+HOST = r"(?i)(?:[a-z]+:/*)?(?:[^/@\s]*@)?(?:www\.)?(?P<host>[^/?#:\s]*)"
+ENTITY = r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#[0-9]{1,7}|#[xX][0-9A-Fa-f]{1,6});"
+_TITLE = r"(?:\"[^\"]*\"|'[^']*'|\([^()]*\))"
+_LINK = rf"\(\s*(?:<[^<>\n]*>|(?!<)(?:[^\s()]|\([^\s()]*\))*)(?:\s+{_TITLE})?\s*\)"
+LINK = rf"\]{_LINK}"
+LABEL = r"\]\[[^\[\]\n]{0,80}\]"
+_LABEL = r"\[(?P<label>[^\[\]\n^][^\[\]\n]{0,79})\]"
+DEFINITION = rf"(?<=\n){_LABEL}:[ \t]*(?:<[^<>\n]*>|[^\s<]\S*)(?:[ \t]+{_TITLE})?[ \t]*(?=\n)"
+INDEX = rf"(?<=(?![{UNSPACED}])\w)"
+"""Behind a name, where a bracket is an index: `array[0]`."""
+_NO_INDEX = rf"(?!{INDEX})"
+TASK = r"\[[xX ]\](?=\s)"
+_FOOTNOTE = r"\[\^[^\s\[\]]+\]"
+FOOTNOTE = rf"(?<=\n){_FOOTNOTE}:|{_FOOTNOTE}(?=[^:])|(?<!\n){_FOOTNOTE}"
+CITATION = rf"{_NO_INDEX}(?P<told>\[\d{{1,4}}(?:\s*[,;–-]\s*\d{{1,4}})*\])(?:{_LINK}|(?=[^(:\d]|:\s)|(?=\([^)\n]*\)))"
+IMAGE = rf"(?<!{_LETTER})!(?=\[)"
+SOURCE = r"【\d+(?::\d+)?†[^】\n]{0,80}】"
+IN_SQUARE = rf"(?i){_NO_INDEX}\[{IN_BRACKETS}\](?=[^(])"
+IN_ROUND = rf"(?i)(?<!{_LETTER})\({IN_PARENTHESES}\)"
+IN_STARS = rf"(?i)(?<!{_LETTER})(?P<mark>[*_]){IN_ASTERISKS}(?P=mark)(?=[.,!…]|\s+(?-i:[^\s\p{{Ll}}])|\s*\n)"
+SIGN = (
+    rf"(?<=\s)\*{{1,2}}(?=\s)|(?<={_LETTER})_+(?={_LETTER})|(?<=\))\*{{1,2}}(?=\()|(?<=\d)\*{{1,2}}(?={_LETTER})"
+    rf"|(?<={_LETTER})\*{{1,2}}(?=\d)|(?<=[\W_]{_LETTER})\*{{1,2}}(?={_LETTER})"
 )
-DEFINITION = re.compile(rf":[ \t]*(?:<[^<>\n]*>|[^\s<]\S*)(?:[ \t]+(?:{_TITLE}))?[ \t]*(?=\n|\Z)")
-INSIDE = re.compile(r"\[(?P<inside>[^\[\]\n]{0,80})\]")
-CITATION = re.compile(r"\d{1,4}(?:\s*[,;–-]\s*\d{1,4})*\Z")
-FOOTNOTE = re.compile(r"\^[^\s\[\]]+\Z")
-SOURCE = re.compile(r"【\d+(?::\d+)?†[^】\n]{0,80}】")
-SOURCE_BEGUN = re.compile(r"【(?:\d+(?::\d*)?(?:†[^】\n]{0,80})?)?\Z")
-FENCE = re.compile(r"(?P<fence>`{3,}(?=[^`\n]*(?:\n|\Z))|~{3,})[^\n]*")
-RULE = re.compile(
-    r"(?:[ \t]*(?:(?:-[ \t]*)+|(?:_[ \t]*){3,}|(?:\*[ \t]*){3,}|=+[ \t]*)|[-:| \t]*\|[-:| \t]*)(?=\n|\Z)"
-)
+"""Asterisks and underscores that are signs: between operands, and within names."""
+CODE = r"(?P<run>`+)(?!`)(?P<code>(?:[^`\n]+|\n(?![ \t]*\n)|(?!(?P=run)(?!`))`+)*+)(?P=run)(?=[^`])"
+FENCE = r"(?P<fence>`{3,}(?=[^`\n]*\n)|~{3,})[^\n]*\n"
+RULE = r"[-_*=:|][-_*=:| \t]*(?=\n)"
 """A line without words: under a heading, between paragraphs, or between rows of a table."""
-ITEM = re.compile(r"(?:[-+*](?=\s)|(?P<number>\d{1,9})[.)](?=\s))")
-HEADING = re.compile(r"#{1,6}(?=[ \t\n]|\Z)")
-HEADING_ENDS = re.compile(r"[ \t]+#+[ \t]*(?=\n|\Z)")
-PLAIN = re.compile(r"[^\W_ℹ]+(?<![hwfmtHWFMT])|[^\W_ℹ]|[,;:'.?\"/%$+)}={-]+")
-PUNCTUATION = frozenset("!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~")
+HEADING = r"#{1,6}(?=[ \t\n])"
+HEADING_ENDS = r"(?<=[ \t])#+[ \t]*(?=\n)"
+BULLET = r"[-+*](?=\s)"
+NUMBER = r"(?P<number>\d{1,9})[.)](?=\s)"
+PLAIN = r"[^\W_ℹ\ufe0f\u20e3]+|[,;:'.?\"/%$+)}={-]+"
+PUNCTUATION = r"[!-/:-@\[-`{-~]"
 
 _SILENT = frozenset(("So", "Sk", "Cf", "Cs", "Co", "Cn", "Cc"))
 """Categories of characters that are not given to an engine: emoji, which it would read out by name, and controls."""

@@ -1,8 +1,9 @@
 """Pieces of a text that has been read: what is said, what is referred to, and what was left out."""
 
 from collections.abc import Collection, Iterable, Mapping
-from functools import cached_property
 from typing import Literal, NamedTuple
+
+import regex
 
 Kind = Literal["say", "symbol", "silent", "break", "refer", "left"]
 Reason = Literal["", "address", "citation", "direction", "tag", "thought", "definition", "bracket", "case"]
@@ -62,49 +63,22 @@ def _examples(texts: list[str]) -> str:
     return f"{', '.join(texts[:_MOST])}{more}"
 
 
+_ANY = regex.compile(r"\[(?P<id>[^\s!\[\]]+)(?P<certain>!?)\](?=[^(])")
+
+
 class Ids:
-    """The ids of objects that a text may name, for a search from a place of it. None: nobody knows the world."""
+    """The ids of objects that a text may name. None: nobody knows the world, so that any word may be one."""
 
     def __init__(self, ids: Collection[str] | None) -> None:
         self.ids = frozenset(ids or ())
         self.is_unknown = ids is None
+        named = r"\[(?P<id>\L<ids>)(?P<certain>!?)\]"
+        self.exact = _ANY if ids is None else regex.compile(named, ids=self.ids)
+        """Pattern of a bracket that names an object, `[id]` or `[id!]`; the longest id counts."""
+        self.folded = regex.compile(named, regex.IGNORECASE, ids=self.ids) if self.ids else self.exact
+        """Pattern of one that does in other letters, maybe."""
 
-    @cached_property
-    def _lengths(self) -> list[int]:
-        return sorted({len(each) for each in self.ids}, reverse=True)
-
-    @cached_property
-    def _folded(self) -> dict[str, str]:
-        """Ids by their lower case; empty where two have the same."""
-        found: dict[str, str] = {}
-        for each in self.ids:
-            found[each.lower()] = "" if each.lower() in found else each
-        return found
-
-    @cached_property
-    def _prefixes(self) -> frozenset[str]:
-        return frozenset(each.lower()[:size] for each in self.ids for size in range(len(each) + 1))
-
-    def named(self, text: str, place: int) -> tuple[str, bool, int] | None:
-        """Find the longest id that a bracket names: `id]` or `id!]`. Returns it, whether it is certain, and its end.
-
-        Spelled exactly, or else in other letters if that is but one object's.
-        """
-        for is_exact in (True, False):
-            for length in self._lengths:
-                end = place + length
-                closes, is_certain = text.startswith("]", end), text.startswith("!]", end)
-                if not (closes or is_certain):
-                    continue
-                written = text[place:end]
-                id = (written if written in self.ids else "") if is_exact else self._folded.get(written.lower(), "")
-                if id:
-                    return id, is_certain, end + 1 + is_certain
-        return None
-
-    def may_name(self, text: str, place: int) -> bool:
-        """Tell whether the end of a text, from a place, may become an id with a bracket."""
-        if not self._lengths or len(text) - place > self._lengths[0] + 1:
-            return False
-        rest = text[place:].lower()
-        return rest in self._prefixes or rest.removesuffix("!") in self._folded
+    def meant(self, written: str) -> str:
+        """Find the one id that was written in other letters; empty: there are several."""
+        found = [each for each in self.ids if each.lower() == written.lower()]
+        return found[0] if len(found) == 1 else ""

@@ -87,8 +87,8 @@ def test_the_events_of_a_fragment_are_followed_to_their_ends(engage: Engage, tmp
     assert states == [
         ("adjacency_pair", "started"),
         ("mutual_facial_gaze", "started"),
-        ("adjacency_pair", "failed"),
         ("mutual_facial_gaze", "failed"),
+        ("adjacency_pair", "failed"),
     ]
 
 

@@ -14,6 +14,7 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.tool import Say
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.web.laying import NEAR, laid
 from engage_hri.services.console.web.orders import (
@@ -101,8 +102,8 @@ def test_the_log_has_what_was_ordered_but_not_the_words() -> None:
 
 
 def test_words_and_a_reference_are_a_turn_that_engage_can_read() -> None:
-    asked = json_codec_fragment(told("Could you hand me", "cup", asks=True, addressee="ann"))
-    said = json_codec_fragment(told("Thanks.", "", asks=False, addressee=""))
+    asked = json_codec_fragment(told([Say(say="Could you hand me")], "cup", asks=True, addressee="ann"))
+    said = json_codec_fragment(told([Say(say="Thanks.")], "", asks=False, addressee=""))
 
     assert [type(each) for each in asked.behaviors] == [Speech, Reference]
     assert (asked.turn_index, asked.addressee, said.turn_index) == (1, "ann", 3)

@@ -227,7 +227,7 @@ async def test_what_a_person_does_ends_when_its_program_is_killed(hub: MemoryHub
             ended = await events.next(60.0)
 
     assert ended is not None
-    assert (ended.state, ended.at.seconds - gone) == ("withdrawn", pytest.approx(0.5, abs=0.01))
+    assert (ended.state, ended.at.seconds - gone) == ("withdrawn", pytest.approx(2.0, abs=0.01))
 
 
 @pytest.mark.parametrize("perception", ["symbolic", "raw"])

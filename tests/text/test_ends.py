@@ -8,7 +8,8 @@ from engage_hri.services.text.ends import next_end
 
 ROWS = [
     tuple(line.split("\t"))
-    for line in (Path(__file__).parent / "sentences.txt").read_text("utf-8").splitlines()
+    for name in ("sentences.txt", "unseen.txt")
+    for line in (Path(__file__).parent / name).read_text("utf-8").splitlines()
     if not line.startswith("#")
 ]
 UNSPACED = ("zh", "ja")
@@ -17,8 +18,15 @@ MISSED = (
     "Wait... what is that? | I do not know.",
     "« Viens ici ! » dit-il. | Elle vint.",
     "Vive en EE. UU. desde 1999. | Le gusta.",
+    "Il est 8 h. | On part.",
+    "« Bonjour ! » dit-elle. | Il sourit.",
+    "Cuesta 3,5 euros aprox. por kilo.",
+    "EE. UU. es un país grande.",
+    "L'ing. Neri lavora a Roma. | Torna lunedì.",
+    "A Dra. Costa ligou às 10 h. | Volte mais tarde.",
 )
-"""Four of 235: a pause at `...` does no harm, and the others cost too many other sentences."""
+"""Ten of 343: a pause at `...` does no harm, and others cost too many other sentences. The table has not changed
+since `unseen.txt` was written, to say how good it is on sentences that it has not seen."""
 
 
 def sentences(text: str) -> list[str]:

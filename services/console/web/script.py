@@ -1,7 +1,9 @@
 """Prepared fragments and blocks, which a person performs by a button or a key. Pure."""
 
+from collections.abc import Sequence
 from itertools import count
 
+from msgspec import to_builtins
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference, Speech
@@ -9,6 +11,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import with_names
 from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.tool import Part, Refer
 
 Thing = Block | TurnFragment
 
@@ -52,12 +55,10 @@ def title(thing: Thing) -> str:
     return joined(parts) or thing.id
 
 
-def told(text: str, target: str, asks: bool, addressee: str) -> dict[str, object]:
-    """A turn as the tool of language models has it: words, then what is meant. asks: the person is to answer."""
-    parts: list[dict[str, object]] = [{"say": text}] if text.strip() else []
-    if target:
-        parts.append({"refer": target})
-    return {"turn_status": "full", "turn_index": 1 if asks else 3, "parts": parts, "addressee": addressee}
+def told(parts: Sequence[Part], target: str, asks: bool, addressee: str) -> dict[str, object]:
+    """A turn as the tool of language models has it, and then what is meant. asks: the person is to answer."""
+    whole = to_builtins([*parts, *([Refer(refer=target)] if target else [])])
+    return {"turn_status": "full", "turn_index": 1 if asks else 3, "parts": whole, "addressee": addressee}
 
 
 def backchannel(how: str, addressee: str = "") -> dict[str, object]:

@@ -13,6 +13,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.services.client.chunking import parts_of
 from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.perceive import check_id, perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
@@ -23,6 +24,7 @@ from engage_hri.services.console.web.laying import laid
 from engage_hri.services.console.web.receipts import Panel, Receipts
 from engage_hri.services.console.web.seats import SETTLED
 from engage_hri.services.console.web.service import Window
+from engage_hri.services.text.pieces import Ids
 
 REACH: Seconds = 0.9
 """Time that a person takes to lay a thing elsewhere."""
@@ -168,9 +170,11 @@ class Visitor:
         robot = self._window.robot
         match order:
             case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
-                if not text.strip() and not target:
-                    raise InputRefused(Fault(reason="nothing to say", advice="write words, or choose an object"))
-                self._drives(self._perform(script.told(text, target, asks, addressee)))
+                parts, left_out = parts_of(text, Ids([each.id for each in self._window.picture.world.objects]))
+                if not parts and not target:
+                    advice = "; ".join(left_out) or "write words, or choose an object"
+                    raise InputRefused(Fault(reason="nothing to say", advice=advice))
+                self._drives(self._perform(script.told(parts, target, asks, addressee), left_out))
             case orders.Prepared(number=number, addressee=addressee):
                 if number >= len(self._window.script):
                     raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))
@@ -200,13 +204,15 @@ class Visitor:
     def _drives(self, work: Coroutine[Any, Any, None]) -> None:
         self._begin(work, "wizard")
 
-    async def _perform(self, thing: Any) -> None:
+    async def _perform(self, thing: Any, left_out: tuple[str, ...] = ()) -> None:
+        """Perform a fragment or a block. left_out: what of a typed line is not said."""
         if isinstance(thing, Block):
             await self._window.robot.realize(thing, timeout=PATIENCE)
             return
         fragment = fragment_in(thing, self._window.new_id())
         outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
-        if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
+        problems = (*left_out, *(summary(outcome).problems if isinstance(outcome, FragmentOutcome) else ()))
+        if problems:
             self.receipts.tell("wizard", "; ".join(problems))
 
     async def _steered(self, verb: str, work: Coroutine[Any, Any, tuple[str, ...]]) -> None:

@@ -312,9 +312,7 @@ class EndingLaws(Suite):
 def _encoders(violation: Violation) -> str:
     """Advice for encoders that count in steps: they look like motion that comes in jerks."""
     noise = math.ceil(math.degrees(violation.explained) * 100.0) / 100.0
-    return (
-        f"if its encoders count in steps or are noisy, `--noise {noise:g}` explains this" if noise < 1.0 else ""
-    )
+    return f"if its encoders count in steps or are noisy, `--noise {noise:g}` explains this" if noise < 1.0 else ""
 
 
 def _timers() -> set[asyncio.TimerHandle]:

@@ -8,7 +8,6 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body import BodyPose, Estimate, Phase, WordTime
 from engage_hri.schemas.documents.prosody import unread
 from engage_hri.services.control.voice.timeline import Utterance
-from engage_hri.services.text.ear import heard
 
 
 def speech_estimate(
@@ -16,12 +15,11 @@ def speech_estimate(
 ) -> Estimate:
     """Estimate a speech from its time line. pose: the one of the body that speaks, which it leaves as it is.
 
-    warnings: what of it would not be said as it is meant, besides what is for the eye.
+    warnings: what of it would not be said as it is meant.
     """
     times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
     times["end"] = utterance.seconds
     gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
-    degraded = "; ".join(dict.fromkeys((*heard(behavior.text).problems, *unread(behavior), *warnings)))
     phases = []
     for since, to in pairwise(sync_points(behavior)):
         seconds = times[to] - times[since]
@@ -29,6 +27,6 @@ def speech_estimate(
         phases.append(Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=longest, hold=to in gaps))
     words = tuple([WordTime(position=word.position, start=word.start, end=word.end) for word in utterance.words])
     return Estimate(
-        behavior=behavior.id, feasible=True, degraded=degraded, parts=("voice",), phases=tuple(phases), words=words,
-        pose_after=pose, pose_end=pose,
+        behavior=behavior.id, feasible=True, degraded="; ".join(dict.fromkeys([*unread(behavior), *warnings])),
+        parts=("voice",), phases=tuple(phases), words=words, pose_after=pose, pose_end=pose,
     )  # fmt: skip

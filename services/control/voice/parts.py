@@ -11,11 +11,12 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.refusals import infeasible
 from engage_hri.services.control.voice.clauses import Clause
 from engage_hri.services.control.voice.phrases import Piece
-from engage_hri.services.control.voice.timeline import Utterance, Word, as_written, modelled, uttered
+from engage_hri.services.control.voice.timeline import Utterance, Word, utter, uttered
 from engage_hri.services.control.voice.visemes import Lips
 
 
@@ -47,12 +48,25 @@ def sounding(piece: Piece, clause: Clause) -> Part:
 
 def expected(piece: Piece, pace: float) -> Part:
     """The part that a phrase will be, for as long as it is not synthesized. pace: 2 takes twice as long."""
-    model = modelled(piece.phrase.text, pace, piece.phrase.prosody)
-    return Part(Utterance(_as_written(piece, model.words), model.seconds), piece.end, piece.pause)
+    modelled = utter(piece.phrase.text, pace, piece.phrase.prosody)
+    return Part(Utterance(_as_written(piece, modelled.words), modelled.seconds), piece.end, piece.pause)
 
 
 def _as_written(piece: Piece, said: Sequence[Word]) -> tuple[Word, ...]:
-    return as_written(piece.text, piece.places, said, piece.start)
+    """The words of a phrase as they stand in the text, where there is more: an emoji is not given to the engine."""
+    words: list[Word] = []
+    number, now = 0, 0.0
+    for token in tokens(piece.text):
+        begin = token.end - len(token.text)
+        since = until = None
+        while number < len(said) and said[number].position <= token.end:
+            word = said[number]
+            number += 1
+            if word.position - len(word.text) >= begin:
+                since, until = (word.start if since is None else since), word.end
+        start, now = (now, now) if since is None or until is None else (since, max(now, until))
+        words.append(Word(token.text, min(start, now), now, piece.start + token.end))
+    return tuple(words)
 
 
 def joined(parts: Sequence[Part], length: int) -> Utterance:

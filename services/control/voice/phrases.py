@@ -11,7 +11,6 @@ from engage_hri.schemas.documents.prosody import Prosody, spans
 from engage_hri.schemas.speakable import has_words, tokens
 from engage_hri.services.control.voice.synthesis import Phrase
 from engage_hri.services.control.voice.timeline import PAUSE
-from engage_hri.services.text.ear import heard
 from engage_hri.services.text.ends import ends
 
 ENOUGH = 120
@@ -35,27 +34,22 @@ class Piece(NamedTuple):
     start: int
     end: int
     pause: float
-    places: tuple[int, ...]
-    """For each character of the phrase the number of characters of the piece before it."""
 
 
 def pieces(speech: Speech, language: str = "") -> list[Piece]:
     """Cut a speech into phrases; none if it has nothing to say. language: the one where the speech names none."""
-    ear = heard(speech.text)
-    if not has_words(ear.text):
+    text = speech.text
+    if not has_words(text):
         return []
-    prosody = [ear.span(span) for span in spans(speech)]
-    cuts = list(_cuts(ear.text))
+    prosody = spans(speech)
+    cuts = list(_cuts(text))
     found = []
-    for first, last in zip([0, *cuts], [*cuts, len(ear.text)], strict=True):
-        inside = tuple(_inside(prosody, first, last))
-        said = ear.text[first:last]
-        pause = max((PAUSE.get(each, 0.0) for each in said.rstrip()[-3:]), default=0.0)
-        start = ear.places[first] if first else 0
-        end = ear.places[last] if last < len(ear.text) else len(speech.text)
-        places = tuple(place - start for place in ear.places[first:last])
-        phrase = Phrase(said, speech.language or language, inside)
-        found.append(Piece(phrase, speech.text[start:end], start, end, pause, places))
+    for start, end in zip([0, *cuts], [*cuts, len(text)], strict=True):
+        inside = tuple(_inside(prosody, start, end))
+        pause = max((PAUSE.get(each, 0.0) for each in text[start:end].rstrip()[-3:]), default=0.0)
+        found.append(
+            Piece(Phrase(text[start:end], speech.language or language, inside), text[start:end], start, end, pause)
+        )
     return found
 
 

@@ -39,7 +39,7 @@ from engage_hri.services.control.voice.speaker import FAULTS, Speaker, speech, v
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
 from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
-from engage_hri.services.control.voice.timeline import modelled, uttered
+from engage_hri.services.control.voice.timeline import utter, uttered
 from engage_hri.services.control.voice.wav import WavFile
 from engage_hri.services.control.waiting import Bell
 
@@ -153,7 +153,7 @@ class SoundingVoice(Speaker):
         clause = self._studio.known(piece.phrase)
         if clause is None:
             return None
-        model = modelled(piece.phrase.text, prosody=piece.phrase.prosody).seconds
+        model = utter(piece.phrase.text, prosody=piece.phrase.prosody).seconds
         if model > 0.5:
             self._pace += 0.1 * (clause.seconds / model - self._pace)
         return sounding(piece, clause)

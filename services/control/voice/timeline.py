@@ -8,7 +8,6 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.documents.prosody import Prosody, spans
 from engage_hri.schemas.speakable import Script, Token, tokens
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.text.ear import heard
 
 BEFORE_WORD: Seconds = 0.12
 PER_LETTER: Seconds = 0.05
@@ -66,31 +65,7 @@ def uttered(speech: Speech, pace: float = 1.0) -> Utterance:
 
 
 def utter(text: str, pace: float = 1.0, prosody: Sequence[Prosody] = ()) -> Utterance:
-    """Lay a text out in time, with its words as the author wrote them. Arguments as of `modelled`."""
-    ear = heard(text)
-    model = modelled(ear.text, pace, [ear.span(each) for each in prosody])
-    return Utterance(as_written(text, ear.places, model.words), model.seconds) if model.words else model
-
-
-def as_written(text: str, places: Sequence[int], said: Sequence[Word], start: int = 0) -> tuple[Word, ...]:
-    """The words of a text as its author wrote it, where there is more: what is for the eye takes no time.
-
-    places: see `Heard`, in characters of this text. said: words of the text for the ear. start: added to positions.
-    """
-    words: list[Word] = []
-    number, now = 0, 0.0
-    for token in tokens(text):
-        since = until = None
-        while number < len(said) and places[said[number].position - 1] < token.end:
-            since, until = (said[number].start if since is None else since), said[number].end
-            number += 1
-        begin, now = (now, now) if since is None or until is None else (since, max(now, until))
-        words.append(Word(token.text, min(begin, now), now, start + token.end))
-    return tuple(words)
-
-
-def modelled(text: str, pace: float = 1.0, prosody: Sequence[Prosody] = ()) -> Utterance:
-    """Lay a text for the ear out in time. pace: 2 takes twice as long. prosody: spans of the text, in order.
+    """Lay `text` out in time. pace: 2 takes twice as long. prosody: spans of the text, in order.
 
     Of a pause of punctuation and one of a span at the same place the longer counts, as eSpeak NG has it; silence of
     punctuation is as fast as the words before it.
