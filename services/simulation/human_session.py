@@ -211,7 +211,8 @@ class _PlannedObservations:
                 turn_ends,
             )
         if not event.succeeds:
-            yield from self._does(EXPLAINER, "speak", event.decided + GOES_ON[0], event.decided + GOES_ON[1])
+            since, until = GOES_ON
+            yield from self._does(EXPLAINER, "speak", event.decided + since, event.decided + until)
             return
         responder = self._other(event.initiator)
         if event.task_until is not None:

@@ -18,7 +18,7 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, Warnin
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
 from engage_hri.services.collaboration.relations import Relation, relation
-from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.bus.faulty import Faults
 from tests.scenario.playing import Record, play
@@ -266,8 +266,7 @@ def test_the_person_leaves_and_no_event_stays_open() -> None:
     for life in record.events.values():
         assert life[0].state == "started"
         assert [it.state in ENDINGS for it in life] == [False] * (len(life) - 1) + [True]
-    grace = RecognitionConfig().lost_face_grace
-    assert all(life[-1].at.seconds <= lost + grace + 1e-6 for life in record.events.values())
+    assert all(life[-1].at.seconds <= lost + FACE_GRACE + 1e-6 for life in record.events.values())
 
 
 def test_every_action_of_the_person_that_began_has_ended() -> None:

@@ -12,7 +12,7 @@ ENDS = {"completed", "failed", "preempted", "withdrawn", "superseded"}
 
 
 async def plays(seed: int, condition: Condition = "operational", habits: Habits | None = None) -> Record:
-    return await play("stochastic", "object", seed, condition=condition, habits=habits, mode="task", after=12.0)
+    return await play("stochastic", "object", seed, condition=condition, habits=habits, mode="task")
 
 
 def placed(record: Record) -> int:

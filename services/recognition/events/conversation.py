@@ -119,8 +119,8 @@ class Conversation:
         backchannel.
         """
         words, pair = self._writer.text_of(self.id, since), self.pair
-        if not words or not pair.robot_holds_turn:
-            return
+        if not words or not pair.robot_holds_turn or pair.event is None or since < pair.event.started:
+            return  # said to no turn, or before this one
         if is_listening(words):
             if pair.was_listening(since):
                 self._brief = since, self.silent_since
