@@ -113,11 +113,11 @@ class Heard(Answer, frozen=True, kw_only=True, tag="heard", omit_defaults=True):
 class Accepted(Answer, frozen=True, kw_only=True, tag="accepted", omit_defaults=True):
     """The request is being carried out, or will be.
 
-    limit: of an event, the time that the responder has, from the end of the turn or the last anchor. Only recognition
-    knows it.
+    within: of an event, the longest time from the robot's last deed (a sync point of its blocks, or the end of what
+    goes on) to the outcome. Only recognition knows it. None: nothing is promised.
     """
 
-    limit: Seconds | None = None
+    within: Seconds | None = None
 
 
 class Outdated(Answer, frozen=True, kw_only=True, tag="outdated", omit_defaults=True):

@@ -147,13 +147,6 @@ def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
     return max(events, key=lambda event: event.started.seconds, default=None)
 
 
-def _decision(event: ConnectionEvent | None) -> bool | None:
-    """True if the person responded, False if not; None if the event was not decided."""
-    if event is None or event.state not in ("succeeded", "completed", "failed"):
-        return None
-    return event.state != "failed"
-
-
 def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal["none", "pending"] | None:
     """Answer to the turn, as in `Summary`. is_over: the turn ended early, so no answer is waited for any more."""
     if pair is None or (is_over and pair.state == "started"):
@@ -193,7 +186,8 @@ def _sentences(it: Summary) -> Iterable[str]:
         yield f"The fragment {'failed' if it.status == 'failed' else 'was interrupted'}."
     if it.said:
         stop = "" if it.said.rstrip(_CLOSING).endswith(_STOPS) else "."
-        yield f'{"Only said" if it.cut_short else "Said"}: "{it.said}"{stop}'
+        how = "Said at least" if it.status == "unknown" else "Only said" if it.cut_short else "Said"
+        yield f'{how}: "{it.said}"{stop}'
     elif it.status not in ("refused", "unknown"):
         yield "Nothing was said."
     for each in it.references:

@@ -23,7 +23,9 @@ DESCRIPTION = """\
 Speak as the robot, to the person in front of it. Say what is to be said and name the objects you mean by their ids; \
 the robot finds the words for them, where to look, when to point, and the timing. It returns once this has been \
 performed, with what was really said, whether the person looked where you referred to and at the robot's face, and \
-what went wrong. If they did not look at an object that matters, refer to it again with certainty `high`."""
+what went wrong. If they did not look at an object that matters, refer to it again with certainty `high`. Status \
+`unknown` means that a part of the robot has failed: more may have been said and done than is told, so ask the \
+person before you say it again. After `refused`, nothing has been said or done."""
 
 Format = Literal["anthropic", "openai", "openai-chat"]
 """Forms for Anthropic's Messages API, OpenAI's Responses API, and the Chat Completions API of many others."""
@@ -123,7 +125,7 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
     within: Annotated[
         Literal[0, 3, 6, 10, 20, 30, 60],
         Meta(
-            description="Seconds that the person has to answer, if not as usual (1.5 for a reply, 8 for an action): "
+            description="Seconds that the person has to answer, if not as usual (4 for a reply, 8 for an action): "
             "6 for a question to think about. 0, or left out: as usual."
         ),
     ] = 0

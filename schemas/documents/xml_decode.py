@@ -99,6 +99,7 @@ class _Document:
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
+        self._source.require_declared()
         raw = self._own_fields(root, TurnFragment)
         self._note_foreign(root, foreign_attributes(root))
         fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
@@ -264,6 +265,7 @@ class _Document:
 
     def _speech(self, element: etree._Element, raw: dict[str, Any]) -> list[of.Timing]:
         self._leave_out_strays(element, raw["id"])
+        self._choose(element, raw["id"])
         said = spoken(self._source, element, raw["id"])
         raw["text"], raw["marks"] = said.text, said.marks
         raw["language"] = raw.get("language") or language(self._source, element)
@@ -278,6 +280,17 @@ class _Document:
             elif has_text and name not in ("description", "timing"):
                 self._leave_out(f"unknown element <{name}> beside <text>", child, raw["id"])
         return [*_ties(element), *said.timing]
+
+    def _choose(self, speech: etree._Element, id: str) -> None:
+        """Let a speech say the first of its alternatives."""
+        found = [each for each in speech.iter(etree.Element) if local_name(each) == "alternative"]
+        first = {each.getparent(): each for each in reversed(found)}
+        if others := [each for each in found if each is not first[each.getparent()]]:
+            self._note("only the first <alternative> is said: another", others[0], id, "DEGRADED")
+            for each in others:
+                each.tag = _STRAY
+            etree.strip_elements(speech, _STRAY, with_tail=False)
+        etree.strip_tags(speech, "{*}alternative")
 
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
         """Leave out elements that a <speech> cannot hold: other behaviors, and anything inside a mark."""

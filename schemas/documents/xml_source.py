@@ -10,6 +10,7 @@ from typing import cast
 
 from lxml import etree
 
+from engage_hri.schemas.behaviors import UNDECLARED
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.limits import LARGEST
 
@@ -38,7 +39,6 @@ MOST_PREFIXES = 100
 
 _UNDECLARED_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _UNDECLARED = re.compile(r"Namespace prefix ([^\s\"'<>&=/]+) (?:for|on) ")
-_UNKNOWN_PREFIX = "urn:undeclared:"
 _ADVICE = {
     "ERR_UNDECLARED_ENTITY": "write the character itself; only &amp; &lt; &gt; &quot; &apos; are known",
     "ERR_INVALID_CHAR": "remove it: XML holds no control characters",
@@ -60,7 +60,10 @@ class Source:
     """A parsed document: its `root`, the id of that (`block`), its source's name, and the line of each element."""
 
     def __init__(self, data: bytes | str, name: str = "") -> None:
-        """Parse a document. Raises InputRefused if it is too large or too deep, malformed, or has a document type."""
+        """Parse a document. Raises InputRefused if it is too large or too deep, malformed, or has a document type.
+
+        Elements with an undeclared prefix are of a namespace of their own, `UNDECLARED` and the prefix.
+        """
         self.name = name
         self.block: str | None = None
         if len(data) > LARGEST:
@@ -82,7 +85,9 @@ class Source:
             if count > most:
                 raise self.refusal(f"more than {most} {what}", advice="split it into several blocks")
         self._lines = dict(zip(elements, _start_lines(text), strict=False))
+        self._elements = elements
         self._require_plain(elements)
+        self.require_declared([self.root])
         self._require_shallow()
 
     def line(self, element: etree._Element) -> int:
@@ -125,7 +130,7 @@ class Source:
             raise self.refusal(reason, line=1, advice="save it as UTF-8") from error
 
     def _parse(self, text: str) -> etree._Element:
-        """Parse the text strictly, but for undeclared prefixes: attributes with those are ignored.
+        """Parse the text strictly, but for undeclared prefixes: what has one is of a namespace that nobody knows.
 
         They are declared here, and the text is parsed again, as strictly as before, so that no other error slips
         through.
@@ -162,15 +167,19 @@ class Source:
         raise self.refusal(f"malformed XML: {reason}", line=line, advice=advice) from error
 
     def _require_plain(self, elements: Iterable[etree._Element]) -> None:
-        """Refuse elements with an undeclared prefix or too many attributes. Raises InputRefused."""
+        """Refuse elements with too many attributes. Raises InputRefused."""
         for element in elements:
-            namespace, local = split(str(element.tag))
-            if namespace.startswith(_UNKNOWN_PREFIX):
-                name = f"<{namespace.removeprefix(_UNKNOWN_PREFIX)}:{local}>"
-                advice = f'declare the prefix, for example xmlns:ebml="{EBML}"'
-                raise self.refusal(f"malformed XML: prefix of {name} is not declared", element, advice=advice)
             if (count := len(element.attrib)) > MOST_ATTRIBUTES:
-                raise self.refusal(f"<{local}> has {count} attributes; at most {MOST_ATTRIBUTES} are read", element)
+                reason = f"<{split(str(element.tag))[1]}> has {count} attributes; at most {MOST_ATTRIBUTES} are read"
+                raise self.refusal(reason, element)
+
+    def require_declared(self, elements: Iterable[etree._Element] | None = None) -> None:
+        """Refuse elements with an undeclared prefix. elements: None: all. Raises InputRefused."""
+        for element in self._elements if elements is None else elements:
+            if str(element.tag).startswith(f"{{{UNDECLARED}"):
+                advice = f'declare the prefix, for example xmlns:ebml="{EBML}"'
+                reason = f"malformed XML: prefix of <{prefixed_name(element)}> is not declared"
+                raise self.refusal(reason, element, advice=advice)
 
     def _require_shallow(self) -> None:
         depth = 0
@@ -198,7 +207,7 @@ def _declaring(text: str, prefixes: Set[str]) -> str:
     if not prefixes:
         return text
     end = next(tag.end(1) for tag in _TAGS.finditer(text) if tag[1])
-    declarations = "".join(f' xmlns:{prefix}="{_UNKNOWN_PREFIX}{prefix}"' for prefix in sorted(prefixes))
+    declarations = "".join(f' xmlns:{prefix}="{UNDECLARED}{prefix}"' for prefix in sorted(prefixes))
     return f"{text[:end]}{declarations}{text[end:]}"
 
 

@@ -98,8 +98,6 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Time after the end of an event for which it is told again, should its words become known or be corrected."""
     sensing: Sensing = Sensing()
     """Settings for raw perception."""
-    lost_face_grace: Seconds = FACE_GRACE
-    """Time for which a face may be lost before the person has gone."""
     look_break: Seconds = 0.15
     """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
     meanwhile waits for the decision."""
@@ -133,15 +131,15 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
             "longest_speech", "longest_gesture", "longest_manipulation",
         ))  # fmt: skip
         not_negative(self, (
-            "after_robot_directed", "lost_face_grace", "hysteresis", "words_margin", "words_patience",
+            "after_robot_directed", "hysteresis", "words_margin", "words_patience",
         ))  # fmt: skip
         if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
         if not 0 <= self.look_break <= self.sensing.settling:
             raise ValueError("look_break must not be negative, nor longer than sensing.settling")
-        if not self.forgotten_after > max(self.lost_face_grace, self.after_robot_directed, self.direct_by_look):
+        if not self.forgotten_after > max(FACE_GRACE, self.after_robot_directed, self.direct_by_look):
             raise ValueError(
-                "forgotten_after must be greater than lost_face_grace, after_robot_directed and direct_by_look"
+                f"forgotten_after must be greater than {FACE_GRACE:g} s, after_robot_directed and direct_by_look"
             )
         if self.enough_events < 2:
             raise ValueError("enough_events must be at least 2: one event has no time between events")

@@ -140,8 +140,8 @@ class _Recognition:
                     self._bus.publish(key, message)
                 case Withdraw(states=states):
                     self._bus.withdraw(*states)
-                case Answer(answer=Accepted(id=id, limit=limit)):
-                    self.desk.accept(id, limit)
+                case Answer(answer=Accepted(id=id, within=within)):
+                    self.desk.accept(id, within)
                 case Answer(answer=Refused(id=id, fault=fault)):
                     self.desk.refuse(id, fault)
                 case Answer(answer=outcome):

@@ -319,9 +319,9 @@ class RequestDesk:
         """Tell the requester that it is not accepted, but may have begun: no other life is to begin it."""
         self._answer(name, Heard(id=name))
 
-    def accept(self, name: str, limit: Seconds | None = None) -> None:
-        """Tell the requester that the request is being performed. limit: that of an event."""
-        self._answer(name, Accepted(id=name, limit=limit))
+    def accept(self, name: str, within: Seconds | None = None) -> None:
+        """Tell the requester that the request is being performed. within: see `Accepted`."""
+        self._answer(name, Accepted(id=name, within=within))
 
     def refuse(self, name: str, fault: Fault) -> None:
         """End the request: it will not be performed."""

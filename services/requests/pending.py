@@ -26,11 +26,11 @@ class Pending:
         return keys.server_of(self.key)
 
     @property
-    def limit(self) -> Seconds | None:
-        """Limit of an event, as its server has told; None if it has told none so far."""
+    def within(self) -> Seconds | None:
+        """Time in which the server has promised to decide (see `Accepted`); None if it has promised none so far."""
         is_known = self.accepted.done() and not self.accepted.cancelled() and self.accepted.exception() is None
         answer = self.accepted.result() if is_known else None
-        return answer.limit if answer is not None else None
+        return answer.within if answer is not None else None
 
     def accept(self, answer: Accepted | None = None) -> None:
         """Note that the server has accepted the request. answer: None if that was lost, and its end has come."""

@@ -35,12 +35,12 @@ TURN: tuple[Seconds, Seconds] = (0.6, 1.8)
 """Range of the length of a pair's first turn, uniform; but at most half the delay of a pair that fails."""
 ANSWER: Seconds = 0.6
 """Length of the second turn of an adjacency pair."""
-GOES_ON: Seconds = 0.05
-"""Time after a pair that failed until the explainer says a word, and the length of that."""
 LEAD: Seconds = 0.5
 """Time for which the explainer has been speaking when a backchannel comes."""
 THIRD_TURN: Seconds = 1.6
 """Time after the answer until the asker's next words can no longer be the third turn of that pair (1.5 s)."""
+GOES_ON: tuple[Seconds, Seconds] = (0.02, 0.08)
+"""Beginning and end of the explainer's "well" after a pair failed: what the listener says then is no late answer."""
 BETWEEN: Seconds = 0.6
 """Least time from the end of an event to the start of the next; longer than `LEAD`."""
 
@@ -211,8 +211,7 @@ class _PlannedObservations:
                 turn_ends,
             )
         if not event.succeeds:
-            # The explainer goes on: else the listener's next turn, whenever it came, would be the answer, late.
-            yield from self._does(EXPLAINER, "speak", event.decided + GOES_ON, event.decided + 2.0 * GOES_ON)
+            yield from self._does(EXPLAINER, "speak", event.decided + GOES_ON[0], event.decided + GOES_ON[1])
             return
         responder = self._other(event.initiator)
         if event.task_until is not None:

@@ -1,7 +1,7 @@
 """References that are chosen again before their words begin, and what is told of them: whole robots in memory."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 
@@ -36,8 +36,10 @@ def cup(*position: float) -> Entity:
 
 
 @asynccontextmanager
-async def robot(hub: MemoryHub, *left_out: str) -> AsyncIterator[tuple[Robot, AsyncExitStack]]:
-    config = load(settings=["simulation.human=none"])
+async def robot(
+    hub: MemoryHub, *left_out: str, settings: Iterable[str] = ()
+) -> AsyncIterator[tuple[Robot, AsyncExitStack]]:
+    config = load(settings=["simulation.human=none", *settings])
     names = [name for name in (*roster.ROBOT, "simulation") if name not in left_out]
     services = {name: roster.service(name, config) for name in names}
     async with running(hub, services), connect(hub=hub) as client, AsyncExitStack() as others:

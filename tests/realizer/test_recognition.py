@@ -9,6 +9,7 @@ from engage_hri.schemas.recognition import EventOutcome, RequestEvent
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import running
+from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage
 
 EVENT = Event(id="e", kind="backchannel", responder="human", limit=2.0)
@@ -56,13 +57,25 @@ async def test_an_event_is_decided_when_recognition_says_it_was_and_not_when_tha
     assert seen.times()["s:start"] == 0.5
 
 
-async def test_an_event_that_is_not_decided_in_time_is_asked_for_no_more() -> None:
-    """Recognition is there, and is given ten seconds beyond the limit."""
+async def test_an_event_that_is_not_decided_in_the_time_that_recognition_has_promised_is_asked_for_no_more() -> None:
     recognition = FakeRecognition({"e": None})
     async with stage(recognition=recognition) as seen:
         await seen.perform(WAITING)
 
     assert source(seen) == (12.0, "clock")
+    assert recognition.cancelled == ["r-b/e"]
+
+
+@pytest.mark.parametrize("spoken", [1.0, 11.0, 13.0, 40.0, 200.0])
+async def test_the_promised_time_counts_from_the_last_deed_of_the_robot(spoken: float) -> None:
+    """However long it speaks: only then the turn is over, and the answer is waited for."""
+    recognition = FakeRecognition({"e": None})
+    said, then = Speech(id="s", text="so"), Speech(id="t", text="what now")
+    async with stage(FakeBody(estimates={"s": (spoken,)}, scripts={"s": Script((spoken,))}), recognition) as seen:
+        await seen.perform(block((EVENT, said, then), after("e:end", "t:start")))
+
+    assert seen.times()["s:end"] == spoken
+    assert source(seen) == (spoken + 12.0, "clock")
     assert recognition.cancelled == ["r-b/e"]
 
 

@@ -36,13 +36,11 @@ def world(*people: str, pieces: tuple[str, ...] = PIECES) -> World:
 class Log:
     """A session about one table; every call is one observation, its effects are kept in `effects`.
 
-    An answer has 1.5 s, and a lost face half a second, unless a test says otherwise: so the stories stay short.
+    An answer has 1.5 s, unless a test says otherwise: so the stories stay short.
     """
 
     def __init__(self, *people: str, **config: Any) -> None:
-        self.session = Session(
-            ROBOT, RecognitionConfig(**{"adjacency_pair_limit": 1.5, "lost_face_grace": 0.5, **config})
-        )
+        self.session = Session(ROBOT, RecognitionConfig(**{"adjacency_pair_limit": 1.5, **config}))
         self.effects: list[Effect] = []
         self.requests = 0
         self.feed(world(*people), 0.0)

@@ -142,20 +142,20 @@ a robot that falls silent before the person has ended has answered, too
 
 a person who leaves while the robot cuts in has been answered
     1 human +speak; 1.5 robot +speak; 1.5 asks ap turn=turn-1; 2 lost human; 9 time
-    human's ap-1: started 1, succeeded 2.5 after -1 by speak, completed 2.5 lasting 0.5
-    robot's ap-2: started 1.5, failed 2.5 after 1
+    human's ap-1: started 1, succeeded 4 after -2.5 by speak, completed 4 lasting 0.5
+    robot's ap-2: started 1.5, failed 4 after 2.5
 
 robot that interrupts has answered when the person has finished
     1 human +speak; 1.5 robot +speak; 3 human -speak; 3.5 robot -speak
     human's ap-1: started 1, succeeded 3 after -1.5 by speak, completed 3.5 lasting 2
 
 a person who leaves while speaking withdraws
-    1 human +speak; 2 lost human; 2.5 time
-    human's ap-1: started 1, withdrawn 2.5
+    1 human +speak; 2 lost human; 4 time
+    human's ap-1: started 1, withdrawn 4
 
 a person who leaves while answering has answered
-    1 asked; 2.5 human +speak; 3 lost human; 3.5 time
-    robot's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 3.5 lasting 0.5
+    1 asked; 2.5 human +speak; 3 lost human; 5 time
+    robot's ap-1: started 1, succeeded 2.5 after 0.5 by speak, completed 5 lasting 0.5
 """
 
 

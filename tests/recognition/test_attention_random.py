@@ -11,6 +11,7 @@ from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.recognizer import Recognizer
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 from tests.recognition.observations import ROBOT, stamp
 from tests.recognition.raw import EYES, PLACES, face, hand, pose, table, voice
 from tests.recognition.test_random_streams import ACTORS, Chance
@@ -62,7 +63,7 @@ def test_every_event_ends_once_and_every_request_is_answered(seed, length):
             results += recognizer.advance(at)
             kind = ActorFound if at == 1000.0 else ActorLost
             results += recognizer.feed(kind(actor=actor, at=stamp(at)), at, at)
-    results += recognizer.advance(1001.0 + RecognitionConfig().lost_face_grace + 1.0)
+    results += recognizer.advance(1001.0 + FACE_GRACE + 1.0)
 
     lives: dict[str, list[str]] = {}
     for event in results:

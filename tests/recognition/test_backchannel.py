@@ -58,8 +58,8 @@ an announced backchannel ends with its block
     human's bc-1: started 1.5, succeeded 1.5, completed 1.9 lasting 0.4
 
 a gesture whose person vanishes is completed
-    1 robot +speak; 1.5 human +nod; 1.6 lost human; 2.1 time
-    robot's bc-1: started 1.5, succeeded 1.5, completed 2.1 lasting 0.1
+    1 robot +speak; 1.5 human +nod; 1.6 lost human; 3.6 time
+    robot's bc-1: started 1.5, succeeded 1.5, completed 3.6 lasting 0.1
 
 late and repeated speech does not speak for ever
     1 human +speak; 2 human -speak; 1 human +speak; 3.5 time

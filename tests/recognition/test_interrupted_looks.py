@@ -75,8 +75,10 @@ def test_who_is_found_again_and_looks_at_nothing_any_more_has_looked_away_then()
 
 
 def test_who_is_not_found_again_has_gone():
-    assert told(began(HUMAN, 1.0, ROBOT), ended(HUMAN, 1.5, ROBOT), lost(1.5), lost_face_grace=0.5) == [
-        ("mfg-1", "started", 1.0), ("mfg-1", "withdrawn", 2.0),
+    gone = (ended(HUMAN, 1.5, ROBOT), lost(1.5))
+
+    assert told(began(HUMAN, 1.0, ROBOT), *gone, mutual_facial_gaze_limit=4.0) == [
+        ("mfg-1", "started", 1.0), ("mfg-1", "withdrawn", 3.5),
     ]  # fmt: skip
 
 

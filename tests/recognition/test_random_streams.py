@@ -17,6 +17,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.statistics.tally import KINDS
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 from engage_hri.services.runtime.reports import GoesOn
 from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
@@ -155,7 +156,7 @@ def run(stream, resolution="object"):
     end = max(at for at, _ in stream) + 100.0
     for name in ACTORS:
         effects += session.feed(ActorLost(actor=name, at=stamp(end)), end)
-    effects += session.advance(end + RecognitionConfig().lost_face_grace + 1.0)
+    effects += session.advance(end + FACE_GRACE + 1.0)
     return session, effects, asked, signaled
 
 
@@ -198,3 +199,38 @@ def test_times_of_an_event_never_run_backwards(stream):
             times[event.id] = event.at.seconds
             assert event.duration is None or event.duration >= 0
             assert event.delay is None or event.delay >= 0 or event.kind == "adjacency_pair"
+
+
+def is_deed(observation: Observation) -> bool:
+    """True for what the robot does, by its body or by its blocks; the actions of people are none."""
+    told = observation.began if isinstance(observation, GoesOn) else observation
+    return getattr(told, "actor", ROBOT) == ROBOT and not isinstance(told, Cancel | HeadOwner)
+
+
+@settings(max_examples=share_of(150), deadline=None)
+@given(any_streams, st.sampled_from(("object", "table")))
+def test_every_accepted_event_is_decided_in_the_promised_time_after_the_last_deed_of_the_robot(stream, resolution):
+    """Also if nobody tells the end of the turn, or the anchors, and if everybody stays."""
+    session = Session(ROBOT, RecognitionConfig(gaze_resolution=resolution))
+    session.feed(world(*ACTORS), 0.0)
+    over = stream[-1][0] + 0.1
+    silent = ActionEnded(actor=ROBOT, action="speak", at=stamp(over))
+    deed, is_speaking = 0.0, False
+    due: dict[str, float] = {}
+    promised: dict[str, float] = {}
+    for at, observation in [*stream, (over, silent), (over + 1000.0, None)]:
+        effects = session.advance(at) if observation is None else session.feed(observation, at)
+        for effect in effects:
+            if isinstance(effect, Accepted):
+                assert effect.within is not None
+                promised[effect.id], due[effect.id] = effect.within, float("inf")
+            elif isinstance(effect, EventOutcome):
+                del promised[effect.id]
+                assert effect.at.seconds <= due.pop(effect.id) + 1e-6, effect
+        if observation is not None and is_deed(observation):
+            deed = at
+            told = observation.began if isinstance(observation, GoesOn) else observation
+            if getattr(told, "action", "") == "speak":
+                is_speaking = not isinstance(told, ActionEnded)
+        due = {id: float("inf") if is_speaking else deed + within for id, within in promised.items()}
+    assert promised == {}

@@ -129,7 +129,7 @@ def test_ids_count_by_kind_and_carry_the_session():
     ("setting", "value", "reason"),
     [
         ("directed_gaze_limit", 0.0, "directed_gaze_limit must be positive"),
-        ("lost_face_grace", -0.1, "lost_face_grace must not be negative"),
+        ("after_robot_directed", -0.1, "after_robot_directed must not be negative"),
         ("engaged_from", 0.2, "thresholds overlap"),
         ("enough_events", 1, "at least 2"),
         ("accept", (), "at least one action"),

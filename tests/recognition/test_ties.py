@@ -30,7 +30,7 @@ def test_a_single_start_is_settled_too():
 
 
 def presence() -> Presence:
-    return Presence(0.5)
+    return Presence()
 
 
 def test_who_is_found_and_lost_at_one_instant_is_lost():
@@ -38,7 +38,7 @@ def test_who_is_found_and_lost_at_one_instant_is_lost():
     person.found(1.0)
     person.lost(1.0)
 
-    assert person.deadline == 1.5
+    assert person.deadline == 3.0
 
 
 def test_a_loss_that_is_told_twice_is_no_second_one_though_the_person_was_found_at_that_instant():

@@ -175,6 +175,14 @@ def test_what_nobody_knows_is_not_told_as_refused() -> None:
     )
 
 
+def test_of_words_that_nobody_could_tell_to_the_end_there_may_have_been_more() -> None:
+    told = Summary(status="unknown", said="one two", cut_short=True)
+
+    assert told.text == (
+        'A part of the robot has gone: it is unknown what became of the fragment. Said at least: "one two".'
+    )
+
+
 def test_nobody_waits_for_the_answer_to_a_turn_that_ended_early() -> None:
     pending = (event("adjacency_pair", "started", turn="f"),)
 

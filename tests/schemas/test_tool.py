@@ -15,6 +15,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.tool import FILE, PARTS, Format, ToolInput, input_schema, tool_definition
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.recognition.config import RecognitionConfig
 
 SCENE = World(
     entities=(
@@ -128,6 +129,20 @@ def test_each_api_gets_the_form_it_takes() -> None:
     assert tool_definition("openai-chat").keys() == {"type", "function"}
     assert len({function(format)["name"] for format in FORMATS}) == 1
     assert len(function("anthropic")["description"]) < 1024  # what OpenAI takes
+
+
+def test_a_model_is_told_the_limits_that_recognition_has() -> None:
+    usual = RecognitionConfig()
+    told = input_schema()["properties"]["within"]["description"]
+
+    assert f"{usual.adjacency_pair_limit:g} for a reply, {usual.manipulation_limit:g} for an action" in told
+
+
+def test_a_model_is_told_what_it_may_not_say_again_without_asking() -> None:
+    told = function("anthropic")["description"]
+
+    assert "`unknown` means that a part of the robot has failed" in told
+    assert "After `refused`, nothing has been said or done." in told
 
 
 def test_what_must_be_there_is_required_and_everything_is_explained() -> None:

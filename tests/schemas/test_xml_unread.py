@@ -351,3 +351,35 @@ def test_words_outside_of_speech_are_noted_with_their_own_line(content: str, lin
     (noted,) = block(content, DRAFT).unread
 
     assert noted.message.startswith(f"line {line}: text 'words")
+
+
+def test_a_speech_says_the_first_of_its_alternatives() -> None:
+    said = "".join(
+        f'<alternative><text>{word} <sync id="m"/>there</text></alternative>' for word in ("Hello", "Hi", "Hey")
+    )
+
+    for content in (said, said.replace("<text>", "").replace("</text>", "")):
+        found = decode_xml(f'<bml id="b"><speech id="s">{content}</speech></bml>')
+
+        assert isinstance(found, Block)
+        (speech,) = found.behaviors
+        assert isinstance(speech, Speech)
+        assert (speech.text, speech.marks, speech.markup) == ("Hello there", (Mark("m", 6),), "")
+        assert [each.kind for each in found.unread] == ["DEGRADED"]
+
+
+def test_what_has_an_undeclared_prefix_costs_itself_alone() -> None:
+    found = decode_xml('<bml id="b"><x:a id="a"/><y:b/><speech id="s">one <z:c>two</z:c></speech></bml>')
+
+    assert isinstance(found, Block)
+    unknown, speech = found.behaviors
+    assert isinstance(unknown, Unknown)
+    assert isinstance(speech, Speech)
+    assert (unknown.element, speech.text) == ("x:a", "one two")
+    assert len(found.unread) == 2
+
+
+@pytest.mark.parametrize("root", ['<x:bml id="b"/>', '<ebml id="e"><x:reference id="r" object="cup"/></ebml>'])
+def test_a_root_and_a_fragment_have_declared_prefixes(root: str) -> None:
+    with pytest.raises(InputRefused, match="is not declared"):
+        decode_xml(root)

@@ -94,25 +94,16 @@ UNTOLD: Seconds = 2.5
 say then what the person does: the robot leaves the time in which most people follow a point or begin to answer."""
 GRACE: Seconds = 0.5
 """Time after its limit at which an event ends as failed if recognition is not there to decide it."""
-PATIENCE: Seconds = 10.0
-"""Time after the limit that recognition told for which it is trusted to decide. It may be a recognizer of others."""
 
 
-def event_deadline(
-    event: Event, block: Block, reached: Mapping[Point, Seconds], told: Seconds | None, *, is_received: bool
-) -> Seconds:
-    """Time at which to give an event up as failed. told: the limit that recognition named when it accepted the event.
+def event_deadline(event: Event, block: Block, reached: Mapping[Point, Seconds]) -> Seconds:
+    """Time at which an event has failed, if recognition is not there to decide it.
 
-    If recognition has the request (is_received), deciding is its business: it alone knows what the limit counts from,
-    so only a block in which nothing has happened for far longer than the limit gives the event up. Else the limit
-    counts from the start or from the last of the anchors that are reached by now.
+    The limit counts from the start or from the last of the anchors that are reached by now.
     """
-    limit = told or event.limit or UNTOLD
-    if is_received:
-        return max(reached.values()) + limit + PATIENCE
     anchors = (reached.get(_point(text, block)) for text in event.anchors)
     since = max(time for time in (reached[Point(event.id, "start")], *anchors) if time is not None)
-    return since + limit + GRACE
+    return since + (event.limit or UNTOLD) + GRACE
 
 
 def _point(text: str, block: Block) -> Point:

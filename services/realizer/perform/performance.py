@@ -57,7 +57,7 @@ class BlockPerformance:
         self._live, self.id = live, live.id
         self.plan, self._shared = plan, shared
         self.bus, self._config = shared.bus, shared.config
-        self.recognition = RecognitionLink(shared.bus, shared.requests, shared.peers)
+        self.recognition = RecognitionLink(shared)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.futures = SyncPointFutures()
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
@@ -405,3 +405,9 @@ class BlockPerformance:
         """Parts of the body used by behaviors that have begun and not ended."""
         moving = {id for id, run in self._runs.items() if run.behavior is not None} - self._dropped.keys()
         return {part for id in moving if not self.decisions.facts.has_ended(id) for part in self.plan.parts(id)}
+
+    @property
+    def last_deed(self) -> Seconds:
+        """Time when the robot last did something of the block: now, while a behavior of the body goes on."""
+        facts = self.decisions.facts
+        return self.bus.now() if self.parts_moving else max(facts.reached.values(), default=facts.began)

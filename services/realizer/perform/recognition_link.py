@@ -1,6 +1,7 @@
 """Requests of one block to recognition: connection events and turn signals. The clock decides if it is not there."""
 
 import asyncio
+from math import inf
 from typing import Any
 
 from msgspec import Struct
@@ -11,12 +12,11 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.perform.shared_context import Presence
+from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
+from engage_hri.services.requests.ends import Pending, RequestRefused, ServerRestarted
 
 
 class Decision(Struct, frozen=True):
@@ -29,10 +29,11 @@ class Decision(Struct, frozen=True):
 class RecognitionLink:
     """Asks recognition for the events of one block."""
 
-    def __init__(self, bus: Bus, requests: Requester, peers: Presence) -> None:
-        self._bus = bus
-        self._requests = requests
-        self._peers = peers
+    def __init__(self, shared: SharedContext) -> None:
+        self._bus = shared.bus
+        self._requests = shared.requests
+        self._peers = shared.peers
+        self._others = shared.others
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
         """Tell recognition what became of a turn. The answer does not matter."""
@@ -50,11 +51,13 @@ class RecognitionLink:
         return self._requests.send(keys.EVENT, request)
 
     async def decision(self, event: Event, block: Block, pending: Pending | None, facts: Facts) -> Decision:
-        """Wait for the decision of an event, not counting the time for which it is held. Raises RequestRefused.
+        """Wait for the decision of an event. Raises RequestRefused.
 
-        facts: those of the block, as they grow.
+        Recognition decides as long as it is there, in the time that it has promised: counted from the last deed of
+        the robot, since the turn may go on in other blocks. Else the clock does. The time for which the event is held
+        is not counted. facts: those of the block, as they grow.
         """
-        began = facts.reached[Point(event.id, "start")]
+        began = deed = facts.reached[Point(event.id, "start")]
         while True:
             if pending is not None and pending.outcome.done():
                 try:
@@ -68,17 +71,21 @@ class RecognitionLink:
                     continue
                 at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
                 return Decision(at, True)
-            is_received = pending is not None and "recognition" in self._peers
             now = self._bus.now()
-            told = pending.limit if pending is not None else None
-            deadline = event_deadline(event, block, facts.reached, told, is_received=is_received)
-            remaining = deadline + facts.held_between(began, now, event.id) - now
+            deed = max(deed, *(each.last_deed for each in self._others()))
+            if pending is None or "recognition" not in self._peers:
+                due = event_deadline(event, block, facts.reached)
+            else:
+                due = inf if pending.within is None else deed + pending.within
+            remaining = due + facts.held_between(began, now, event.id) - now
             if remaining <= EPSILON:
                 if pending is not None:
                     self._requests.cancel(pending.request.id, "no decision in time")
                 return Decision(self._bus.now(), False)
-            # The deadline is computed again after this: meanwhile points were reached, or the limit was told.
+            # The deadline is computed again after this: meanwhile points were reached, or the promise was heard.
             news: list[asyncio.Future[Any]] = [self._peers.changed]
             if pending is not None:
-                news.append(pending.outcome)
-            await asyncio.wait(news, timeout=remaining, return_when=asyncio.FIRST_COMPLETED)
+                news += [each for each in (pending.outcome, pending.accepted) if not each.done()]
+            await asyncio.wait(
+                news, timeout=None if remaining == inf else remaining, return_when=asyncio.FIRST_COMPLETED
+            )

@@ -9,6 +9,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
 from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
@@ -52,6 +53,8 @@ class Moving(Tied, Protocol):
 
     @property
     def parts_moving(self) -> set[str]: ...
+    @property
+    def last_deed(self) -> Seconds: ...
     def containing(self) -> Containing: ...
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None: ...
 

@@ -12,10 +12,6 @@ from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Ma
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
 
-LATEST_ANSWER: Seconds = 10.0
-"""Time from the end of the robot's turn after which what a person does is no late answer, but a turn of its own.
-People who answered a product robot after its limit did so within 6 s, but for one of 70."""
-
 TABLE = table(
     Row(IDLE, "robot_asks", ROBOT_WAITING, ("started",)),
     Row(IDLE, "human_asks", HUMAN_WAITING, ("started",)),
@@ -36,6 +32,7 @@ TABLE = table(
     Row(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
     Row(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
     Row(INTERRUPTED, "turn_ends", RESPONDING, ("succeeded",)),
+    Row(INTERRUPTED, "was_listening", ROBOT_WAITING),
     Row(RESPONDING, "response_ends", IDLE, ("completed",)),
     Row(RESPONDING, "repaired", IDLE, ("completed",)),
     Row(RESPONDING, "supersede", IDLE, ("completed",)),
@@ -203,8 +200,6 @@ class AdjacencyPair(Machine):
         event = self._unanswered
         if event is None or self._turn_end is None or action not in event.accept:
             return False
-        if not in_time(at, self._turn_end + LATEST_ANSWER):
-            return False
         self.forget_unanswered()
         event.rests_on(confidence)
         event.response, event.delay = action, at - self._turn_end
@@ -221,6 +216,19 @@ class AdjacencyPair(Machine):
         if self.event is None or self.state != INTERRUPTED or not self._by_robot:
             return False
         return at < self._response_since and action in self.event.accept
+
+    def was_listening(self, since: Seconds) -> bool:
+        """Wait on: the words of this speech, taken for the answer during the robot's turn, are a listener's.
+
+        False if it has not been taken for the answer.
+        """
+        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
+            return False
+        if (self.event.response, self._response_since) != ("speak", since):
+            return False
+        self.event.response, self.event.spoken = None, ()
+        self.step("was_listening", since)
+        return True
 
     def human_goes_on(self, action: Action, at: Seconds) -> bool:
         """Continue a person's first turn that had ended with another `action`. False if none waits for an answer."""

@@ -45,7 +45,7 @@ class Person:
     ) -> None:
         self.id = id
         self.number = number
-        self.presence = Presence(config.lost_face_grace)
+        self.presence = Presence()
         self.gaze = GazeState()
         self.directed: list[DirectedGaze] = []
         self.facial = MutualFacialGaze(writer)

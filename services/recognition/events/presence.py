@@ -1,25 +1,25 @@
 """Presence of a person: faces get lost and found again, and reports of it may come late or twice."""
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 NEVER: Seconds = float("-inf")
 
 
 class Presence:
-    """Presence of one person. grace: time for which a face may be lost before the person has gone."""
+    """Presence of one person."""
 
-    def __init__(self, grace: Seconds) -> None:
+    def __init__(self) -> None:
         self.here = True
         self.reported = False
         """True if perception has reported that the person is there, and so will report when that is over."""
-        self._grace = grace
         self._lost_at: Seconds | None = None
         self._found_last = self._seen_last = self._lost_last = self.left_at = NEVER
 
     @property
     def deadline(self) -> Seconds | None:
         """Time at which the person has gone, unless it is seen again before; then call `leave`."""
-        return None if self._lost_at is None else self._lost_at + self._grace
+        return None if self._lost_at is None else self._lost_at + FACE_GRACE
 
     def seen(self, at: Seconds) -> bool:
         """Take an observation at `at` that shows the person is there. False if it is from before the person left."""

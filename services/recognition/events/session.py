@@ -23,7 +23,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
-from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock
+from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Person
@@ -133,6 +133,8 @@ class Session:
                 if observation.is_line:
                     self.scene.lines[actor] = since
                 self._writer.understand(actor, since, observation.text, at)
+                if actor in self.persons:
+                    self._people.apply(actor, at, lambda person: person.conversation.understand(since))
             case RequestEvent():
                 self._request(observation, at)
             case SignalTurn():
@@ -265,7 +267,7 @@ class Session:
             cause=wanted.cause, optional=wanted.optional, block=request.block, behavior=wanted.id, turn=wanted.turn,
             request=request.id, limit=self._limit(wanted),
         )  # fmt: skip
-        self._writer.effects.append(Accepted(id=request.id, limit=event.limit))
+        self._writer.effects.append(Accepted(id=request.id, within=self._within(event, wanted)))
         self._live[request.id] = event
         self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, wanted))
         if event.request and not event.id:  # a bug has shown before the event could be published
@@ -319,6 +321,12 @@ class Session:
                 )
             case "backchannel":
                 return None
+
+    def _within(self, event: OngoingEvent, wanted: Event) -> Seconds:
+        """Longest time from the robot's last deed to the decision, also if the turn's end or anchors never come."""
+        offsets = [found[1] for text in wanted.anchors if (found := anchor(text)) is not None]
+        limit = max(event.limit or 0.0, self._config.backchannel_limit)
+        return limit + self._config.turn_patience + max([0.0, *offsets]) + self._config.sensing.settling
 
     def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock:
         assert event.limit is not None

@@ -26,6 +26,7 @@ from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, i
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import Voice
+from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 Raw = HeadPose | VoiceActivity | World | RobotState
 
@@ -46,15 +47,14 @@ class _Actor:
         self.reported: set[Action] = set()
         """Actions that perception reports itself."""
         self.presence_reported = False
-        self._grace = config.lost_face_grace
 
     @property
     def face_lost_at(self) -> Seconds | None:
-        return self.posed_at + self._grace if self.looking.nearest is not None else None
+        return self.posed_at + FACE_GRACE if self.looking.nearest is not None else None
 
     @property
     def lost_at(self) -> Seconds | None:
-        return self.alive_at + self._grace if self.seen and not self.presence_reported else None
+        return self.alive_at + FACE_GRACE if self.seen and not self.presence_reported else None
 
     @property
     def deadlines(self) -> Iterator[Seconds]:
