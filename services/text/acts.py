@@ -58,13 +58,17 @@ LISTS: Mapping[str, Any] = {
     "acts": frozenset(_ACTS),
     "wide": frozenset(_WIDE_ACTS),
     "quiet": frozenset(f"{_SOUNDS}{_MANNERS}".split()),
+    "alone": frozenset(("sigh", "gasp", "cough", "gulp", "yawn", "sniff", "groan", "giggle", "chuckle", "ahem")),
     "no_adverbs": frozenset(("only", "family", "early", "reply", "apply", "supply", "july", "italy", "really")),
 }
 """Words of the patterns below."""
 _NAMED = r"(?:clear(?:s|ing)|shak(?:es|ing)|tak(?:es|ing)|deep|long)\s(?:\w+\s){0,2}(?:throat|head|breath|pause)"
-_ADVERBS = r"(?:(?!\L<no_adverbs>\b)[a-z]+ly,?\s)*+"
+_OVER = r"(?![^\W_])"
+"""Behind a whole word."""
+_ADVERBS = rf"(?:(?!\L<no_adverbs>{_OVER})[a-z]+ly,?\s)*+"
 _MORE = r"(?:[\s,…]+[^\W\d_]++(?:['’-][^\W\d_]++)*+)"
-IN_BRACKETS = rf"{_ADVERBS}(?:{_NAMED}|\L<wide>\b{_MORE}{{0,7}}+|\L<quiet>\b{_MORE}{{0,2}}+)[\s…]*+"
-IN_PARENTHESES = rf"{_ADVERBS}(?:{_NAMED}|\L<acts>\b{_MORE}{{0,4}}+)[\s…]*+"
+IN_BRACKETS = rf"{_ADVERBS}(?:{_NAMED}|\L<wide>{_OVER}{_MORE}{{0,7}}+|\L<quiet>{_OVER}{_MORE}{{0,2}}+)[\s…]*+"
+_ALONE = r"\L<alone>(?=[)*_])"
+IN_PARENTHESES = rf"{_ADVERBS}(?:{_NAMED}|{_ALONE}|\L<acts>{_OVER}{_MORE}{{0,4}}+)[\s…]*+"
 """Longer ones are remarks."""
-IN_ASTERISKS = rf"{_ADVERBS}(?:{_NAMED}|\L<wide>\b{_MORE}{{0,7}}+)[\s…]*+"
+IN_ASTERISKS = rf"{_ADVERBS}(?:{_NAMED}|{_ALONE}|\L<wide>{_OVER}{_MORE}{{0,7}}+)[\s…]*+"

@@ -401,6 +401,7 @@ _INLINE = _table(
     ("(", mark.IN_ROUND, Reader._directed),
     ("【", mark.SOURCE, Reader._cited),
     ("<", mark.COMMENT, Reader._skips),
+    ("<", mark.TOKEN, Reader._skips),
     ("<", mark.AUTOLINK, Reader._address),
     ("<", mark.TAG, Reader._tag),
     ("[", mark.TASK, Reader._task),

@@ -10,7 +10,7 @@ from engage_hri.services.text.acts import IN_ASTERISKS, IN_BRACKETS, IN_PARENTHE
 
 THOUGHTS = frozenset({"think", "thinking", "thought", "thoughts", "reasoning", "reflection", "scratchpad"})
 """Elements in which models think, so that what is in them is not meant for the person."""
-UNSAID = THOUGHTS | {"script", "style", "template", "svg", "math"}
+UNSAID = THOUGHTS | {"script", "style", "template", "svg", "math", "tool_call", "function_call"}
 _BLOCKS = """
 address article aside blockquote body br dd details div dl dt figure figcaption footer form h1 h2 h3 h4 h5 h6 head
 header hr html li main nav ol p pre section summary table tbody td tfoot th thead tr ul speak break paragraph
@@ -22,6 +22,8 @@ BLOCKS = frozenset(_BLOCKS.split())
 _LETTER = r"[^\W_]"
 _ATTRIBUTE = r"\s+[A-Za-z_:][\w:-]*(?:\s*=\s*(?:\"[^\"]*\"|'[^']*'|[^\s\"'=<>`]+))?"
 TAG = rf"</?(?P<name>[A-Za-z][\w:-]*)(?:{_ATTRIBUTE})*\s*/?>"
+TOKEN = r"<\|[\w-]{1,40}\|>"
+"""Tokens that steer a model, and that it has let slip: `<|im_end|>`."""
 COMMENT = r"<(?:!--[\s\S]*?--|!\[CDATA\[[\s\S]*?\]\]|\?[\s\S]*?\?|![A-Za-z][^>]*)>"
 AUTOLINK = r"<(?P<address>[A-Za-z][A-Za-z0-9+.-]{1,31}:[^\s<>]*|[\w.+-]+@[\w-]+(?:\.[\w-]+)+)>"
 _NO_ADDRESS, _STOPS = r"\s<>\[\]*`|{}\"", ".,;:!?'_~&"
@@ -36,7 +38,9 @@ _LINK = rf"\(\s*(?:<[^<>\n]*>|(?!<)(?:[^\s()]|\([^\s()]*\))*)(?:\s+{_TITLE})?\s*
 LINK = rf"\]{_LINK}"
 LABEL = r"\]\[[^\[\]\n]{0,80}\]"
 _LABEL = r"\[(?P<label>[^\[\]\n^][^\[\]\n]{0,79})\]"
-DEFINITION = rf"(?<=\n){_LABEL}:[ \t]*(?:<[^<>\n]*>|[^\s<]\S*)(?:[ \t]+{_TITLE})?[ \t]*(?=\n)"
+_DESTINATION = r"(?:<[^<>\n]*>|(?=[^\s<]*(?:[:/#]|\.\w))[^\s<]\S*)"
+DEFINITION = rf"(?<=\n){_LABEL}:[ \t]*{_DESTINATION}(?:[ \t]+{_TITLE})?[ \t]*(?=\n)"
+"""Of a link, with what looks like an address: `[Robot]: Hello.` is words."""
 INDEX = rf"(?<=(?![{UNSPACED}])\w)"
 """Behind a name, where a bracket is an index: `array[0]`."""
 _NO_INDEX = rf"(?!{INDEX})"

@@ -97,6 +97,10 @@ def test_the_words_that_a_voice_says_are_those_of_a_parser_of_commonmark(seed: i
         ("Great 👍🏽 ℹ️ 20 °C", "Great 20 °C"),
         ("`<b>` is bold", "<b> is bold"),
         ("[docs][ref]\n\n[ref]: https://example.org 'title'\nend", "docs, end"),
+        ("*sigh* Well. _laughs_ No (cough) and (cough syrup)", "Well. No and (cough syrup)"),
+        ("Done.<|im_end|>", "Done."),
+        ('<tool_call>{"look": "cup"}</tool_call>Yes', "Yes"),
+        ("[Robot]: Hello.", "Robot: Hello."),
         ("Title\n=====\n\n---\ntext", "Title, text"),
     ],
 )
