@@ -54,7 +54,7 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
     " simulation study > client > recording > requests > runtime > bus > tangram text",
-    "services/text": "ear > marks > pieces > patterns > acts ends > abbreviations",
+    "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
     "services/bus": "memory zenoh > interface > payloads subscription > samples > answering config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"

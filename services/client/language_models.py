@@ -10,15 +10,15 @@ the other.
 """
 
 import asyncio
-from collections.abc import AsyncIterable, Callable
-from contextlib import suppress
+from collections.abc import AsyncIterable, AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
-from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment, TurnStatus
+from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment, TurnStatus
 from engage_hri.schemas.summary import Summary, refusal, summary, unknown
 from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
@@ -87,20 +87,21 @@ async def stream(
     Raises:
         InputRefused: `pieces` cannot be followed, and nothing was said; or one of them is neither text nor a part,
             and the turn is broken off there.
-        ExceptionGroup: holds what `pieces` raised.
+        Exception: what `pieces` raised.
     """
     if not isinstance(pieces, AsyncIterable):
         raise InputRefused(_unreadable(f"{type(pieces).__name__!r} is no asynchronous iterable of pieces", id))
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
-        async with asyncio.TaskGroup() as tasks:
+        async with speaking.watched(), asyncio.TaskGroup() as tasks:
             read = _read(robot, pieces, chunker or Chunker(), speaking)
             reading = tasks.create_task(read, name=f"read {id}")
             speaking.begin(tasks, reading)
     except BaseException as error:
         speaking.break_off()
-        if isinstance(error, BaseExceptionGroup) and isinstance(error.exceptions[0], _NoPiece):
-            raise InputRefused(error.exceptions[0].fault) from None
+        if isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
+            only = error.exceptions[0]
+            raise (InputRefused(only.fault) if isinstance(only, _NoPiece) else only) from only.__cause__
         raise
     await speaking.leave_no_turn_open()
     return speaking.outcomes
@@ -170,6 +171,25 @@ class _Speaking:
         """Ids of the fragments with a task that has begun, and so has sent its request."""
         self._is_finished = False
         self._last = ""
+        self._closed: TurnClosed | None = None
+        """Set when the turn was aborted while no piece came."""
+
+    @asynccontextmanager
+    async def watched(self) -> AsyncIterator[None]:
+        """Read no more as soon as the turn is over, though no fragment is: somebody spoke while no piece came."""
+        with self._robot.turns() as turns:
+            watching = asyncio.create_task(self._watch(turns), name=f"turn {self.id}")
+            try:
+                yield
+            finally:
+                watching.cancel()
+                await asyncio.gather(watching, return_exceptions=True)
+
+    async def _watch(self, turns: Feed[TurnClosed]) -> None:
+        async for closed in turns:
+            if closed.turn == f"{self.id}-1" and closed.status == "aborted" and not self._reading.done():
+                self._closed = closed
+                self._reading.cancel()
 
     def begin(self, tasks: asyncio.TaskGroup, reading: "asyncio.Task[None]") -> None:
         self._tasks = tasks
@@ -178,6 +198,13 @@ class _Speaking:
     @property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
         outcomes = [task.result() for task in self._performing]
+        if (closed := self._closed) is not None and {each.status for each in outcomes} == {"done"}:
+            id, fault = self._fragment((), "end").id, Fault(reason=closed.reason, where=self.id)
+            outcomes.append(
+                FragmentOutcome(
+                    id=id, fragment=id, status="interrupted", events=closed.events, heard=closed.heard, fault=fault
+                )
+            )
         if outcomes and self.left_out:
             told = tuple(dict.fromkeys((*outcomes[-1].warnings, *self.left_out)))
             outcomes[-1] = replace(outcomes[-1], warnings=told)

@@ -51,7 +51,7 @@ _Said = Answer | None
 
 SHORTEST_PULSE: Seconds = 0.05
 """Least time between two `KeepAlive`, whatever the lease: a shorter one would flood the bus."""
-ANEW = "send it again under a new id"
+ANEW = "if it is to be done again, send it under a new id"
 
 # Members that are used with each message: an enum is slow to look one up.
 _SENT, _ENDED, _FINISHED = State.SENT, State.ENDED, Event.FINISHED

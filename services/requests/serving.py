@@ -322,7 +322,11 @@ class Serving:
         self._answer(record, now, Refused(id=record.name, fault=fault))
 
     def _refuse_forgotten(self, record: Record, now: Seconds, cause: _Cause) -> None:
-        self._refuse(record.request, f"{self._server} does not know it any more", "send it again under a new id")
+        self._refuse(
+            record.request,
+            f"{self._server} does not know it any more",
+            "if it is to be done again, send it under a new id",
+        )
 
     def _warn_different(self, record: Record, now: Seconds, cause: _Cause) -> None:
         which = "an ended" if record.state is _ENDED else "a live"

@@ -211,7 +211,7 @@ class _PlannedObservations:
                 turn_ends,
             )
         if not event.succeeds:
-            yield from self._does(EXPLAINER, "speak", *(event.decided + each for each in GOES_ON))
+            yield from self._does(EXPLAINER, "speak", event.decided + GOES_ON[0], event.decided + GOES_ON[1])
             return
         responder = self._other(event.initiator)
         if event.task_until is not None:

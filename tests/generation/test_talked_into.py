@@ -7,9 +7,9 @@ from contextlib import AsyncExitStack, asynccontextmanager
 import pytest
 
 from engage_hri import perceive
-from engage_hri.schemas.summary import Summary
+from engage_hri.schemas.summary import Summary, summary
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.language_models import perform_call
+from engage_hri.services.client.language_models import perform_call, stream
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import load
@@ -163,3 +163,50 @@ async def test_who_is_gone_for_longer_has_left(hub: MemoryHub) -> None:
     told = await lost(hub, [(2.0, 6.0)], answer_at=9.0)
 
     assert told.answer == "none"
+
+
+# -- while nobody has written the next piece -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["typed", "said"])
+@pytest.mark.parametrize("after", [2.0, 3.0, 4.5])
+async def test_who_speaks_while_the_writer_thinks_is_heard(hub: MemoryHub, how: str, after: float) -> None:
+    read_on = False
+
+    async def pieces() -> AsyncIterator[str]:
+        nonlocal read_on
+        yield "One moment please. "
+        await asyncio.sleep(8.0)
+        read_on = True
+        yield "Here it is. "
+
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        began = client.now()
+        streaming = asyncio.create_task(stream(client, pieces(), id="s"))
+        await asyncio.sleep(after)
+        await (ann.type("wait, which one?") if how == "typed" else ann.say("wait, which one?", seconds=1.2))
+        told = summary(*await streaming)
+        took = client.now() - began
+
+    assert (told.status, told.said) == ("interrupted", "One moment please.")
+    assert [each.text for each in told.heard] == ["wait, which one?"]
+    assert any("ann took the floor" in each for each in told.problems), told.problems
+    assert took < 8.0
+    assert not read_on
+
+
+async def test_a_writer_who_is_silent_for_too_long_is_told_so(hub: MemoryHub) -> None:
+    async def pieces() -> AsyncIterator[str]:
+        yield "One moment please. "
+        await asyncio.sleep(20.0)
+        yield "Here it is. "
+
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        told = summary(*await stream(client, pieces(), id="s"))
+
+    assert told.status == "interrupted"
+    assert any("silence for 10 s" in each for each in told.problems), told.problems

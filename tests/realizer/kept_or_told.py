@@ -97,6 +97,8 @@ def _time(term: Term, told: Told) -> float | None:
     place = term.place
     if not place.behavior:
         return term.offset if place.sync == "start" else None
+    if place.number > 1:
+        return None  # Feedback tells of the first of repeated strokes only.
     at = told.times.get(f"{place.behavior}:{place.sync}")
     return None if at is None else at + term.offset
 
@@ -121,11 +123,12 @@ def _warned(one: Term, other: Term, gap: float, told: Told) -> float | None:
 
 # -- pairs of one type -----------------------------------------------------------------------------------------------
 
+BEAT = 'gesture id="{id}" lexeme="BEAT" mode="LEFT_HAND"'
 SEVEN = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
 FOUR = ("start", "ready", "relax", "end")
-PAIRS = {
+PAIRS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "head": (SEVEN, 'head id="{id}" lexeme="NOD"', 'head id="{id}" lexeme="NOD"'),
-    "gesture": (SEVEN, *['gesture id="{id}" lexeme="BEAT" mode="LEFT_HAND"'] * 2),
+    "gesture": (SEVEN, BEAT, BEAT),
     "gaze": (FOUR, 'gaze id="{id}" target="box"', 'gaze id="{id}" target="cup"'),
 }
 """Points of each type, and two behaviors of it."""

@@ -6,7 +6,7 @@ looked there. The oracle knows looks, words, gestures and signals; of recognitio
 
 import random
 
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from msgspec import Struct
 
@@ -259,6 +259,11 @@ rounds = st.builds(Round, st.booleans(), st.integers(5, 40).map(lambda tenths: 0
 @given(st.lists(rounds, min_size=1, max_size=4))
 def test_the_delay_of_an_answer_is_from_the_end_of_the_turn(rounds):
     stream = [seen for number, one in enumerate(rounds) for seen in one.stream(f"turn-{number}", 30.0 * number + 1.0)]
+    for number, at in enumerate(30.0 * each + 29.0 for each in range(len(rounds))):
+        # The robot says a word between the rounds: else the next turn of the person would be a late answer.
+        for kind, when in ((ActionBegan, at), (ActionEnded, at + 0.3)):
+            stream.append((when, kind(actor=ROBOT, action="speak", at=stamp(when), behavior=f"word-{number}")))
+    stream.sort(key=lambda observed: observed[0])
     found = lives(stream, "adjacency_pair")
 
     for number, one in enumerate(rounds):
@@ -270,3 +275,41 @@ def test_the_delay_of_an_answer_is_from_the_end_of_the_turn(rounds):
             assert (life.decided.state, life.decided.response) == ("succeeded", one.answer.action)
             assert close(life.decided.delay, one.answer.at - one.lasts)
             assert life.completed is not None
+
+
+@settings(max_examples=150, deadline=None)
+@given(rounds, st.lists(st.tuples(st.booleans(), st.integers(5, 150), st.integers(2, 15)), max_size=4))
+def test_the_first_answer_after_the_limit_is_late_unless_the_robot_has_spoken_since(one, after):
+    """after: further words of robot or person, each some tenths of a second after the last, and how long."""
+    limit = 1.0 + one.lasts + CONFIG.adjacency_pair_limit
+    stream, at, words = one.stream("turn", 1.0), limit + 12.0, []
+    for number, (by_robot, pause, lasts) in enumerate(after):
+        at += 0.1 * pause + 0.0113
+        actor = ROBOT if by_robot else "ann"
+        words.append((at, actor))
+        for kind, when in ((ActionBegan, at), (ActionEnded, at + 0.1 * lasts)):
+            stream.append((when, kind(actor=actor, action="speak", at=stamp(when), behavior=f"after-{number}")))
+        at += 0.1 * lasts
+    assume(max([seen[0] for seen in one.stream("turn", 1.0)]) < limit + 12.0)
+    stream.sort(key=lambda observed: observed[0])
+    session = Session(ROBOT, CONFIG)
+    session.feed(world(*PEOPLE), 0.0)
+    told = [effect for at, seen in stream for effect in session.feed(seen, at)] + session.advance(1e4)
+    pairs = [effect for effect in told if isinstance(effect, ConnectionEvent) and effect.kind == "adjacency_pair"]
+    late = [effect for effect in pairs if effect.retold]
+
+    if not one.by_robot or one.answer is not None:
+        assert late == []
+        return
+    # Of the round itself: what begins after the limit while the robot is silent, and has been since.
+    spoken = [(1.0 + one.lasts + word.at, word.lasts) for word in one.further]
+    done = [(1.0 + act.at, "ann", act.action) for act in one.acts] + [(at, ROBOT, "speak") for at, _ in spoken]
+    done += [(at, actor, "speak") for at, actor in words]
+    since = [(at, actor, action) for at, actor, action in sorted(done) if at > limit]
+    is_muddled = any(at + lasts > limit for at, lasts in spoken)
+    if is_muddled:  # the robot talks over the limit: what is short then is a backchannel
+        return
+    first = since[0] if since else None
+    assert [(each.response, round(each.delay or 0.0, 6)) for each in late] == (
+        [(first[2], round(first[0] - 1.0 - one.lasts, 6))] if first and first[1] != ROBOT else []
+    )

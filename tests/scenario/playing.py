@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.collaboration.config import CollaborationConfig
@@ -28,8 +29,6 @@ from tests.bus.faulty import Faults, FaultyHub
 
 LIMIT = 900.0
 """Seconds of virtual time: nothing in the scenario takes so long."""
-LAST_ANSWER = 5.0
-"""Seconds after the goodbye in which the last events end: an answer may come for 4 s, who has left is gone in 2."""
 
 
 class Record:
@@ -71,11 +70,12 @@ async def play(
     habits: Habits | None = None,
     sensors: SimulationConfig | None = None,
     control: ControlConfig | None = None,
+    after: Seconds = 0.0,
     **manager: Any,
 ) -> Record:
     """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
     sensors: how person and table are perceived; exactly, by default. control: in place of the torso with `noise`.
-    manager: its configuration.
+    after: how long the robot and the person go on then. manager: its configuration.
     """
     received: list[Received] = []
     finished = asyncio.Event()
@@ -100,7 +100,7 @@ async def play(
             async with running(hub, services):
                 async with asyncio.timeout(LIMIT):
                     await finished.wait()
-                await asyncio.sleep(LAST_ANSWER)
+                    await asyncio.sleep(after)
             while len(inbox) and (it := await inbox.next()):
                 received.append(it)
     return Record(received)

@@ -12,12 +12,19 @@ ENDS = {"completed", "failed", "preempted", "withdrawn", "superseded"}
 
 
 async def plays(seed: int, condition: Condition = "operational", habits: Habits | None = None) -> Record:
-    return await play("stochastic", "object", seed, condition=condition, habits=habits, mode="task")
+    return await play("stochastic", "object", seed, condition=condition, habits=habits, mode="task", after=12.0)
 
 
 def placed(record: Record) -> int:
     """How many of the ten pieces are where they belong at the end."""
     return len(Goal(tangram_table()).placed(record.messages(World)[-1].objects))
+
+
+def left_open(record: Record) -> list[str]:
+    """Events that began ten seconds before the end and have not ended: a pair may wait for 4 s."""
+    lives = record.events
+    over = max(life[-1].at.seconds for life in lives.values())
+    return [id for id, life in lives.items() if life[-1].state not in ENDS and life[0].at.seconds < over - 10.0]
 
 
 def times_asked_again(record: Record) -> int:
@@ -29,7 +36,7 @@ async def test_the_anchor_is_made_and_nothing_stays_open():
 
     assert "goodbye" in record.outcomes
     assert placed(record) == 10
-    assert all(life[-1].state in ENDS for life in record.events.values())
+    assert left_open(record) == []
 
 
 async def test_words_alone_are_enough():
@@ -47,4 +54,4 @@ async def test_who_gets_nearly_everything_wrong_is_asked_again_and_again():
 
     assert times_asked_again(record) > 4
     assert "goodbye" in record.outcomes
-    assert all(life[-1].state in ENDS for life in record.events.values())
+    assert left_open(record) == []

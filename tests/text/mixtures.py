@@ -73,8 +73,9 @@ def _texts(tokens: list[Token]) -> list[str]:
 class Maker:
     """Maker of mixtures. Each part returns what is written, and what the oracle is to see of it."""
 
-    def __init__(self, random: Random) -> None:
+    def __init__(self, random: Random, *, with_references: bool = True) -> None:
         self.random = random
+        self.with_references = with_references
         self.named: list[str] = []
 
     def mixture(self) -> Mixture:
@@ -106,7 +107,7 @@ class Maker:
         ]  # fmt: skip
         if pick < 0.65:
             return self.random.choice(simple)
-        if pick < 0.75:
+        if pick < 0.75 and self.with_references:
             id = self.random.choice(OBJECTS)
             self.named.append(id)
             return f"[{id}{'!' if self.random.random() < 0.2 and id != 'cup' else ''}]", ""

@@ -25,8 +25,8 @@ MISSED = (
     "L'ing. Neri lavora a Roma. | Torna lunedì.",
     "A Dra. Costa ligou às 10 h. | Volte mais tarde.",
 )
-"""Ten of 343: a pause at `...` does no harm, and others cost too many other sentences. The table was not changed after
-`unseen.txt` was written, to say how good it is on sentences that it has not seen."""
+"""Ten of 343: a pause at `...` does no harm, and others cost too many other sentences. The table is as it was before
+`unseen.txt` was written, so that this says how good it is on sentences that it has not seen."""
 
 
 def sentences(text: str) -> list[str]:

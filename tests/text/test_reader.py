@@ -7,6 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.behaviors import Speech
+from engage_hri.services.control.body import Spoke
+from engage_hri.services.control.spoken import progress_of, spoken
+from engage_hri.services.control.voice.timeline import uttered
 from engage_hri.services.text.ear import heard, is_spoken, said
 from engage_hri.services.text.marks import Reader
 from engage_hri.services.text.pieces import Ids, Piece, problems
@@ -43,8 +47,23 @@ def test_letters_are_those_of_a_parser_of_commonmark_in_whatever_bits_a_text_com
         assert tuple(each.text for each in pieces if each.kind == "refer") == mixture.named, (number, mixture.text)
 
 
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+def test_the_words_that_a_voice_says_are_those_of_a_parser_of_commonmark(seed: int) -> None:
+    for number in range(seed * 50, seed * 50 + 50):
+        mixture = Maker(Random(number), with_references=False).mixture()
+        speech = Speech(id="s", text=mixture.text)
+        asked = spoken(speech)
+        assert isinstance(asked, Speech)
+        words = uttered(asked).words
+        told = [progress_of(speech, Spoke(each.text, each.position, 0.0)).position for each in words]  # type: ignore[union-attr]
+
+        assert letters("".join(each.text for each in words)) == letters(plain_text(mixture.plain)), mixture.text
+        assert told == sorted(told)
+        assert not told or told[-1] == len(mixture.text)
+
+
 @pytest.mark.parametrize(
-    ("text", "spoken"),
+    ("text", "words_of_it"),
     [
         ("**Bold** words and `code` here", "Bold words and code here"),
         ("* star\n* moon", "star, moon"),
@@ -81,8 +100,8 @@ def test_letters_are_those_of_a_parser_of_commonmark_in_whatever_bits_a_text_com
         ("Title\n=====\n\n---\ntext", "Title, text"),
     ],
 )
-def test_what_is_for_the_eye_is_not_said(text: str, spoken: str) -> None:
-    assert " ".join(heard(text).text.split()) == spoken
+def test_what_is_for_the_eye_is_not_said(text: str, words_of_it: str) -> None:
+    assert " ".join(heard(text).text.split()) == words_of_it
 
 
 @pytest.mark.parametrize(

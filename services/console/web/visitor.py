@@ -174,7 +174,9 @@ class Visitor:
                 if not parts and not target:
                     advice = "; ".join(left_out) or "write words, or choose an object"
                     raise InputRefused(Fault(reason="nothing to say", advice=advice))
-                self._drives(self._perform(script.told(parts, target, asks, addressee), left_out))
+                if left_out:
+                    self.receipts.tell("wizard", "; ".join(left_out))
+                self._drives(self._perform(script.told(parts, target, asks, addressee)))
             case orders.Prepared(number=number, addressee=addressee):
                 if number >= len(self._window.script):
                     raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))
@@ -204,15 +206,13 @@ class Visitor:
     def _drives(self, work: Coroutine[Any, Any, None]) -> None:
         self._begin(work, "wizard")
 
-    async def _perform(self, thing: Any, left_out: tuple[str, ...] = ()) -> None:
-        """Perform a fragment or a block. left_out: what of a typed line is not said."""
+    async def _perform(self, thing: Any) -> None:
         if isinstance(thing, Block):
             await self._window.robot.realize(thing, timeout=PATIENCE)
             return
         fragment = fragment_in(thing, self._window.new_id())
         outcome = await self._window.robot.perform(fragment, timeout=PATIENCE)
-        problems = (*left_out, *(summary(outcome).problems if isinstance(outcome, FragmentOutcome) else ()))
-        if problems:
+        if isinstance(outcome, FragmentOutcome) and (problems := summary(outcome).problems):
             self.receipts.tell("wizard", "; ".join(problems))
 
     async def _steered(self, verb: str, work: Coroutine[Any, Any, tuple[str, ...]]) -> None:

@@ -15,8 +15,8 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.turns.listening import is_listening
 from engage_hri.services.runtime.action_reports import FACE_GRACE
+from engage_hri.services.text.listening import is_listening
 
 LONGEST_LISTENING: Seconds = 3.0
 """Seconds of nothing but a listener's words, such as "yes, yes, okay", after which their speaker takes the floor."""

@@ -5,7 +5,7 @@ from itertools import pairwise
 from math import inf
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.foresee.expectations import NOTICEABLE, Expectations, Pace
+from engage_hri.services.realizer.foresee.expectations import NOTICEABLE, SURPRISE, Expectations, Pace
 from engage_hri.services.realizer.foresee.forecast import Forecast
 from engage_hri.services.realizer.foresee.from_scratch import full_forecast
 from engage_hri.services.realizer.foresee.outlook import Outlook
@@ -63,9 +63,9 @@ class Foresight(Expectations):
                 if point is points[number] and not self.paces.get(behavior):
                     natural = max(natural, self.not_before.get(behavior, natural))  # overdue, not slower on purpose
                 at = max(natural, now) if facts.holds(point) else natural
-                if forecast.times[here] > natural + NOTICEABLE and self._net.part_of[point].kind == "passive":
+                if forecast.times[here] > natural + SURPRISE and self._net.part_of[point].kind == "passive":
                     at = max(natural, min(forecast.times[here], latest))
-                    is_paced = is_paced or at > natural + NOTICEABLE
+                    is_paced = is_paced or at > natural + SURPRISE
                 if behavior in self.may_be_slower and self._net.part_of[point].can_wait and may_pass(point):
                     is_paced = is_paced or forecast.times[here] > at + EPSILON
                     at = max(at, min(forecast.times[here], at + slack(plan, point)))

@@ -1,4 +1,20 @@
-"""Agreement of a plan with what the body says about it: each answer may make another plan, with another answer."""
+"""Agreement of a plan with what the body says about it: each answer may make another plan, with another answer.
+
+A plan is made with what the body promises of each phase: its natural time, and how short and how long it can be.
+What a phase takes in truth depends on how the behavior comes to it, so on the plan. The body rehearses each plan, and
+its answer is what the next plan is made with. Two things can happen.
+
+- They agree: the answer is what the plan was made with. The body can keep this plan.
+- They never agree: each answer makes the plan that calls for the other. Then what each plan comes to is computed from
+  the answer to it (`as_told`), and with it what that plan would miss.
+
+The search goes from later to faster, from there to told late, and from there to dropped. The net lets behaviors wait
+and dawdle before any hurries (`predict`). If the best plan misses what the block says, the block is planned in the
+next manner (`manner.py`): times may be missed by as little as can be, then behaviors also stand before they hurry. Of
+all plans in all manners the one is taken that misses least, where the doubt that is left counts as missed. It is told
+LATE before anything moves. A behavior is dropped only if the first promise left no time for it, or if there is no
+such plan.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf
@@ -10,6 +26,7 @@ from engage_hri.schemas.body import Estimate, EstimateBehaviors, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.manner import AT_EASE, Manner
+from engage_hri.services.realizer.plan.outcome import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE
 from engage_hri.services.realizer.plan.slack import UNNOTICED
@@ -32,23 +49,22 @@ class Rounds:
 
     def __init__(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
         self.manner = AT_EASE
+        self._tried: list[tuple[Seconds, Plan]] = []
+        """Plans as the body would perform them: what each misses, and by how much the body may still err."""
         self._begin(question, first)
         self._first = question, first
         self._believing: Plan | None = None
         """The first plan: it believes all that the body has promised."""
-        self._settled: Plan | None = None
-        """The last plan that is right but for phases that cannot be hurried so."""
         self._refuted: set[Point] = set()
         """Hold points behind which a phase took longer than the body had promised."""
-        self._agreed: list[Plan] = []
-        """Plans that the body can keep and that miss something, each in a manner of its own."""
         self._is_resigned = False
 
     def _begin(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
         self.estimates = first
         self.turns: frozenset[Turn] = frozenset()
         self._answers = [(question, first)]
-        self._nearest: tuple[Seconds, Plan] | None = None
+        self._begun = len(self._tried)
+        """Number of plans that were tried in other manners."""
         self._has_jumped = False
         self._is_free = False
 
@@ -65,22 +81,21 @@ class Rounds:
 
         None: plan once more, with `estimates`.
         """
-        if self.turns and self._nearest is not None and len(plan.dropped) > len(self._nearest[1].dropped):
+        tried = self._tried[self._begun :]
+        if self.turns and tried and len(plan.dropped) > len(min(tried, key=_badness)[1].dropped):
             self.let_go()
             return None
         self._believing = self._believing or plan
         off = difference(self.estimates, told)
         if len(plan.dropped) > len(self._believing.dropped) and not self._is_resigned:
             return self.give_way()
-        if max(off) <= NOTICEABLE:
-            return self._close(plan)
+        is_agreed = max(off) <= NOTICEABLE
+        outcome = plan if is_agreed else as_told(plan, told)
+        self._tried.append((outcome.lateness + max(off), outcome))
+        if is_agreed or len(self._answers) > MOST:
+            best = outcome if is_agreed else min(self._tried[self._begun :], key=_badness)[1]
+            return best if self._is_resigned or best.lateness <= UNNOTICED else self.give_way()
         self._refuted.update(_refuted(plan, self.estimates, told))
-        if off.natural <= NOTICEABLE and not plan.manner.may_be_late:
-            self._settled = self._settled or plan
-        if self._nearest is None or max(off) < self._nearest[0]:
-            self._nearest = max(off), plan
-        if len(self._answers) > MOST:
-            return self._close(self._nearest[1])
         # The same question again: its answer is tried once as it is.
         is_settled = self._answers[-1][0] == question and not self._has_jumped
         is_early = len(self._answers) < STRAIGHT + 1
@@ -91,13 +106,6 @@ class Rounds:
         earlier = [answer for _, answer in self._answers[-SURE:-1]]
         self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, earlier)
         return None
-
-    def _close(self, plan: Plan) -> Plan | None:
-        """Take a plan that the body can keep, unless it misses something and another manner may miss less."""
-        if plan.lateness > UNNOTICED:
-            self._agreed.append(plan)
-            return self.give_way()
-        return plan
 
     @property
     def can_give_way(self) -> bool:
@@ -114,14 +122,16 @@ class Rounds:
             self.manner = Manner(may_be_late=True, lost=lost)
         elif stands - self.manner.stands and not self.manner.stands:
             self.manner = replace(self.manner, stands=stands)
-        elif self._agreed:
-            return min(self._agreed, key=lambda plan: plan.lateness)
-        elif self._settled is not None:
-            return self._settled
+        elif self._tried:
+            return min(self._tried, key=_badness)[1]
         else:
             self.manner, self._is_resigned = AT_EASE, True
         self._begin(*self._first)
         return None
+
+
+def _badness(tried: tuple[Seconds, Plan]) -> Seconds:
+    return tried[0]
 
 
 def _refuted(plan: Plan, before: Sequence[Estimate], after: Sequence[Estimate]) -> Iterator[Point]:

@@ -4,6 +4,7 @@ A manager that streams blocks cannot know whether the one that it names still ru
 has ended stays known for a while; the time and the number are bounded, so that nothing grows.
 """
 
+from collections import OrderedDict
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -22,7 +23,7 @@ class Past(Generic[Ended]):
 
     def __init__(self, now: Callable[[], Seconds]) -> None:
         self._now = now
-        self._ended: dict[str, tuple[Seconds, int, Ended]] = {}
+        self._ended: OrderedDict[str, tuple[Seconds, int, Ended]] = OrderedDict()
         """When it ended, its size, and itself; in the order of the ends."""
         self._size = 0
 
@@ -32,10 +33,11 @@ class Past(Generic[Ended]):
         self._ended[id] = (self._now(), size, thing)
         self._size += size
         gone = list[Ended]()
-        for each, (at, _, before) in list(self._ended.items()):
+        while self._ended:
+            oldest, (at, _, before) = next(iter(self._ended.items()))
             if at >= self._now() - LASTING and self._size <= MOST:
                 break
-            self.take_out(each)
+            self.take_out(oldest)
             gone.append(before)
         return gone
 

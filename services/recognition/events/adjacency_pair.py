@@ -32,6 +32,7 @@ TABLE = table(
     Row(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
     Row(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
     Row(INTERRUPTED, "turn_ends", RESPONDING, ("succeeded",)),
+    Row(INTERRUPTED, "was_listening", ROBOT_WAITING),
     Row(RESPONDING, "response_ends", IDLE, ("completed",)),
     Row(RESPONDING, "repaired", IDLE, ("completed",)),
     Row(RESPONDING, "supersede", IDLE, ("completed",)),
@@ -215,6 +216,19 @@ class AdjacencyPair(Machine):
         if self.event is None or self.state != INTERRUPTED or not self._by_robot:
             return False
         return at < self._response_since and action in self.event.accept
+
+    def was_listening(self, since: Seconds) -> bool:
+        """Wait on: the words of this speech, taken for the answer during the robot's turn, are a listener's.
+
+        False if it has not been taken for the answer.
+        """
+        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
+            return False
+        if (self.event.response, self._response_since) != ("speak", since):
+            return False
+        self.event.response, self.event.spoken = None, ()
+        self.step("was_listening", since)
+        return True
 
     def human_goes_on(self, action: Action, at: Seconds) -> bool:
         """Continue a person's first turn that had ended with another `action`. False if none waits for an answer."""

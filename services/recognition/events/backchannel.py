@@ -15,6 +15,7 @@ TABLE = table(
     Row(IDLE, "announced", BRIEF, ("started", "succeeded")),
     Row(UNDECIDED, "ends", IDLE, ("started", "succeeded", "completed")),
     Row(UNDECIDED, "limit", IDLE),
+    Row(UNDECIDED, "words", IDLE),
     Row(UNDECIDED, "outlasts_turn", IDLE),
     Row(UNDECIDED, "announced", BRIEF, ("started", "succeeded")),
     Row(UNDECIDED, "person_gone", IDLE),
@@ -79,7 +80,7 @@ class Backchannel(Machine):
         self.last = (event.started, event.id)
 
     def takes_floor(self, given: str, at: Seconds) -> Seconds:
-        """Drop speech that turns out to be a turn (given: `limit` or `outlasts_turn`). Returns its start."""
+        """Drop speech that turns out to be a turn (given: `limit`, `words` or `outlasts_turn`). Returns its start."""
         assert self.event is not None
         started = self.event.started
         self.step(given, at)

@@ -13,9 +13,7 @@ from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED,
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
-
-WORDS_KNOWN: Seconds = 2.0
-"""Time after a short speech in which its words may show that it took the floor: a "stop" cuts the turn off."""
+from engage_hri.services.text.listening import is_listening
 
 
 class Conversation:
@@ -33,9 +31,8 @@ class Conversation:
         self.own_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.robot_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self._speech_confidence: Probability = 1.0
-        self._brief_since: Seconds = 0.0
-        self._brief_until: Seconds | None = None
-        """End of the person's last speech, if that was short and within the robot's turn."""
+        self._brief: tuple[Seconds, Seconds | None] | None = None
+        """Beginning and end of the person's last speech within the robot's turn, if it has been no answer so far."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -95,7 +92,7 @@ class Conversation:
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
             event = self._backchannel(self._scene.robot, self.id, at, confidence)
             event.spoken = (at,)
-            self._brief_until = None
+            self._brief = None
             self.own_backchannel.speaks(event)
         else:
             self._human_turn(at, "speak", confidence)
@@ -105,11 +102,37 @@ class Conversation:
             return
         self.speaks_since, self.silent_since = None, at
         self._scene.falls_silent(self.id, at)
-        self._brief_until = at if self.own_backchannel.state == UNDECIDED else None
-        self._brief_since = self.own_backchannel.undecided_since or at
+        since = self.own_backchannel.undecided_since
+        words = "" if since is None else self._writer.text_of(self.id, since)
+        if words and self.pair.robot_holds_turn and not is_listening(words):
+            self._takes_floor(at, "words")
+        elif since is not None:
+            self._brief = since, at
         self._backchannel_speech_ends(self.own_backchannel, at)
         self._floor_is_free(at)
         self._ends("speak", at, by_robot=False)
+
+    def understand(self, since: Seconds) -> None:
+        """Judge speech within the robot's turn by its words, if they are known before the turn is over.
+
+        Until then its length has decided: a "stop" was too short for an answer, and "yes, yes, okay" too long for a
+        backchannel.
+        """
+        words, pair = self._writer.text_of(self.id, since), self.pair
+        if not words or not pair.robot_holds_turn:
+            return
+        if is_listening(words):
+            if pair.was_listening(since):
+                self._brief = since, self.silent_since
+                event = self._backchannel(self._scene.robot, self.id, since, self._speech_confidence)
+                event.spoken = (since,)
+                self.own_backchannel.gestures(event)
+                if self.silent_since is not None:
+                    self.own_backchannel.ends(self.silent_since)
+        elif self._brief is not None and self._brief[0] == since:
+            is_answer = pair.human_begins("speak", since, self._speech_confidence)
+            if is_answer and self._brief[1] is not None:
+                pair.ends("speak", self._brief[1], by_robot=False)
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a nod or a shake of the person."""
@@ -232,7 +255,9 @@ class Conversation:
 
     def _takes_floor(self, at: Seconds, given: str = "limit") -> None:
         """Turn the person's undecided speech into a turn since the speech began."""
-        self._human_turn(self.own_backchannel.takes_floor(given, at), "speak", self._speech_confidence)
+        since = self.own_backchannel.takes_floor(given, at)
+        self._human_turn(since, "speak", self._speech_confidence)
+        self.understand(since)
 
     def turn_ended(self, turn: str, at: Seconds) -> None:
         if self.pair.is_turn(turn):
@@ -253,11 +278,6 @@ class Conversation:
         """
         if self.pair.is_turn(turn):
             self._keep_floor(at)
-            # Its words may have been known only after the short speech was over, and told as a backchannel.
-            asked, until = self.pair.event, self._brief_until
-            if asked and until is not None and self._brief_since >= asked.started and at <= until + WORDS_KNOWN:
-                self.pair.human_begins("speak", self._brief_since, self._speech_confidence)
-                self.pair.ends("speak", until, by_robot=False)
             self.pair.abort(at)
             self._floor_is_free(at)
 

@@ -183,6 +183,10 @@ class EventWriter:
                 self._spoken[event.id] = (event, told)
                 self.effects.append(told)
 
+    def text_of(self, person: str, speech: Seconds) -> str:
+        """Words of a speech, as far as they are known; "": none."""
+        return self._texts.get((person, speech), "")
+
     def _forget_spoken(self, at: Seconds) -> None:
         """Forget the events that are not told again, whatever may become known of their words."""
         while self._spoken:

@@ -133,6 +133,8 @@ class Session:
                 if observation.is_line:
                     self.scene.lines[actor] = since
                 self._writer.understand(actor, since, observation.text, at)
+                if actor in self.persons:
+                    self._people.apply(actor, at, lambda person: person.conversation.understand(since))
             case RequestEvent():
                 self._request(observation, at)
             case SignalTurn():

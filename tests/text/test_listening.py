@@ -6,8 +6,8 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.turns.listening import is_listening
 from engage_hri.services.generation.turns.policy import LONGEST_LISTENING, TurnPolicy
+from engage_hri.services.text.listening import is_listening
 
 LISTENING = (
     "uh-huh", "Yes.", "yes yes okay", "hm hm hm hm", "Hmmm, mm-hmm!", "All right, I see.", "ja genau", "ach so",
