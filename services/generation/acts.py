@@ -80,12 +80,12 @@ def reasons(outcome: BlockOutcome) -> Mapping[str, str]:
 class Rest(Struct, frozen=True):
     """Rest of a fragment, and of its turn, after a block that was cut.
 
-    again: references that are chosen again, each with the gestures that failed, and why.
+    failed: gestures, `gaze` and `point`, that failed for each object that is chosen again, and why.
     """
 
     fragment: TurnFragment
     turn: TurnPlan
-    again: Mapping[str, Mapping[str, str]]
+    failed: Mapping[str, Mapping[str, str]]
 
 
 def rest_of(fragment: TurnFragment, turn: TurnPlan, act: Act, outcome: BlockOutcome) -> Rest | None:
@@ -96,11 +96,10 @@ def rest_of(fragment: TurnFragment, turn: TurnPlan, act: Act, outcome: BlockOutc
     why = reasons(outcome)
     lost = {*outcome.dropped, *outcome.interrupted}
     fallen = {each.phrase for each in act.plan.made if each.falls and each.phrase in lost}
-    gone = {each.phrase: [id for id in each.gestures if id in lost] for each in act.plan.made}
     cut = {
         each.id
         for each in act.plan.block.behaviors
-        if each.id in lost and (fallen & {*each.needs} or (each.id in fallen and gone[each.id]))
+        if each.id in lost and {*each.needs} & (lost if each.id in fallen else fallen)
     }
     if not cut or outcome.status == "interrupted":
         return None
@@ -121,12 +120,10 @@ def rest_of(fragment: TurnFragment, turn: TurnPlan, act: Act, outcome: BlockOutc
         elif behavior.id not in emitted and isinstance(behavior, Speech) and is_in_rest:
             left.append(behavior)  # punctuation that was to be said with the phrase
     ids = {behavior.id for behavior in left}
-    again = {
-        each.reference: {
-            "point" if id == each.point else "gaze": why[id] for id in gone[each.phrase] if id in outcome.dropped
-        }
+    failed = {
+        each.object: {"point" if id == each.point else "gaze": why[id] for id in each.gestures if id in why}
         for each in act.plan.made
-        if each.phrase in cut and gone[each.phrase]
+        if each.phrase in cut and lost & {*each.gestures}
     }
     behaviors = tuple(replace(each, timing=_among(each, ids), needs=tuple(ids & {*each.needs})) for each in left)
     constraints = tuple(
@@ -142,7 +139,7 @@ def rest_of(fragment: TurnFragment, turn: TurnPlan, act: Act, outcome: BlockOutc
     return Rest(
         replace(fragment, behaviors=behaviors, constraints=constraints, unread=()),
         replace(turn, announces_pair=False, reply="") if opened else turn,
-        again,
+        failed,
     )
 
 
@@ -219,10 +216,9 @@ def unshown(acts: Sequence[Act], made: Iterable[ReferenceMade]) -> Iterator[str]
     planned = {parts.reference: (act, parts) for act in acts for parts in act.plan.made}
     for each in made:
         act, parts = planned[each.reference]
-        if each.phrase and parts.point and not act.came(parts.point, "stroke"):
-            yield f"{each.reference}: {each.phrase!r} was said, but the point at {each.object} did not come"
-        elif each.phrase and parts.gaze and not parts.point and not act.came(parts.gaze, "stroke"):
-            yield f"{each.reference}: {each.phrase!r} was said, but the look at {each.object} did not come"
+        gesture, name = (parts.point, "point") if parts.point else (parts.gaze, "look")
+        if each.phrase and gesture and not act.came(gesture, "stroke"):
+            yield f"{each.reference}: {each.phrase!r} was said, but the {name} at {each.object} did not come"
 
 
 def last_choices(acts: Iterable[Act]) -> tuple[ReferenceChoice, ...]:

@@ -240,11 +240,10 @@ class FragmentPerformance:
         self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in told.items()]
         if rest is not None:
             self.left, self.turn_left, self.plan, self.is_sent = rest.fragment, rest.turn, None, False
-            for each in act.plan.made:
-                if each.reference in rest.again:
-                    self.barred.setdefault(each.object, {}).update(rest.again[each.reference])
-                    if self._tries >= MOST_TRIES:
-                        self.barred[each.object] = dict.fromkeys(("gaze", "point"), "it has failed too often")
+            for object, reasons_why in rest.failed.items():
+                self.barred.setdefault(object, {}).update(reasons_why)
+                if self._tries >= MOST_TRIES:
+                    self.barred[object] = dict.fromkeys(("gaze", "point"), "it has failed too often")
             self._running.clear()
             self._gaze = ""
             return

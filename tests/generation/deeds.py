@@ -324,7 +324,14 @@ def compared(
     if result.status not in allowed:
         ends = [reader.ends.get(block) for block in blocks]
         found.append(f"{id}: status: told {result.status}, seen {sorted(allowed)}: {ends} {reader.gone} {result}")
-    if result.status == "unknown" and not result.said and not result.references:
+    if result.status == "unknown" and any(name == "generation" and time >= since for time, name in reader.gone):
+        # What it had told of earlier fragments is known, and nothing of the one that it died of.
+        judged = {
+            "said": judged["said"][: len(told["said"])],
+            "references": judged["references"][: len(told["references"])],
+            "eye_contact": judged["eye_contact"] if told["eye_contact"] is not None else None,
+        }
+    elif result.status == "unknown" and not result.said and not result.references:
         return found  # Whatever could have told is gone.
     for name in ("said", "eye_contact", "references"):
         if told[name] != judged[name]:

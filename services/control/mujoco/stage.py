@@ -17,8 +17,6 @@ from engage_hri.services.control.torso.motion import Motion
 from engage_hri.services.control.torso.path import Leg, Path, resting
 
 Angles = Mapping[str, Radians]
-SWING = 1.3
-"""Measured speed of a joint, as a multiple of the planned one that it may come to."""
 
 
 class Stage:

@@ -40,7 +40,6 @@ from engage_hri.services.control.torso.path import Leg
 from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
 Looks = Gaze | GazeShift | HeadDirectionShift
-Faces = Face | FaceLexeme | FaceFacs | FaceShift
 TYPES_OF_BEHAVIORS: tuple[type[BlockBehavior], ...] = (
     Gaze, GazeShift, HeadDirectionShift, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture, PostureShift, Pose,
 )  # fmt: skip

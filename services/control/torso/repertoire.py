@@ -120,7 +120,6 @@ class PosePath(_Part, frozen=True, kw_only=True):
 
 
 FacePath = dict[str, Share]
-AnyPath = GesturePath | HeadPath | FacePath | PosePath
 _PATHS: Mapping[Table, Any] = {
     "gesture": GesturePath, "head": HeadPath, "face": FacePath, "facs": FacePath, "pose": PosePath,
     "stance": PosePath,
