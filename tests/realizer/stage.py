@@ -46,6 +46,8 @@ def before(ref: str, *syncs: str) -> Before:
 class FakeRecognition:
     """Decides each event as told: seconds after its start, by behavior id; None: never, though 12 s are promised."""
 
+    within: Seconds | None = 12.0
+
     def __init__(self, decisions: Mapping[str, Seconds | None] | None = None, refuse: Sequence[str] = ()) -> None:
         self.decisions = dict(decisions or {})
         self.refuse = refuse
@@ -66,7 +68,7 @@ class FakeRecognition:
                                 if request.event.id in self.refuse:
                                     desk.refuse(request.id, Fault(reason="unknown actor"))
                                     continue
-                                desk.accept(request.id, within=12.0)
+                                desk.accept(request.id, within=self.within)
                                 tasks.create_task(self._decide(bus, desk, request))
                             case SignalTurn() as signal:
                                 self.signals.append(signal)

@@ -66,6 +66,15 @@ async def test_an_event_that_is_not_decided_in_the_time_that_recognition_has_pro
     assert recognition.cancelled == ["r-b/e"]
 
 
+async def test_a_recognizer_that_promises_nothing_has_thirty_seconds() -> None:
+    recognition = FakeRecognition({"e": None})
+    recognition.within = None
+    async with stage(recognition=recognition) as seen:
+        await seen.perform(WAITING)
+
+    assert source(seen) == (30.0, "clock")
+
+
 @pytest.mark.parametrize("spoken", [1.0, 11.0, 13.0, 40.0, 200.0])
 async def test_the_promised_time_counts_from_the_last_deed_of_the_robot(spoken: float) -> None:
     """However long it speaks: only then the turn is over, and the answer is waited for."""

@@ -1,7 +1,6 @@
 """Requests of one block to recognition: connection events and turn signals. The clock decides if it is not there."""
 
 import asyncio
-from math import inf
 from typing import Any
 
 from msgspec import Struct
@@ -17,6 +16,10 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Pending, RequestRefused, ServerRestarted
+
+
+UNPROMISED: Seconds = 30.0
+"""Time from the robot's last deed that a recognizer has which promises none, before its event is given up."""
 
 
 class Decision(Struct, frozen=True):
@@ -76,7 +79,7 @@ class RecognitionLink:
             if pending is None or "recognition" not in self._peers:
                 due = event_deadline(event, block, facts.reached)
             else:
-                due = inf if pending.within is None else deed + pending.within
+                due = deed + (UNPROMISED if pending.within is None else pending.within)
             remaining = due + facts.held_between(began, now, event.id) - now
             if remaining <= EPSILON:
                 if pending is not None:
@@ -86,6 +89,4 @@ class RecognitionLink:
             news: list[asyncio.Future[Any]] = [self._peers.changed]
             if pending is not None:
                 news += [each for each in (pending.outcome, pending.accepted) if not each.done()]
-            await asyncio.wait(
-                news, timeout=None if remaining == inf else remaining, return_when=asyncio.FIRST_COMPLETED
-            )
+            await asyncio.wait(news, timeout=remaining, return_when=asyncio.FIRST_COMPLETED)
