@@ -17,7 +17,6 @@ from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Pending, RequestRefused, ServerRestarted
 
-
 UNPROMISED: Seconds = 30.0
 """Time from the robot's last deed that a recognizer has which promises none, before its event is given up."""
 
