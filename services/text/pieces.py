@@ -35,7 +35,7 @@ _TOLD: Mapping[Reason, str] = {
     "address": "addresses were not said in full",
     "definition": "definitions of links were not said",
     "tag": "tags were not said",
-    "bracket": "brackets that name no object were said as words",
+    "bracket": "brackets that are no reference were said as words",
     "case": "ids were written in other letters than the world has",
 }
 _MOST = 3

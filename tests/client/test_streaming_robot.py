@@ -198,6 +198,6 @@ async def test_what_is_for_the_eye_is_not_said_and_told_in_one_line_a_reason() -
     assert result.problems == (
         "thoughts were not said: <think>",
         "stage directions were not said: [smiles], [laughs]",
-        "brackets that name no object were said as words: [0], [sic]",
+        "brackets that are no reference were said as words: [0], [sic]",
         "ids were written in other letters than the world has: [Blue-Square]",
     )

@@ -143,7 +143,7 @@ def test_what_was_left_out_is_told_in_one_line_a_reason() -> None:
         "citations were not said: [1]",
         "addresses were not said in full: https://example.org/x",
         "tags were not said: <b>, </b>",
-        "brackets that name no object were said as words: [sic]",
+        "brackets that are no reference were said as words: [sic]",
     )
 
 
