@@ -103,6 +103,12 @@ class PerceivedPerson:
         """
         self._check()
         taken(World(entities=entities), World, f"{self.id}: entities")
+        for each in entities:
+            if each.id in (self.id, self.robot) and each.kind != "person":
+                fault = Fault(
+                    reason=f"{each.id!r} is an actor, and cannot be: {each.kind}", where=f"{self.id}: entities"
+                )
+                raise InputRefused(fault)
         self._own.update((entity.id, entity) for entity in entities)
         self._show()
 
@@ -219,7 +225,7 @@ class PerceivedPerson:
 
         ago: seconds by which the instant is earlier.
         """
-        return self._bus.stamp(self._bus.now() - ago)
+        return self._bus.stamp(self._bus.now() - taken(ago, Seconds, f"{self.id}: ago"))
 
     def begin(self, action: Action, *targets: str) -> None:
         """Begin an action, which goes on until its `end`; a look until the next one.
@@ -252,6 +258,8 @@ class PerceivedPerson:
             InputRefused: a text or an id that no reader takes.
         """
         self._check()
+        if not isinstance(utterance, Utterance):
+            raise InputRefused(Fault(reason=f"{type(utterance).__name__!r} is no Utterance", where=self.id))
         self._check_length(utterance.text)
         if not 0 < len(utterance.id) <= LONGEST_ID:
             reason = f"the id of an utterance has 1 to {LONGEST_ID} letters, not {len(utterance.id)}"

@@ -25,6 +25,7 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.feedback import Feedback
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
 from engage_hri.schemas.holds import Held
+from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
@@ -34,7 +35,7 @@ from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed, NewFeed
 from engage_hri.services.client.hearing import Hearing, NewWords
-from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in
+from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in, taken
 from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.configuration import bus_config
@@ -129,14 +130,17 @@ class Robot(Hearing):
         return outcome
 
     async def _answered(self, request: PerformFragment, timeout: Seconds | None) -> FragmentOutcome:
-        with self.turns() as turns:
+        with self._feed((TurnClosed, PeerGone), keys.TURN_CLOSED, keys.ANY_ALIVE) as news:
             outcome = await self._performed(request, timeout)
             events = {event.id for event in outcome.events}
             deadline = self.now() + ANSWER_PATIENCE + (request.fragment.within or 0.0)
-            while (turn := await turns.next(max(0.0, deadline - self.now()))) is not None:
+            while (told := await news.next(max(0.0, deadline - self.now()))) is not None:
+                if isinstance(told, PeerGone):
+                    if told.participant == "generation":
+                        return _without_an_answer(outcome)
                 # An earlier turn of the same name, told again, has other events.
-                if request.fragment.id in turn.fragments and events <= {event.id for event in turn.events}:
-                    return replace(outcome, events=turn.events, heard=turn.heard)
+                elif request.fragment.id in told.fragments and events <= {event.id for event in told.events}:
+                    return replace(outcome, events=told.events, heard=told.heard)
         return outcome
 
     async def realize(
@@ -247,6 +251,7 @@ class Robot(Hearing):
             ValueError: a name that can be no person, or no kind.
         """
         kinds = (kind,) if isinstance(kind, str) else tuple(kind)
+        taken(actor, str, "actor")
         if unknown := set(kinds) - set(get_args(EventKind)):
             raise ValueError(f"{', '.join(map(repr, unknown))}: the kinds are {', '.join(get_args(EventKind))}")
         self._requests.check()
@@ -318,7 +323,7 @@ class Robot(Hearing):
         Raises:
             ValueError: a name that can be no person.
         """
-        return self._feed((Statistics,), keys.statistics(keys.chunk(actor)), keep=Keep.LATEST)
+        return self._feed((Statistics,), keys.statistics(keys.chunk(taken(actor, str, "actor"))), keep=Keep.LATEST)
 
     async def statistics(self, actor: str = "all", timeout: Seconds | None = None) -> Statistics:
         """Return the statistics of a person, or of `all`, as they are now; waits for recognition.
@@ -396,3 +401,11 @@ async def _joined(hub: Hub, name: str) -> AsyncIterator[Robot]:
             yield client
     finally:
         await bus.leave()
+
+
+def _without_an_answer(outcome: FragmentOutcome) -> FragmentOutcome:
+    """The outcome of a fragment that was performed, but of which nobody will tell how it was answered."""
+    events = tuple(replace(each, state="lost") if each.state == "started" else each for each in outcome.events)
+    return replace(
+        outcome, events=events, warnings=(*outcome.warnings, "generation is gone: the answer is not known")
+    )

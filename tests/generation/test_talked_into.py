@@ -210,3 +210,28 @@ async def test_a_writer_who_is_silent_for_too_long_is_told_so(hub: MemoryHub) ->
 
     assert told.status == "interrupted"
     assert any("silence for 10 s" in each for each in told.problems), told.problems
+
+
+# -- the robot's own "uh-huh" --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("parts", [[{"say": "uh-huh"}], [{"gesture": "nod"}], [{"gesture": "nod"}, {"say": "mhm"}]])
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 3.0])
+async def test_an_announced_sign_of_the_robot_answers_nobody(
+    hub: MemoryHub, parts: list[dict[str, str]], delay: float
+) -> None:
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        with client.connection_events("ann", ("adjacency_pair", "backchannel")) as events:
+            await ann.look_at(ann.robot)
+            await asyncio.sleep(1.0)
+            await ann.say("could you tell me which one you like", seconds=2.0)
+            await asyncio.sleep(delay)
+            told = await perform_call(client, {"turn_status": "backchannel", "parts": parts})
+            states = []
+            while (event := await events.next(0.3)) is not None:
+                states.append((event.kind, event.initiator, event.state))
+
+    assert told.status == "done"
+    assert [state for kind, who, state in states if (kind, who) == ("adjacency_pair", "ann")][:1] == ["started"]
+    assert ("adjacency_pair", "ann", "succeeded") not in states
+    assert ("backchannel", "ann", "succeeded") in states

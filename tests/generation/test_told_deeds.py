@@ -160,3 +160,25 @@ async def test_the_outcome_of_a_fragment_is_unknown_too(hub: MemoryHub, service:
     # Where generation itself has gone there is no outcome: nobody could tell one.
     assert isinstance(failed.value, OutcomeUnknown) or failed.value.outcome.status == "unknown"
     assert isinstance(failed.value, OutcomeUnknown) is (service == "generation")
+
+
+@pytest.mark.parametrize("is_back", [False, True])
+async def test_an_answer_that_nobody_will_tell_is_not_waited_for(hub: MemoryHub, *, is_back: bool) -> None:
+    async with robot(hub, "generation") as (client, life), perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        began = client.now()
+        call = {"turn_status": "full", "parts": [{"say": "Which one?"}]}
+        performing = asyncio.create_task(perform_call(client, call, await_answer=True))
+        await asyncio.sleep(2.0)
+        await life.aclose()
+        if is_back:
+            config = load(settings=["simulation.human=none"])
+            await asyncio.sleep(0.3)
+            await life.enter_async_context(running(hub, {"generation": roster.service("generation", config)}))
+        told = await performing
+        took = client.now() - began
+
+    assert (told.status, told.said, told.answer) == ("done", "Which one?", None)
+    assert told.problems == ("generation is gone: the answer is not known",)
+    assert took < 3.0

@@ -340,7 +340,12 @@ class Emission:
             if not start and nod and not self.permits.speech_only:
                 start = f"{nod}:start"
             about = (start.rpartition(":")[0],) if start else ()
-            return [self._event("backchannel", "backchannel", start, about)]
+            event = self._event("backchannel", "backchannel", "", about)
+            if start:
+                # Recognition has to know of it before it hears the robot: else the sign would answer the person.
+                id = self.names.fresh("backchannel-first")
+                self.constraints.append(Constraint(id=id, operators=(after(f"{event.id}:start", start),)))
+            return [event]
         return []
 
     def _closing(self) -> list[BlockBehavior]:

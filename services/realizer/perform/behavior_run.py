@@ -193,11 +193,12 @@ class BehaviorRun:
         """Time at which an event begins that may: with the first report of what it needs, else now.
 
         The body may refuse what it needs only as that begins. Then recognition must not hear of the event: with a
-        person who looks already, it would succeed at once.
+        person who looks already, it would succeed at once. Of a backchannel it has to hear before it hears the robot,
+        whose sign would answer the person else.
         """
         block, now = self._block, self._block.bus.now()
         starts = [Point(id, "start") for id in event.needs if id in block.decisions.plan.chains]
-        if not starts:
+        if not starts or event.kind == "backchannel":
             return now
         if not any(start in block.decisions.facts.reached for start in starts):
             awaited = [block.futures.reached(start) for start in starts]

@@ -1,0 +1,44 @@
+"""Values that are no names, times or words: the client says so, with the place, and takes none of them."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from engage_hri import perceive
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.world import Entity
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import connect
+from tests.cancelling import whole_robot
+
+PLACE = (0.5, 0.0, 0.8)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda ann: ann.tell(None),
+        lambda ann: ann.tell("hello"),
+        lambda ann: ann.stamp("x"),
+        lambda ann: ann.stamp(math.nan),
+        lambda ann: ann.stamp(math.inf),
+        lambda ann: ann.bring(Entity(id="ann", kind="object", position=PLACE)),
+        lambda ann: ann.bring(Entity(id="robot", kind="object", position=PLACE)),
+    ],
+)
+async def test_a_person_refuses_it(hub: MemoryHub, wrong: Callable[[Any], object]) -> None:
+    async with whole_robot(hub), perceive("ann", hub=hub) as ann:
+        before = ann.world
+        with pytest.raises(InputRefused, match="ann"):
+            wrong(ann)
+
+        assert ann.world == before
+
+
+@pytest.mark.parametrize("name", ["connection_events", "statistics_updates"])
+async def test_a_robot_refuses_it(hub: MemoryHub, name: str) -> None:
+    async with connect(hub=hub) as robot:
+        with pytest.raises(InputRefused, match="actor"):
+            getattr(robot, name)(5)
