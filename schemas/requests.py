@@ -113,8 +113,8 @@ class Heard(Answer, frozen=True, kw_only=True, tag="heard", omit_defaults=True):
 class Accepted(Answer, frozen=True, kw_only=True, tag="accepted", omit_defaults=True):
     """The request is being carried out, or will be.
 
-    within: of an event, the longest time from the robot's last deed (a sync point of its blocks, or the end of what
-    goes on) to the outcome. Only recognition knows it. None: nothing is promised.
+    within: of an event, the longest time from the robot's last deed (a sync point of its blocks, or a word of its
+    speech) to the outcome. Only recognition knows it. None: nothing is promised.
     """
 
     within: Seconds | None = None

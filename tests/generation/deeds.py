@@ -140,7 +140,8 @@ class Reader:
         ends = [self.ends.get(block, []) for block in blocks]
         gone = {name for time, name in self.gone if time >= since}
         if not any(ends):
-            return {"unknown", "refused", "failed"} if gone & {"generation", "realizer", "control"} else {"refused"}
+            # Nothing was done. It has failed if it waited for a body that was not there.
+            return {"refused", "failed", *(["unknown"] if gone & {"generation", "realizer"} else [])}
         last = [each[-1] if each else "never begun" for each in ends]
         if "generation" in gone:
             return {"unknown", "done" if all(each == "done" for each in last) else "failed"}

@@ -408,6 +408,9 @@ class BlockPerformance:
 
     @property
     def last_deed(self) -> Seconds:
-        """Time when the robot last did something of the block: now, while a behavior of the body goes on."""
+        """Time when the robot last did something of the block: now, while it speaks.
+
+        A look goes on until the block ends, and that may wait for the decision of an event: it is no deed.
+        """
         facts = self.decisions.facts
-        return self.bus.now() if self.parts_moving else max(facts.reached.values(), default=facts.began)
+        return self.bus.now() if "voice" in self.parts_moving else max(facts.reached.values(), default=facts.began)
