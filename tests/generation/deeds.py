@@ -82,11 +82,11 @@ class Reader:
                 self.gone.append((now, message["participant"]))
 
     def decision(self, block: str, behavior: str) -> bool | None:
+        """What the person did, the last time that the robot tried; None: nobody has decided."""
         told = [each for each in self.events.values() if (each["block"], each.get("behavior")) == (block, behavior)]
-        states = {each["state"] for each in told}
-        if states & {"succeeded", "completed"}:
-            return True
-        return False if "failed" in states else None
+        if not told:
+            return None
+        return {"succeeded": True, "completed": True, "failed": False}.get(told[-1]["state"])
 
     def references(self, block: str) -> list[str]:
         """Ids of the references of a block of which anything came."""
