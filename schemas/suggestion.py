@@ -9,8 +9,8 @@ MOST = 12
 
 def meant(name: str, known: Iterable[str]) -> str:
     """Write ` (did you mean 'start'?)`; empty if no name is like this one."""
-    near = get_close_matches(name, sorted(known), n=1, cutoff=0.75)
-    return f" (did you mean {near[0]!r}?)" if near else ""
+    near = _nearest(name, sorted(known), 0.75)
+    return f" (did you mean {near!r}?)" if near else ""
 
 
 def suggestion(name: str, known: Iterable[str], none: str = "known: none") -> str:
@@ -21,6 +21,13 @@ def suggestion(name: str, known: Iterable[str], none: str = "known: none") -> st
     names = sorted(known)
     if not names:
         return none
-    if near := get_close_matches(name, names, n=1):
-        return f"did you mean {near[0]!r}?"
+    if near := _nearest(name, names, 0.6):
+        return f"did you mean {near!r}?"
     return f"known: {', '.join(names[:MOST])}{', ...' if len(names) > MOST else ''}"
+
+
+def _nearest(name: str, names: list[str], cutoff: float) -> str:
+    """The name that is most like this one, whatever its case; empty if none is."""
+    folded = {each.casefold(): each for each in reversed(names)}
+    near = get_close_matches(name.casefold(), folded, n=1, cutoff=cutoff)
+    return folded[near[0]] if near else ""

@@ -168,14 +168,14 @@ def references_made(acts: Sequence[Act], events: Iterable[ConnectionEvent]) -> t
 def _made(tries: Sequence[tuple[Act, Made]], events: Mapping[str, ConnectionEvent]) -> ReferenceMade:
     pointed = any(act.came(made.point, "stroke") for act, made in tries if made.point)
     looked = any(act.came(made.gaze, "stroke") for act, made in tries if made.gaze)
-    said = [
+    phrases = [
         (each, made)
         for act, made in tries
         for each in act.spoken
         if each.behavior == made.phrase and has_words(each.text)
     ]
     by: Literal["pointing", "look", "words", "nothing"] = (
-        "pointing" if pointed else "look" if looked else "words" if said else "nothing"
+        "pointing" if pointed else "look" if looked else "words" if phrases else "nothing"
     )
     decided = [
         event
@@ -188,7 +188,9 @@ def _made(tries: Sequence[tuple[Act, Made]], events: Mapping[str, ConnectionEven
         reference=last.reference,
         object=last.object,
         by=by,
-        phrase=" ".join(made.words if each.complete else each.text for each, made in said),
+        phrase=" ".join(
+            said(text := made.words if each.complete else each.text, len(text)) for each, made in phrases
+        ),
         looked=answered is not None if decided else None,
         delay=answered.delay if answered else None,
     )

@@ -182,3 +182,9 @@ async def test_an_answer_that_nobody_will_tell_is_not_waited_for(hub: MemoryHub,
     assert (told.status, told.said, told.answer) == ("done", "Which one?", None)
     assert told.problems == ("generation is gone: the answer is not known",)
     assert took < 3.0
+
+
+async def test_a_phrase_is_told_as_it_was_heard(hub: MemoryHub) -> None:
+    told, _ = await performed(hub, [{"refer": "cup", "phrases": ["**the cup**"]}, {"say": "please"}])
+
+    assert (told.said, [each.phrase for each in told.references]) == ("the cup please", ["the cup"])

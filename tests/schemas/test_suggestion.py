@@ -25,3 +25,12 @@ def test_the_name_that_was_probably_meant_or_those_that_there_are(name: str, kno
 
 def test_what_is_said_where_there_is_nothing_is_the_callers() -> None:
     assert suggestion("x", (), "the world is empty") == "the world is empty"
+
+
+@pytest.mark.parametrize("name", ["CUP", "Cup", "cub", "cup "])
+def test_a_name_in_other_letters_is_found(name: str) -> None:
+    assert suggestion(name, ["table", "cup"]) == "did you mean 'cup'?"
+
+
+def test_the_name_is_told_as_it_is_spelled() -> None:
+    assert meant("bluesquare", ["Blue-Square"]) == " (did you mean 'Blue-Square'?)"
