@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.suggestion import suggestion
+from engage_hri.schemas.suggestion import meant, suggestion
 
 
 @pytest.mark.parametrize(
