@@ -16,6 +16,7 @@ from engage_hri.schemas.units import Seconds
 
 LONGEST_PROBLEM = 160
 MOST_PROBLEMS = 4
+UNKNOWN_ANSWER = "recognition has gone or was restarted: the answer is not known"
 MOST_HEARD = 16
 """Utterances that are told, the newest."""
 ROUNDING = 2
@@ -126,9 +127,14 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         answered_by=pair.responder if pair and pair.response else "",
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
         problems=_problems(
-            text
-            for outcome in outcomes
-            for text in ([str(outcome.fault)] if outcome.fault else []) + list(outcome.warnings)
+            (
+                *(
+                    text
+                    for outcome in outcomes
+                    for text in ([str(outcome.fault)] if outcome.fault else []) + list(outcome.warnings)
+                ),
+                *([UNKNOWN_ANSWER] if pair is not None and pair.state == "lost" else []),
+            )
         ),
     )
 

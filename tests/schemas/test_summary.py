@@ -188,3 +188,10 @@ def test_nobody_waits_for_the_answer_to_a_turn_that_ended_early() -> None:
 
     assert summary(outcome(events=pending)).answer == "pending"
     assert summary(outcome(status="failed", events=pending)).answer is None
+
+
+def test_an_answer_that_nobody_can_know_is_absent_and_told() -> None:
+    told = summary(outcome(events=(event("adjacency_pair", "lost"),)))
+
+    assert (told.status, told.answer) == ("done", None)
+    assert told.problems == ("recognition has gone or was restarted: the answer is not known",)
