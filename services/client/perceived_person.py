@@ -224,6 +224,9 @@ class PerceivedPerson:
         """Return the instant that it is now, as messages have it, for the words of `tell`.
 
         ago: seconds by which the instant is earlier.
+
+        Raises:
+            InputRefused: `ago` is no time.
         """
         return self._bus.stamp(self._bus.now() - taken(ago, Seconds, f"{self.id}: ago"))
 

@@ -248,6 +248,7 @@ class Robot(Hearing):
         open: begin with those that are open already, each as it was last told; otherwise from now on.
 
         Raises:
+            InputRefused: `actor` is no text.
             ValueError: a name that can be no person, or no kind.
         """
         kinds = (kind,) if isinstance(kind, str) else tuple(kind)
@@ -321,6 +322,7 @@ class Robot(Hearing):
         actor: id of the person, or `all` for all together; empty: each of these.
 
         Raises:
+            InputRefused: `actor` is no text.
             ValueError: a name that can be no person.
         """
         return self._feed((Statistics,), keys.statistics(keys.chunk(taken(actor, str, "actor"))), keep=Keep.LATEST)
@@ -332,6 +334,7 @@ class Robot(Hearing):
         timeout: seconds to wait; None: for ever.
 
         Raises:
+            InputRefused: `actor` is no text.
             NoReply: none within `timeout`.
             ValueError: a name that can be no person.
         """

@@ -77,14 +77,15 @@ def test_what_each_status_adds(status: str, added: list[str]) -> None:
     assert [id for id in by_id(made) if id != "s"] == added
 
 
-def test_a_backchannel_begins_with_its_nod_or_word() -> None:
+def test_a_backchannel_is_announced_before_its_nod_or_word() -> None:
     nod = Head(id="n", lexeme="NOD", timing=(Timing("start", "0.2"),))
 
     nodded = block(TurnFragment(id="f", turn_status="backchannel", behaviors=(nod,)))
     said = block(TurnFragment(id="f", turn_status="backchannel", behaviors=(nod, speech("s", "mhm"))))
 
-    assert start_of(by_id(nodded)["backchannel"]) == "n:start"
-    assert start_of(by_id(said)["backchannel"]) == "s:start"
+    assert "n:start after backchannel:start" in lines(nodded)
+    assert "s:start after backchannel:start" in lines(said)
+    assert [by_id(made)["backchannel"].needs for made in (nodded, said)] == [("n",), ("s",)]
 
 
 def test_a_turn_without_speech_ends_when_everything_in_it_has() -> None:
