@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Seconds
 
 LONGEST_PROBLEM = 160
 MOST_PROBLEMS = 4
-UNKNOWN_ANSWER = "recognition has gone or was restarted: the answer is not known"
+UNKNOWN_ANSWER = "the answer is not known: the service that was to tell it has gone or was restarted"
 MOST_HEARD = 16
 """Utterances that are told, the newest."""
 ROUNDING = 2

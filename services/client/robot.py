@@ -409,6 +409,4 @@ async def _joined(hub: Hub, name: str) -> AsyncIterator[Robot]:
 def _without_an_answer(outcome: FragmentOutcome) -> FragmentOutcome:
     """The outcome of a fragment that was performed, but of which nobody will tell how it was answered."""
     events = tuple(replace(each, state="lost") if each.state == "started" else each for each in outcome.events)
-    return replace(
-        outcome, events=events, warnings=(*outcome.warnings, "generation is gone: the answer is not known")
-    )
+    return replace(outcome, events=events)

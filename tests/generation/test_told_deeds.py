@@ -180,7 +180,7 @@ async def test_an_answer_that_nobody_will_tell_is_not_waited_for(hub: MemoryHub,
         took = client.now() - began
 
     assert (told.status, told.said, told.answer) == ("done", "Which one?", None)
-    assert told.problems == ("generation is gone: the answer is not known",)
+    assert told.problems == ("the answer is not known: the service that was to tell it has gone or was restarted",)
     assert took < 3.0
 
 

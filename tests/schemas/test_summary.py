@@ -194,4 +194,4 @@ def test_an_answer_that_nobody_can_know_is_absent_and_told() -> None:
     told = summary(outcome(events=(event("adjacency_pair", "lost"),)))
 
     assert (told.status, told.answer) == ("done", None)
-    assert told.problems == ("recognition has gone or was restarted: the answer is not known",)
+    assert told.problems == ("the answer is not known: the service that was to tell it has gone or was restarted",)
