@@ -32,7 +32,6 @@ _AT_ONCE = 4096
 """Characters that are looked through for ends at once: so the time to read a long text grows with its length only."""
 _LITERAL = frozenset("*_[]<>`~&\\|#()!")
 UNKNOWN = Ids(None)
-NONE = Ids(())
 
 
 class Chunker:
@@ -63,7 +62,7 @@ class Chunker:
         yield from self._complete(self._reader.finish(ids))
         if isinstance(piece, Say):
             part = Reader()
-            yield from self._complete([*part.feed(piece.say, NONE), *part.finish(NONE)])
+            yield from self._complete([*part.feed(piece.say), *part.finish()])
         else:
             self._parts.append(piece)
 

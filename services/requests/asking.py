@@ -42,7 +42,7 @@ from engage_hri.services.requests.asking_effects import (
 from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.records import unwieldy
+from engage_hri.services.requests.records import ANEW, unwieldy
 from engage_hri.services.requests.window import Window
 
 _Said = Answer | None
@@ -51,7 +51,6 @@ _Said = Answer | None
 
 SHORTEST_PULSE: Seconds = 0.05
 """Least time between two `KeepAlive`, whatever the lease: a shorter one would flood the bus."""
-ANEW = "if it is to be done again, send it under a new id"
 
 # Members that are used with each message: an enum is slow to look one up.
 _SENT, _ENDED, _FINISHED = State.SENT, State.ENDED, Event.FINISHED

@@ -9,6 +9,8 @@ from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Request, kind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.serving_table import Event, State
 
+ANEW = "if it is to be done again, send it under a new id"
+"""Advice about a request of which nobody knows, or remembers, what became of it."""
 LONGEST = 1000
 """Letters of an id, and of a life: answers name them, and answers are kept."""
 

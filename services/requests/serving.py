@@ -34,7 +34,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.ended import Ended
 from engage_hri.services.requests.names import Names
-from engage_hri.services.requests.records import Key, Record, content_of, event_of, key_of
+from engage_hri.services.requests.records import ANEW, Key, Record, content_of, event_of, key_of
 from engage_hri.services.requests.serving_effects import Complain, Effect, Hand, Hold, Publish
 from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
 
@@ -322,11 +322,7 @@ class Serving:
         self._answer(record, now, Refused(id=record.name, fault=fault))
 
     def _refuse_forgotten(self, record: Record, now: Seconds, cause: _Cause) -> None:
-        self._refuse(
-            record.request,
-            f"{self._server} does not know it any more",
-            "if it is to be done again, send it under a new id",
-        )
+        self._refuse(record.request, f"{self._server} does not know it any more", ANEW)
 
     def _warn_different(self, record: Record, now: Seconds, cause: _Cause) -> None:
         which = "an ended" if record.state is _ENDED else "a live"

@@ -9,10 +9,9 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
 from engage_hri.services.recognition.events.history import Latest
+from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 
 LINES_KEPT = 256
-BLOCKS_KEPT = 64
-"""Number of announced backchannels that are remembered, should the ends of their blocks be lost."""
 SAME_INSTANT: Seconds = 0.001
 """Longest gap between two looks at the same target that count as one."""
 
