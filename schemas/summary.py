@@ -105,6 +105,13 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     status: Status = next((each for each in _WORST_FIRST if each in statuses), "done")
     if status == "refused" and statuses != {"refused"}:
         status = "failed"  # something was said or done before
+    wrong = [
+        text
+        for outcome in outcomes
+        for text in ([str(outcome.fault)] if outcome.fault else []) + list(outcome.warnings)
+    ]
+    if pair is not None and pair.state == "lost":
+        wrong.append(UNKNOWN_ANSWER)
     return Summary(
         status=status,
         said=joined(each.text for each in spoken),
@@ -126,16 +133,7 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         answer_delay=_rounded(pair.delay) if pair and pair.response else None,
         answered_by=pair.responder if pair and pair.response else "",
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
-        problems=_problems(
-            (
-                *(
-                    text
-                    for outcome in outcomes
-                    for text in ([str(outcome.fault)] if outcome.fault else []) + list(outcome.warnings)
-                ),
-                *([UNKNOWN_ANSWER] if pair is not None and pair.state == "lost" else []),
-            )
-        ),
+        problems=_problems(wrong),
     )
 
 
