@@ -180,9 +180,7 @@ class Forecast(LongestPaths):
         """
         bounds = [self._arcs[each] for each in self._in[transition] if self._arcs[each].is_on or each in self._broken]
         is_kept = self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
-        if not (is_kept or is_foreign(behavior)) and any(
-            arc.is_bound and arc.behavior != behavior for arc in bounds
-        ):
+        if not (is_kept or is_foreign(behavior)) and any(arc.is_bound and arc.behavior != behavior for arc in bounds):
             node = self._new_node()
             self.times[node] = at
             self._as_others.add(self._add(transition, node, 0.0, 0.0, "", is_bound=True))
