@@ -17,7 +17,7 @@ BRAKING: Seconds = 0.1
 def slack(plan: Plan, point: Point) -> Seconds:
     """Seconds by which a behavior may be early at a hold point that it shares with nobody, and not stop there."""
     members = plan.members[plan.at[point]]
-    if len(members) > 1 or not members[0].can_wait or point in plan.manner.stands:
+    if len(members) > 1 or not members[0].can_wait or members[0].point in plan.manner.stands:
         return 0.0
     chain = plan.chains[point.behavior]
     number = chain.points.index(point) - 1
