@@ -246,8 +246,7 @@ class Estimate(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 class PlannedTime(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Time planned for a sync point. at: seconds from now. through: for a hold point, true if the behavior is told in
-    time that it may pass: it is slower on its way, and does not stop there. For another point, true if it comes as
-    is natural, behind a point that does not: it is asked to be on time all the same."""
+    time that it may pass: it is slower on its way, and does not stop there."""
 
     sync: str
     at: Seconds

@@ -29,18 +29,20 @@ def told_apart(
             is_hurried = times[point.sync] - at < natural - HURRIED
             if point.held_with and not is_hurried and point.sync not in passing:
                 waits[point.held_with] = times[point.sync]
-            elif point.held_with or point.sync not in passing:
+            else:
                 forced[point.sync] = times[point.sync]
             before, at = point.sync, times[point.sync]
     return waits, forced
 
 
-def paced_by(course: Course, path: Path, times: Mapping[str, Seconds], asked: Container[str]) -> dict[str, Seconds]:
-    """Instants for all points up to the last that is asked for: the others are, too, as they come by themselves."""
-    syncs = [point.sync for point in course.points]
-    last = max((number for number, sync in enumerate(syncs) if sync in asked), default=0)
+def paced_by(
+    course: Course, path: Path, times: Mapping[str, Seconds], forced: Mapping[str, Seconds]
+) -> dict[str, Seconds]:
+    """Instants for all points up to the last that is forced: the others are asked for as they come by themselves."""
     paced: dict[str, Seconds] = {}
     at = times[START]
-    for since, to in pairwise(syncs[: last + 1]):
+    for since, to in pairwise([point.sync for point in course.points]):
+        if len(forced.keys() & paced.keys()) == len(forced):
+            break
         at = paced[to] = times.get(to, at + path.marks[to] - path.marks[since])
     return paced

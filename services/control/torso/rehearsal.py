@@ -4,7 +4,7 @@ A copy of the body moves on a clock of its own, by the very methods by which the
 where the others have brought its part by then, in motion if they are, and a stop costs what it will cost.
 """
 
-from collections.abc import Container, Iterator, Mapping, Sequence, Set
+from collections.abc import Container, Iterator, Mapping, Sequence
 from copy import copy
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
@@ -293,7 +293,7 @@ def _begin(
     clock: Clock,
     item: EstimateItem,
     times: Mapping[str, Seconds],
-    passing: Set[str],
+    passing: Container[str],
     moved: set[str],
 ) -> Steps[_Part | Estimate]:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
@@ -320,7 +320,7 @@ def _begin(
     except Impossible as impossible:
         return infeasible(behavior, impossible)
     waits, forced = told_apart(course, path, times, passing)
-    paced = paced_by(course, path, times, {*forced, *passing} if forced else ())
+    paced = paced_by(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Deviations(), 0)
     run.bell = clock

@@ -86,7 +86,7 @@ def behavior_times(
     chain = plan.chains[id]
     times = [PlannedTime(sync=point.sync, at=at(point)) for point in chain.points[: max(1, reached)]]
     taken, (_, cut) = _taken(plan, id, at), plan.successors.get(id, ("", None))
-    is_lost = is_paced = False
+    is_lost = False
     left = max(0, reached - 1)
     for (since, to), segment in list(zip(pairwise(chain.points), chain.segments, strict=True))[left:]:
         is_lost = is_lost or to == cut
@@ -99,12 +99,10 @@ def behavior_times(
             break
         is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
         is_due = _is_met_there(plan, to, known, begins) if segment.hold else is_just_in_time
-        is_off = abs(surplus) > NOTICEABLE or is_due
-        is_slower = EPSILON < surplus <= slack(plan, to)
-        if is_off or (is_paced and not segment.hold):
+        if abs(surplus) > NOTICEABLE or is_due:
+            is_slower = EPSILON < surplus <= slack(plan, to)
             when = comes + (APART if id in plan.natural else 0.0)
-            times.append(PlannedTime(sync=to.sync, at=when, through=is_slower or not is_off))
-        is_paced = (is_off or is_paced) and (is_slower or not segment.hold)
+            times.append(PlannedTime(sync=to.sync, at=when, through=is_slower))
     return tuple(times)
 
 
