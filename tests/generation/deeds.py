@@ -35,6 +35,8 @@ PLACES = ((0.5, 0.2, 0.8), (0.45, -0.2, 0.8), (0.6, 0.0, 0.8), (-1.0, 0.2, 0.8),
 """Places of objects: three within reach, one behind the robot, one above its shoulder, one far away."""
 SERVICES = (*roster.ROBOT, "simulation")
 DYING = ("generation", "realizer", "control", "recognition")
+STARTED_AGAIN = 20.0
+"""Seconds after which a program that has died runs again, if its turn still goes on."""
 SAMPLE = 0.06
 """Seconds from an instant within which the body's log has a sample."""
 SEEN = 1.0
@@ -293,7 +295,7 @@ async def happens(
                 await ann.say("no, wait a moment please", seconds=1.5)
             case "leave" if chance.random() < 0.2:
                 await ann.leave()
-                return
+                break
             case "die" if chance.random() < 0.2:
                 name = chance.choice(DYING)
                 if (life := lives.pop(name, None)) is not None:
@@ -301,6 +303,9 @@ async def happens(
                 if chance.random() < 0.5:
                     await asyncio.sleep(chance.uniform(0.1, 2.0))
                     await revive(lives, hub, config)
+    # What is asked of a program that has gone waits for it (docs/bus.md), so somebody starts it again at last.
+    await asyncio.sleep(STARTED_AGAIN)
+    await revive(lives, hub, config)
 
 
 async def revive(lives: dict[str, AsyncExitStack], hub: MemoryHub, config: Any) -> None:

@@ -1,6 +1,7 @@
-"""The reference policy as it was before it asked only for what it needs: a slow oracle, kept as it stood.
+"""The reference policy as it was before it asked only for what it needs: a slow oracle.
 
-It needs every motion from every pose that an earlier reference may leave, each fully estimated (`all_motions`).
+It has one rule more than then: that of decision 0109. It needs every motion from every pose that an earlier reference
+may leave, each fully estimated (`all_motions`).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -41,6 +42,7 @@ class Pair(Struct, frozen=True, kw_only=True):
     channel: Probability
     reliability: Probability
     ruled_out: str = ""
+    by_look: int = 0
 
     @property
     def preference(self) -> tuple[bool, float, int, int]:
@@ -126,6 +128,11 @@ def choose(
                 f"{reference.id}: nothing reaches the minimum reliability {minimum:g}; chose "
                 f"{_pair_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
             )
+        if pair.by_look:
+            warnings.append(
+                f"{reference.id}: {pair.option.text!r} may mean {pair.by_look + 1} objects, and the look alone tells "
+                "which; a higher minimum reliability asks for a point, where one is possible"
+            )
         if choice.gesture == "directed_gaze_with_pointing" and (
             hand := hand_of(motions.point(CURRENT_POSE, choice.target))
         ):
@@ -176,6 +183,7 @@ def considered(
                     channel=channel,
                     reliability=reliability(len(distractors), channel),
                     ruled_out=ruled_out,
+                    by_look=len(said - gazed) if option.text and not points and gesture != "none" else 0,
                 )
             )
     return tuple(pairs)
@@ -238,7 +246,9 @@ def _candidates(
         most = max(round(pair.reliability, ROUNDING) for pair in possible)
         good = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
     best: dict[GestureChoice, Pair] = {}
-    for pair in sorted(good, key=lambda pair: (round(_speaking(pair, config), ROUNDING), pair.preference)):
+    for pair in sorted(
+        good, key=lambda pair: (pair.by_look, round(_speaking(pair, config), ROUNDING), pair.preference)
+    ):
         best.setdefault(pair.gesture, pair)
     return best
 
@@ -321,6 +331,12 @@ def _explain(
             reason = hindrance
         elif short:
             reason = f"R {pair.reliability:.4g} below {minimum:g}"
+        elif any(
+            other.gesture == pair.gesture and other.by_look < pair.by_look
+            for other in table
+            if not other.ruled_out and not _below(other.reliability, minimum)
+        ):
+            reason = f"the look alone rules out {pair.by_look}"
         elif round(seconds - least, ROUNDING) == 0:
             reason = "same cost, less preferred"
         elif seconds > least:
