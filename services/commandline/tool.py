@@ -35,8 +35,8 @@ def main(options: Options) -> int:
     if world is not None and (fields := unlisted(world)):
         complain(
             f"tool: {' and '.join(map(repr, fields))} take any text: the APIs take at most {MOST_VALUES} values and"
-            f" {MOST_LETTERS_IN_ALL} letters in all, and {MOST_LETTERS} letters in a list of more than {MANY}. What is"
-            " no id is refused when performed"
+            f" {MOST_LETTERS_IN_ALL} letters in all, and {MOST_LETTERS} letters in a list of more than {MANY}. What"
+            " is no id is refused when performed"
         )
     print_format(msgspec.json.format(msgspec.json.encode(made), indent=2).decode())
     return DONE
