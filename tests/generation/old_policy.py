@@ -16,11 +16,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.distractors import in_gaze_cone, in_pointing_cylinder, in_zone
+from engage_hri.services.generation.references.distractors import in_zone
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, arm_of, hand_of
 from engage_hri.services.generation.references.pairs import ReferenceScene
 from engage_hri.services.generation.references.policy import Choices, Unreferable
 from engage_hri.services.generation.references.reliability import channel_reliability, reliability
+from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
 """All gestures, the set J of the thesis, from fewer movements to more."""
