@@ -61,7 +61,7 @@ def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Speech) and len(behavior.text) > LONGEST_SPEECH:
             reason = f"{len(behavior.text)} characters of speech, at most {LONGEST_SPEECH} can be said in one go"
-            advice = "say it in several fragments"
+            advice = "say it in several pieces"
             raise _refused(fragment, f"$.behaviors[{index}].text", reason, behavior.line, advice)
     _check_targets(fragment, world, robot)
     for index, behavior in enumerate(fragment.behaviors):
