@@ -115,7 +115,9 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     return Summary(
         status=status,
         said=joined(each.text for each in spoken),
-        cut_short=bool(statuses - {"done", "refused"}) or not all(each.complete for each in spoken),
+        cut_short=bool(statuses - {"done", "refused"})
+        or any(outcome.unsaid for outcome in outcomes)
+        or not all(each.complete for each in spoken),
         references=tuple(
             Referred(
                 object=each.object,

@@ -347,7 +347,7 @@ class FragmentRunner:
                 if performance.is_over:
                     break
                 self._follow_gaze(performance)
-                self._discourse = self._discourse.without(performance.fragment.id, performance.unsaid)
+                self._discourse = self._discourse.without(performance.fragment.id, performance.unmentioned)
                 if (following := await self._begin(performance)) is None:
                     return
                 outcome = await following.outcome
@@ -361,7 +361,7 @@ class FragmentRunner:
         """Draw the consequences of a block that has ended, or that will never be, for turn, head and discourse."""
         now, fragment = self._bus.now(), performance.fragment
         self._follow_gaze(performance)
-        self._discourse = self._discourse.without(fragment.id, performance.unsaid)
+        self._discourse = self._discourse.without(fragment.id, performance.unmentioned)
         if performance.refusal is not None:
             aborted = self._turns.fragment_refused(fragment.id, now)
         else:
