@@ -63,7 +63,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     eye_contact: the person returned the look at the end of the turn; absent: the turn goes on, or the robot
     did not look.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
-    absent: the turn expects none, or recognition has gone.
+    absent: the turn expects none, or has been broken off before its end, or recognition has gone.
     answered_by: id of the person who answered.
     heard: what people have said during and after the turn, and before it since the last, in order.
     problems: what went wrong, in words.
@@ -155,7 +155,7 @@ def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
 
 def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal["none", "pending"] | None:
     """Answer to the turn, as in `Summary`. is_over: the turn ended early, so no answer is waited for any more."""
-    if pair is None or pair.state == "lost" or (is_over and pair.state == "started"):
+    if pair is None or pair.state in ("lost", "withdrawn") or (is_over and pair.state == "started"):
         return None
     if pair.state == "started":
         return "pending"

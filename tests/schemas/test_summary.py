@@ -95,7 +95,7 @@ def test_who_did_not_look_and_who_was_not_waited_for() -> None:
     assert [(each.by, each.looked) for each in told] == [("pointing", False), ("a look", None), ("words alone", None)]
 
 
-def test_an_answer_is_pending_none_or_none_expected() -> None:
+def test_an_answer_is_pending_none_or_not_waited_for() -> None:
     answers = [
         summary(outcome(events=events)).answer
         for events in (
@@ -107,7 +107,7 @@ def test_an_answer_is_pending_none_or_none_expected() -> None:
         )
     ]
 
-    assert answers == ["pending", "none", "none", "speak", None]
+    assert answers == ["pending", "none", None, "speak", None]
 
 
 def test_the_fragments_of_a_turn_are_told_together_each_event_in_its_last_state() -> None:
