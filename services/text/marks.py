@@ -19,7 +19,7 @@ from string import digits
 
 import regex
 
-from engage_hri.schemas.suggestion import meant
+from engage_hri.schemas.suggestion import in_other_letters, meant
 from engage_hri.services.text import patterns as mark
 from engage_hri.services.text.acts import LISTS
 from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason
@@ -281,7 +281,7 @@ class Reader:
     def _refer(self, found: Found) -> bool:
         id, is_other = found["id"], not self._ids.is_unknown and found["id"] not in self._ids.ids
         if is_other:
-            id = self._ids.meant(id)
+            id = in_other_letters(id, self._ids.ids)
         if not id or (self._ids.is_unknown and self._is_index(found.start())):
             return False
         if is_other:
