@@ -42,8 +42,6 @@ SHELLS = {
     "services/recording/replay.py",  # says what was said
     "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
-    "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
-    "services/hostile/visitor.py",  # an honest client
     "services/console/follow.py",  # subscribes
     "services/console/live.py",  # draws
     "services/console/web/server.py",  # serves the page

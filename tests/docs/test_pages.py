@@ -60,7 +60,7 @@ ELSEWHERE = {
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
-    ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
+    ("docs/hostile.md", "sh"): "tests/hostile/test_command.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }
 """Blocks that the tests of their part hold to what they say."""
