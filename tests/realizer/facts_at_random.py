@@ -33,12 +33,15 @@ class Arc(Struct):
 class Model(Struct):
     """What is known of a running net. base: no earlier than that. passed: when behaviors passed transitions.
 
-    latest: when the first passed a transition, where another, who had yet to pass it, was to wait there for the end
-    of its next phase. That one is not expected to wait any longer (docs/decisions/0043), if its phase can be slower.
+    latest: when the first passed a transition that a bound holds back, other than on a phase of its own. Who is left
+    there is not expected to wait any longer (docs/decisions/0043), if a phase can be slower for that, or one can be
+    shorter that the plan makes shorter.
+    planned: seconds from the start of the block to each transition, in the plan.
     """
 
     net: PetriNet
     factor: dict[str, float]
+    planned: tuple[float, ...]
     foreseen: dict[int, float] = field(default_factory=dict)
     facts: dict[int, float] = field(default_factory=lambda: {0: BEGAN})
     base: dict[int, float] = field(default_factory=dict)
@@ -73,7 +76,7 @@ class Model(Struct):
         """It has passed the transition."""
         self.arrive(behavior, transition, at)
         self.passed[behavior, transition] = at
-        waiting = {each.behavior for each in self.arcs() if each.is_bound and each.target == transition} - {""}
+        waiting = {each.behavior for each in self.arcs() if each.is_bound and each.target == transition}
         if transition not in self.facts and any((each, transition) not in self.passed for each in waiting):
             self.latest.setdefault(transition, at)
 
@@ -81,15 +84,28 @@ class Model(Struct):
         """Transitions that others are to pass later, by these times, than the first has."""
         return {each for each, at in self.latest.items() if each not in self.facts and times[each] > at + 1e-6}
 
-    def slower(self, arcs: Iterable[Arc], times: list[float] | None = None) -> list[Arc]:
-        """With phases that are slower than is natural: as these times need it; without these, as slow as can be."""
+    def bent(self, arcs: Iterable[Arc], times: list[float] | None = None) -> list[Arc]:
+        """With phases that are slower than is natural, and shorter where the plan has them so: as these times need
+        it; without these, as much as can be."""
         found = []
         for arc in arcs:
-            if arc.is_bound and arc.behavior and self._fixed(arc) is None:
-                seconds = arc.least if times is None else max(arc.least, times[arc.target] - times[arc.source])
+            is_slower = arc.is_bound and arc.behavior and self._fixed(arc) is None
+            if is_slower or (arc.behavior and not arc.is_bound and self._is_hurried(arc)):
+                begun = self.passed.get((arc.after, arc.source)) if arc.after else None
+                since = 0.0 if times is None else times[arc.source] if begun is None else begun
+                seconds = arc.least if times is None else max(arc.least, times[arc.target] - since)
                 arc = replace(arc, seconds=min(arc.seconds, seconds))
             found.append(arc)
         return found
+
+    def _is_hurried(self, arc: Arc) -> bool:
+        """True for a phase that the plan makes shorter than is natural."""
+        natural = next(
+            each.lag
+            for each in self.net.places
+            if (each.kind, each.behavior, each.source) == ("phase", arc.behavior, arc.source)
+        )
+        return self.planned[arc.target] - self.planned[arc.source] < natural
 
     def arcs(self) -> list[Arc]:
         """All that holds now; a phase that has begun counts from then, and one that has ended not at all."""
@@ -242,7 +258,7 @@ class Story:
         self.case = case(chance, is_elastic=is_elastic)
         self.factor: dict[str, float] = {name: chance.choice((1.0, 1.0, 1.5)) for name in self.case.stations}
         foreseen = {each: BEGAN + chance.choice((-1.0, 0.0, 1.0, 3.0)) for each in self.case.foreign}
-        self.model = Model(self.case.net, self.factor, dict(foreseen))
+        self.model = Model(self.case.net, self.factor, self.case.plan.schedule, dict(foreseen))
         points = {Point(f"other:b{each}", "end"): at for each, at in foreseen.items()}
         points[Point("other:nobody", "end")] = 99.0
         self.forecast = Forecast(self.case.plan, BEGAN, lambda id: self.factor.get(id, 1.0), points)

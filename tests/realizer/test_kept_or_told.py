@@ -16,10 +16,6 @@ def random_block(number: int) -> str:
     return story(0, number, "alone").blocks[0].xml
 
 
-MISJUDGED = {random_block(105)}
-"""The look home depends on when the head is turned, and that on the look: it is told late by 0.03 s too little."""
-
-
 @pytest.mark.parametrize("tie", ['start="a:strokeStart+0.2"', 'stroke="a:stroke+0.5"'])
 def test_a_stand_or_an_earlier_end_keeps_a_tie_between_two_nods(tie: str) -> None:
     told = perform(f'<bml xmlns="{BML}" id="k">{NODS.format(tie)}</bml>')
@@ -53,8 +49,15 @@ def test_a_plan_that_the_body_refutes_is_told_at_planning_with_all_that_waits_fo
     assert [each for each in missed(perform(random_block(number))) if each.is_silent] == []
 
 
+@pytest.mark.parametrize("number", [105, 452, 498, 805, 1041])
+def test_what_is_rehearsed_is_what_is_asked_for_in_the_performance(number: int) -> None:
+    """Looks home that a shift turns on its way; a face that hurries for a hand; a hand that is taken over; a nod that
+    cannot be slower on its way."""
+    assert [each for each in missed(perform(random_block(number))) if each.is_silent] == []
+
+
 def test_no_constraint_of_a_random_block_is_broken_in_silence() -> None:
-    blocks = [xml for _, xml in random_blocks(0, share_of(300)) if xml not in MISJUDGED]
+    blocks = (xml for _, xml in random_blocks(0, share_of(2000, one_of=20)))
     silent = [xml for xml in blocks if any(each.is_silent for each in missed(perform(xml)))]
 
     assert silent == []
@@ -62,6 +65,6 @@ def test_no_constraint_of_a_random_block_is_broken_in_silence() -> None:
 
 def test_pairs_of_one_type_are_on_time_or_told_not_to_be() -> None:
     cases = [xml for _, xml in pairs(offsets(0.05))]
-    some = Random(0).sample(cases, share_of(120))
+    some = Random(0).sample(cases, share_of(len(cases), one_of=65))
 
     assert [xml for xml in some if any(each.is_silent for each in missed(perform(xml)))] == []

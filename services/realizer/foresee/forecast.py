@@ -180,9 +180,7 @@ class Forecast(LongestPaths):
         """
         bounds = [self._arcs[each] for each in self._in[transition] if self._arcs[each].is_on or each in self._broken]
         is_kept = self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
-        if not (is_kept or is_foreign(behavior)) and any(
-            arc.is_bound and arc.behavior not in ("", behavior) for arc in bounds
-        ):
+        if not (is_kept or is_foreign(behavior)) and any(arc.is_bound and arc.behavior != behavior for arc in bounds):
             node = self._new_node()
             self.times[node] = at
             self._as_others.add(self._add(transition, node, 0.0, 0.0, "", is_bound=True))
@@ -302,8 +300,10 @@ class Forecast(LongestPaths):
         """Most seconds that the phase may take that ends at `target`; inf where the body can wait."""
         return self._longest.get((behavior, target), inf) * self._factor(behavior)
 
-    def is_hurried(self, behavior: str) -> bool:
-        """True if a phase of the behavior is to be faster than is natural."""
+    def is_hurried(self, behavior: str, target: int | None = None) -> bool:
+        """True if a phase of the behavior is to be faster than is natural. target: where it ends; None: anywhere."""
+        if target is not None:
+            return self._phase_to.get((behavior, target)) in self._given_way
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 
@@ -357,7 +357,7 @@ class Forecast(LongestPaths):
         room = {each: self._arcs[each].seconds - self._arcs[each].least for each in numbers}
         elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
         if (as_others := next((each for each in numbers if each in self._as_others), None)) is not None:
-            elastic = [each for each in elastic if self._arcs[each].is_bound]
+            elastic = [each for each in elastic if self._arcs[each].is_bound or each in self._bent]
         boundless = [each for each in elastic if room[each] == inf]
         if boundless:
             elastic = [min(boundless, key=lambda each: (each not in self._bent, self._rank[self._arcs[each].target]))]
@@ -375,7 +375,8 @@ class Forecast(LongestPaths):
                 self._given_way.add(each)
                 self._set_seconds(each, self._arcs[each].seconds - share * room[each])
         if not enough and as_others is not None:
-            self._break(as_others)
+            self._given_way.add(as_others)
+            self._set_seconds(as_others, self._arcs[as_others].seconds - excess)
         elif not enough:
             bounds = [each for each in numbers if self._arcs[each].is_bound]
             self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))
