@@ -14,7 +14,6 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.summary import Summary
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK
@@ -31,6 +30,7 @@ from tests.docs.pages import (
     left_to_the_reader,
     spans,
 )
+from tests.schemas.feedback_reader import decode_feedback
 
 pytestmark = pytest.mark.real_time
 
