@@ -8,7 +8,6 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.speakable import joined
@@ -115,7 +114,7 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     return Summary(
         status=status,
         said=joined(each.text for each in spoken),
-        cut_short=bool(statuses - {"done", "refused"})
+        cut_short=bool(statuses & {"failed", "interrupted"})
         or any(outcome.unsaid for outcome in outcomes)
         or not all(each.complete for each in spoken),
         references=tuple(
@@ -137,16 +136,6 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
         problems=_problems(wrong),
     )
-
-
-def refusal(fault: Fault) -> Summary:
-    """Summary of a refused fragment: nothing was said or done, and why."""
-    return Summary(status="refused", problems=_problems([str(fault)]))
-
-
-def unknown(fault: Fault) -> Summary:
-    """Summary of a fragment of which nobody knows what became of it: it may have been said and done."""
-    return Summary(status="unknown", problems=_problems([str(fault)]))
 
 
 def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
