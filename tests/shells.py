@@ -22,7 +22,6 @@ SHELLS = {
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
-    "services/generation/reconsideration.py",  # waits for what changes, and asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/ordinary.py",  # a body that moves on the loop's clock

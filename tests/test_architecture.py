@@ -60,7 +60,7 @@ LAYERS = {
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions blame estimates refusals spoken switching told unheard waiting > live warned > body"
     " > calibration > extras fitting > variability > config",
-    "services/generation": "service > fragment_runner > reconsideration > performance > body_link choosing_again"
+    "services/generation": "service > fragment_runner > performance > body_link choosing_again"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
