@@ -38,7 +38,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.lost import bearable, unsaid
+from engage_hri.services.generation.lost import bearable, left_unsaid
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, planning, targets
@@ -108,7 +108,7 @@ class FragmentRunner:
         fragment = checked(fragment, world, self._bus.robot)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
-        performance.warn((*lost, *unsaid(fragment)))
+        performance.warn((*lost, *left_unsaid(fragment)))
         performance.known = named_objects(fragment, world)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)

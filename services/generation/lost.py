@@ -46,7 +46,7 @@ def bearable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFrag
     return _retied(changed, left_out) if left_out else changed, tuple(warnings)
 
 
-def unsaid(fragment: TurnFragment) -> tuple[str, ...]:
+def left_unsaid(fragment: TurnFragment) -> tuple[str, ...]:
     """Say what of a fragment's words is for the eye alone, and so is not said."""
     speeches = [each for each in fragment.behaviors if isinstance(each, Speech)]
     return tuple(f"{each.id}: {problem}" for each in speeches for problem in heard(each.text).problems)

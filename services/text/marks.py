@@ -184,16 +184,10 @@ class Reader:
         self._break(found)
         self._is_heading, self._is_line_start = True, False
 
-    def _ends_heading(self, found: Found) -> bool:
-        return self._is_heading
-
     def _bullet(self, found: Found) -> None:
         self._break(found)
         self._is_list = self._is_item = True
         self._has_stars = found[0] == "*"
-
-    def _task(self, found: Found) -> bool:
-        return self._is_item
 
     def _number(self, found: Found) -> None:
         if found["number"] == "1" or self._is_list or not self._has_paragraph:
@@ -405,7 +399,7 @@ _INLINE = _table(
     ("*", r"\*+(?=[^*])", Reader._skips),
     ("_", "_+(?=[^_])", Reader._skips),
     ("~", "~~+(?=[^~])", Reader._skips),
-    ("#", mark.HEADING_ENDS, Reader._ends_heading),
+    ("#", mark.HEADING_ENDS, lambda reader, found: reader._is_heading),
     ("|", r"\|(?:[ \t]*:?-+:?[ \t]*\|)+", Reader._break),  # XML makes one line of a table
     ("|", r"\|", Reader._bar),
     ("!", mark.IMAGE, Reader._skips),
@@ -415,7 +409,7 @@ _INLINE = _table(
     ("<", mark.TOKEN, Reader._skips),
     ("<", mark.AUTOLINK, Reader._address),
     ("<", mark.TAG, Reader._tag),
-    ("[", mark.TASK, Reader._task),
+    ("[", mark.TASK, lambda reader, found: reader._is_item),
     ("[", mark.DEFINITION, Reader._defined),
     ("[", mark.FOOTNOTE, Reader._cited),
     ("[", mark.CITATION, Reader._cited),
