@@ -5,7 +5,7 @@ told waits until `update`. What is asked of them is in `foresight.py`.
 """
 
 import heapq
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from math import inf
 from typing import Any
 
@@ -17,6 +17,7 @@ from engage_hri.services.realizer.foresee.utterances import Interval, Utterances
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.slack import BRAKING
 from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, frozen, performer, stands_soon
 
 SURPRISE: Seconds = 0.008
@@ -281,11 +282,11 @@ class Expectations(Observer):
             function(*arguments)
         self._news.clear()
 
-    def update(self, now: Seconds) -> Iterable[int]:
+    def update(self, now: Seconds, may_pass: Callable[[Point], bool]) -> Iterable[int]:
         """Draw the conclusions of all that happened; returns the instants that are expected at another time now.
 
         A behavior that is overdue by a second is expected a second from now; the time for which it is held does not
-        count.
+        count, nor that in which it brakes for a hold point. may_pass: False for one that it has to stop at.
         """
         if self.forecast is None:
             return ()
@@ -306,6 +307,8 @@ class Expectations(Observer):
                 continue
             expected = max(expected, self.asked(chain.points[number], expected))
             until = due = expected + facts.held_between(facts.reached[chain.points[number - 1]], now, behavior)
+            if not may_pass(chain.points[number]):
+                until = due = due + BRAKING
             if facts.is_held(behavior):
                 until = max(now, due)
             elif due < now - EPSILON:  # and not slower on purpose

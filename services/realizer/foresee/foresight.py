@@ -75,7 +75,8 @@ class Foresight(Expectations):
             is_end = not may_pass(point)
             if is_end and is_hurried and index:
                 at, is_off, is_end = max(at, forecast.times[here]), True, False
-                stops.add(point.sync)
+                if self._net.part_of[point].point == point:
+                    stops.add(point.sync)
             planned.append((point.sync, at))
             told = len(planned) if is_off else told
             if is_end:
