@@ -35,9 +35,9 @@ class Expectations(Observer):
 
     paces: the pace that each behavior was last told. paced: those that ever hurried or dawdled: a gesture that was
     made smaller says nothing about speed from there on. is_surprised: something has moved by `SURPRISE` since the
-    last call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
-    times of points of other blocks that this one is tied to. followed: points that others are tied to. forecast:
-    None if nothing in the block needs one.
+    last call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen:
+    expected times of points of other blocks that this one is tied to. followed: points that others are tied to.
+    forecast: None if nothing in the block needs one.
     """
 
     forecast: Forecast | None
