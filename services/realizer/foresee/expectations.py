@@ -33,10 +33,11 @@ Pace = tuple[tuple[str, Seconds], ...]
 class Expectations(Observer):
     """Expectations of a block.
 
-    paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
-    call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
-    times of points of other blocks that this one is tied to. followed: points that others are tied to. forecast:
-    None if nothing in the block needs one.
+    paces: the pace that each behavior was last told. paced: those that ever hurried or dawdled: a gesture that was
+    made smaller says nothing about speed from there on. is_surprised: something has moved by `SURPRISE` since the
+    last call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen:
+    expected times of points of other blocks that this one is tied to. followed: points that others are tied to.
+    forecast: None if nothing in the block needs one.
     """
 
     forecast: Forecast | None
@@ -45,6 +46,7 @@ class Expectations(Observer):
         self.experience = Experience(plan.estimates)
         self.utterances = Utterances(self.experience)
         self.paces: dict[str, Pace] = {}
+        self.paced: set[str] = set()
         self.may_be_slower: set[str] = set()
         """Behaviors that were told to pass a hold point before its instant."""
         self._missed: dict[Point, Seconds] = {}
@@ -214,7 +216,7 @@ class Expectations(Observer):
         """
         chain = self.plan.chains.get(point.behavior)
         number = self._facts.next_number(point.behavior)
-        if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
+        if chain is None or number == 0 or chain.points[number] != point or point.behavior in self.paced:
             return
         before, natural = chain.points[number - 1], chain.segments[number - 1].natural
         if self.utterances.follows(point.behavior):

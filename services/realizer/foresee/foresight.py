@@ -81,6 +81,8 @@ class Foresight(Expectations):
             told = len(planned) if is_off else told
             if is_end:
                 break
+        if told:
+            self.paced.add(behavior)
         return tuple(planned[:told])
 
     # -- expected times ------------------------------------------------------------------------------------------

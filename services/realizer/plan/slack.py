@@ -23,7 +23,7 @@ def slack(plan: Plan, point: Point) -> Seconds:
     if len(members) > 1 or not members[0].can_wait or (hold := members[0].point) in plan.manner.stands:
         return 0.0
     chain = plan.chains[hold.behavior]
-    number = chain.points.index(hold) - 1
+    number = next(index for index, each in enumerate(chain.points) if plan.at[each] == plan.at[hold]) - 1
     longest = chain.longest[number]
     room = inf if longest is None else longest - chain.segments[number].natural
     return min(BRIEF, max(0.0, room) + UNNOTICED)
