@@ -44,6 +44,8 @@ _TOKEN = re.compile(
     rf"(?:[{_STOPS_WIDE}]{_AT_ITS_END})?"
     rf"|[^\w\s]+"
 )
+_CLOSE = re.compile(r"[.,;:!?…)\]}”’»](?!\d)|['’](?:s|d|m|ll|re|ve)\b")
+"""What stands close to the word before it."""
 _UNSPACED_ENDS = re.compile(rf"[{UNSPACED}{_STOPS_WIDE}{_OPENING_WIDE}」』）】》〉］｝〕]")
 
 
@@ -87,10 +89,11 @@ def word_count(text: str) -> float:
 
 
 def joined(texts: Iterable[str]) -> str:
-    """Join texts with single spaces between words, and without where the script has no spaces."""
+    """Join texts with single spaces between words; with none at brackets, stops, and in scripts without spaces."""
     whole = ""
     for text in texts:
         text = " ".join(text.split())
         is_unspaced = whole and text and _UNSPACED_ENDS.match(whole[-1]) and _UNSPACED_ENDS.match(text[0])
-        whole += text if not whole or not text or is_unspaced else f" {text}"
+        is_close = is_unspaced or whole.endswith(tuple(_OPENING)) or _CLOSE.match(text)
+        whole += text if not whole or not text or is_close else f" {text}"
     return whole

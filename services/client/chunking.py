@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from engage_hri.schemas.speakable import joined, word_count
 from engage_hri.schemas.tool import Part, Refer, Say
 from engage_hri.services.text.ear import heard
-from engage_hri.services.text.ends import next_end
+from engage_hri.services.text.ends import ends, next_end
 from engage_hri.services.text.marks import Reader
 from engage_hri.services.text.patterns import PUNCTUATION, is_silent
 from engage_hri.services.text.pieces import Ids, Piece, problems
@@ -65,6 +65,14 @@ class Chunker:
             yield from self._complete([*part.feed(piece.say), *part.finish()])
         else:
             self._parts.append(piece)
+
+    def settled(self, ids: Ids = UNKNOWN) -> Iterator[Chunk]:
+        """Take out what reads as a whole sentence, when nothing has come for a while."""
+        text = f"{self._text}{self._reader.undecided}".rstrip(" \n*_~`")
+        if ends(text, len(text)):
+            yield from self._complete(self._reader.feed(" ", ids))
+            if self._parts:
+                yield self._taken()
 
     def rest(self, ids: Ids = UNKNOWN) -> Chunk:
         """Take out all that is left, when nothing more comes; may be empty."""

@@ -57,6 +57,7 @@ _WIDE_ACTS = {*_ACTS, *_forms(_WIDE_STEMS)}
 LISTS: Mapping[str, Any] = {
     "acts": frozenset(_ACTS),
     "wide": frozenset(_WIDE_ACTS),
+    "third": frozenset(each for each in _WIDE_ACTS if not each.endswith("ing")),
     "quiet": frozenset(f"{_SOUNDS}{_MANNERS}".split()),
     "alone": frozenset(("sigh", "gasp", "cough", "gulp", "yawn", "sniff", "groan", "giggle", "chuckle", "ahem")),
     "no_adverbs": frozenset(("only", "family", "early", "reply", "apply", "supply", "july", "italy", "really")),
@@ -71,4 +72,5 @@ IN_BRACKETS = rf"{_ADVERBS}(?:{_NAMED}|\L<wide>{_OVER}{_MORE}{{0,7}}+|\L<quiet>{
 _ALONE = r"\L<alone>(?=[)*_])"
 IN_PARENTHESES = rf"{_ADVERBS}(?:{_NAMED}|{_ALONE}|\L<acts>{_OVER}{_MORE}{{0,4}}+)[\s…]*+"
 """Longer ones are remarks."""
-IN_ASTERISKS = rf"{_ADVERBS}(?:{_NAMED}|{_ALONE}|\L<wide>{_OVER}{_MORE}{{0,7}}+)[\s…]*+"
+_OTHER = rf"(?P<other>{_NAMED}|{_ALONE}|\L<wide>{_OVER}{_MORE}{{0,7}}+)"
+IN_ASTERISKS = rf"{_ADVERBS}(?:\L<third>{_OVER}{_MORE}{{0,7}}+|{_OTHER})[\s…]*+"

@@ -54,9 +54,7 @@ def heard(text: str) -> Heard:
             places.append(each.place)
         if each.kind in ("say", "symbol") and (text_of := each.text.rstrip()):
             last = len(said) - len(each.text) + len(text_of)
-    # A bracket is words here for everybody: a fragment refers to objects by elements of their own.
-    told = [each for each in pieces if each.reason != "bracket"]
-    return Heard("".join(said), tuple(places), len(text), problems(told))
+    return Heard("".join(said), tuple(places), len(text), problems(pieces))
 
 
 def said(text: str, written: int) -> str:

@@ -34,6 +34,8 @@ _END = "\n\n"
 """Stands behind a text that is over, and before it: all but fences and elements ends at an empty line."""
 _FRESH = frozenset(".!?…。！？:\n\"'”’»)")
 """Characters after which a sentence may begin."""
+_CLOSING = ".,;:!?…)"
+"""Characters that stand close to the word before them."""
 Found = regex.Match[str]
 
 
@@ -87,6 +89,11 @@ class Reader:
             self._leave("thought", f"<{self._element}>")
             found.append(self._found.pop())
         return found
+
+    @property
+    def undecided(self) -> str:
+        """The end of the text, of which more text must tell what it is."""
+        return self._text[self._at :]
 
     def _read(self, ids: Ids, *, is_over: bool) -> list[Piece]:
         self._ids, self._found = ids, []
@@ -203,6 +210,8 @@ class Reader:
             self._break(found)
         if is_blank:
             self._is_list = self._has_paragraph = self._has_stars = False
+            for each in self._open:
+                self._leave("bracket", f"[{each.words.strip()}{meant(each.words.strip(), self._ids.ids)}")
             self._open.clear()
             self._links = 0
         self._is_heading = self._is_row = self._is_item = False
@@ -234,6 +243,8 @@ class Reader:
 
     def _code(self, found: Found) -> None:
         self._literally(*found.span("code"))
+        for each in self._ids.folded.finditer(f"{found['code']} "):
+            self._leave("bracket", each[0])
 
     def _escaped(self, found: Found) -> None:
         self._literally(found.end() - 1, found.end())
@@ -263,9 +274,10 @@ class Reader:
             self._says(found)
 
     def _acted(self, found: Found) -> bool:
-        if is_fresh := not self._last or self._last in _FRESH:
+        is_fresh = not self._last or self._last in _FRESH
+        if is_direction := is_fresh and not (found["small"] and found["other"]):
             self._directed(found)
-        return is_fresh
+        return is_direction
 
     def _directed(self, found: Found) -> None:
         self._leave("direction", found[0])
@@ -286,7 +298,7 @@ class Reader:
         if not id or (self._ids.is_unknown and self._is_index(found.start())):
             return False
         if is_other:
-            self._leave("case", found[0])
+            self._leave("case", self._text[found.start() : found.end("certain") + 1])
         begin = self._offset + found.start()
         self._found.append(Piece("refer", id, begin, begin + len(found[0]), certain=bool(found["certain"])))
         self._last, self._has_paragraph, self._is_item = "]", True, False
@@ -309,7 +321,7 @@ class Reader:
     def _label(self, found: Found) -> bool:
         """Take `][label]`, unless it is an index or a reference of its own."""
         is_label = bool(self._open) and not self._open[-1].is_index
-        if not self._ids.is_unknown and self._ids.exact.match(self._text, found.start() + 1) is not None:
+        if not self._ids.is_unknown and self._ids.exact.match(f"{found[0][1:]} ") is not None:
             is_label = False
         if is_label:
             self._pop()
@@ -323,7 +335,8 @@ class Reader:
         bracket = self._pop()
         words = bracket.words.strip()
         self._leave("bracket", f"[{words}]{meant(words, self._ids.ids)}")
-        if bracket.is_index or self._text[found.end()].isalnum():
+        after = self._text[found.end()]
+        if after.isalnum() or (bracket.is_index and after not in _CLOSING):
             self._spaces(found)
 
     def _pop(self) -> "_Bracket":
@@ -389,6 +402,7 @@ _LINE = _table(
 )
 _INLINE = _table(
     ("\n", r"\n", Reader._newline),
+    (" ", mark.BEFORE_UNSAID, Reader._skips),
     ("\\", rf"\\{mark.PUNCTUATION}", Reader._escaped),
     ("\\", r"\\(?=\n)", Reader._skips),
     ("&", mark.ENTITY, Reader._entity),

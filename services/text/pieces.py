@@ -5,6 +5,8 @@ from typing import Literal, NamedTuple
 
 import regex
 
+from engage_hri.services.text.patterns import ADDRESSED
+
 Kind = Literal["say", "symbol", "silent", "break", "refer", "left"]
 Reason = Literal["", "address", "citation", "direction", "tag", "thought", "definition", "bracket", "case"]
 """Why something was left out, or said otherwise than it may have been meant. `bracket`: names no object, and is said
@@ -72,7 +74,7 @@ class Ids:
     def __init__(self, ids: Collection[str] | None) -> None:
         self.ids = frozenset(ids or ())
         self.is_unknown = ids is None
-        named = r"\[(?P<id>\L<ids>)(?P<certain>!?)\]"
+        named = rf"\[(?P<id>\L<ids>)(?P<certain>!?)\]{ADDRESSED}"
         self.exact = _ANY if ids is None else regex.compile(named, ids=self.ids)
         """Pattern of a bracket that names an object, `[id]` or `[id!]`; the longest id counts."""
         self.folded = regex.compile(named, regex.I | regex.F, ids=self.ids) if self.ids else self.exact

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.tool import Gesture, Part, Refer, Say
 from engage_hri.services.client.chunking import Chunk, Chunker
+from engage_hri.services.text.ear import heard
+from engage_hri.services.text.pieces import Ids
 
 
 def chunks(*pieces: str | Part, **settings: int) -> list[Chunk]:
@@ -142,3 +144,30 @@ def test_no_word_is_torn(text: str) -> None:
     inside = set(re.findall(r"[a-zM]+", text))
 
     assert {word for chunk in words(text) for word in re.findall(r"[a-zM]+", chunk)} == inside
+
+
+@pytest.mark.parametrize("piece", ["Take [vase] now.", Say(say="Take [vase] now.")])
+def test_a_bracket_that_is_said_as_words_is_told_in_text_and_in_parts(piece: str | Part) -> None:
+    chunker = Chunker()
+    assert [*chunker.feed(piece, Ids(())), chunker.rest(Ids(()))]
+
+    assert chunker.left_out == ("brackets that are no reference were said as words: [vase]",)
+    assert heard("Take [vase] now.").problems == ("brackets that are no reference were said as words: [vase]",)
+
+
+@pytest.mark.parametrize("text", ["Take the [blue-squ", "Take `[blue-square]` now."])
+def test_a_bracket_that_is_cut_off_or_in_code_is_words_and_told(text: str) -> None:
+    chunker, ids = Chunker(), Ids(("blue-square",))
+    made = [*chunker.feed(text, ids), chunker.rest(ids)]
+
+    assert all(isinstance(part, Say) for chunk in made for part in chunk)
+    assert chunker.left_out[0].startswith("brackets that are no reference were said as words: [blue-squ")
+
+
+def test_a_finished_sentence_settles_and_an_unfinished_one_does_not() -> None:
+    chunker = Chunker()
+
+    assert list(chunker.feed("Let me")) == list(chunker.settled()) == []
+    assert list(chunker.feed(" look this up for you.")) == []
+    assert list(chunker.settled()) == [(Say(say="Let me look this up for you."),)]
+    assert list(chunker.feed(" Here it is. ")) == [(Say(say="Here it is."),)]

@@ -99,6 +99,27 @@ async def test_a_writer_who_is_silent_for_too_long_has_lost_the_turn() -> None:
     assert result.problems == ("t: silence for 10 s",)
 
 
+@pytest.mark.parametrize(
+    ("text", "said"), [("Let me look this up for you.", "Let me look this up for you."), ("Let me", "")]
+)
+async def test_a_finished_sentence_is_said_though_nothing_follows_and_silence_ends_the_turn(
+    text: str, said: str
+) -> None:
+    async with stage() as here:
+        result = await told(here.robot, writing(text, " Here it is.", pause=40.0))
+        ended = here.robot.now()
+
+    assert (result.status, result.said, result.problems) == ("interrupted", said, ("t: silence for 10 s",))
+    assert ended < 20.0
+
+
+async def test_what_was_said_is_joined_as_it_was_written() -> None:
+    async with stage() as here:
+        result = await told(here.robot, writing("Take ([blue-square](https://example.org)), please."))
+
+    assert result.said == "Take (the blue square), please."
+
+
 async def test_the_robot_looks_away_while_the_writer_thinks() -> None:
     thinking = ToolInput(turn_status="full", parts=(), thinking=True)
     owners = []
