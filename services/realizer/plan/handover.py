@@ -103,21 +103,70 @@ class Conflict(NamedTuple):
         return self.turn[0] not in begun and self.turn not in settled
 
 
+class Hands:
+    """Arms that behaviors use at the times of a schedule, with the hands that are chosen in it.
+
+    chains: of this block, and of others. kept: points that no handover may cost. barred: hands with which a behavior
+    cannot be done.
+    """
+
+    def __init__(
+        self,
+        chains: dict[str, Chain],
+        times: Mapping[Point, Seconds],
+        kept: Container[Point],
+        barred: Container[tuple[str, Hand]],
+    ) -> None:
+        self.chains = chains
+        self._times = times
+        self._kept = kept
+        self._barred = barred
+
+    def choose(self, rivals: Iterable[str]) -> tuple[str, Hand] | None:
+        """Choose the other hand for the first of these that names none and need not wait for that arm, nor it for it.
+
+        That arm may be on its way home, and a movement may do without its reserve.
+        """
+        for id in rivals:
+            chain = self.chains[id]
+            other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None
+            if other is None or not isinstance(chain.behavior, Pointing | Gesture) or chain.behavior.mode is not None:
+                continue
+            arm, hand = other
+            if (id, hand) not in self._barred and self._is_free(arm, chain):
+                self.chains[id] = replace(chain, behavior=replace(chain.behavior, mode=hand), parts=(arm,))
+                return id, hand
+        return None
+
+    def _is_free(self, arm: str, wanting: Chain) -> bool:
+        since, to = self._needed(wanting)
+        windows = [self._needed(each) for each in self.chains.values() if arm in each.parts]
+        return all(end <= since + EPSILON or start >= to - EPSILON for start, end in windows)
+
+    def _needed(self, chain: Chain) -> tuple[Seconds, Seconds]:
+        """From when until when a behavior needs its arm."""
+        times, points = self._times, chain.points
+        kept = [number for number, point in enumerate(points) if point in self._kept]
+        since, to = times[points[0]], times[points[max([least(chain), *kept])]]
+        if chain.type in WITH_STROKE and points[0] not in self._kept:
+            way = [each.to for each in chain.segments].index("stroke_start") + 1
+            since = max(since, times[points[way]] - sum([each.natural for each in chain.segments[:way]]))
+        return since, to
+
+
 def arrange(
     chains: Mapping[str, Chain],
     relations: Relations,
     before: Arrangement,
     times: Mapping[Point, Seconds],
     rounds: Mapping[Point, int],
-    barred: Container[tuple[str, Hand]] = (),
-    given: Mapping[str, Chain] = {},
+    hands: Hands,
     begun: Container[str] = (),
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
-    rounds: order of points that come at one time. barred: hands with which a behavior cannot be done. given:
-    behaviors of other blocks that have parts, with their `times`. begun: behaviors that have begun: they wait for
-    nobody any more, and use the arm that they have.
+    rounds: order of points that come at one time. hands: those that behaviors use, and are given here. begun:
+    behaviors that have begun: they wait for nobody any more, and use the arm that they have.
     """
     held, awaited = relations.held, relations.awaited
     yield len(relations.orders) // 8
@@ -137,6 +186,8 @@ def arrange(
     for id, takers in _takers(chains, ranked, users).items():
         yield len(takers)
         chain, successor = chains[id], takers[0]
+        if set(hands.chains[id].parts).isdisjoint(hands.chains[successor].parts):
+            continue  # One of them uses the other arm from now on, and all is arranged anew.
         if before.successors.get(successor, ("",))[0] == id and id not in begun:
             # Either would come first if the other cut it short. So neither is cut: the one meant to be later waits.
             conflicts.append(Conflict((id, chains[successor].points[-1]), None))
@@ -157,8 +208,8 @@ def arrange(
             if turn is not None:
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
                 rivals = tuple([each for each in (successor, id) if each not in begun])
-                conflicts.append(Conflict(turn, free_hand(rivals, {**chains, **given}, times, barred)))
-                yield 1 + len(chains) // 32  # `free_hand` has looked at all others
+                conflicts.append(Conflict(turn, hands.choose(rivals)))
+                yield 1 + len(chains) // 32  # `hands` has looked at all others
         if chain.type != "speech":
             handovers[id] = tuple([_handover(chain, chains[each], relations, times) for each in takers])
         if id in successors or id in beneath:  # Who begins beneath a look ends by itself, at once.
@@ -329,37 +380,9 @@ def _overlaid(
                 yield id
 
 
-def free_hand(
-    rivals: tuple[str, ...],
-    chains: Mapping[str, Chain],
-    times: Mapping[Point, Seconds],
-    barred: Container[tuple[str, Hand]],
-) -> tuple[str, Hand] | None:
-    """The one of these that can use the other arm, since it names none and the arm is free all the while."""
-    for id in rivals:
-        chain = chains[id]
-        other = _OTHER.get(chain.parts[0]) if len(chain.parts) == 1 else None
-        if other is None or not isinstance(chain.behavior, Pointing | Gesture) or chain.behavior.mode is not None:
-            continue
-        arm, hand = other
-        if (id, hand) in barred:
-            continue
-        if _is_free(arm, window(chain, times), (each for each in chains.values() if each is not chain), times):
-            return id, hand
-    return None
-
-
 def window(chain: Chain, times: Mapping[Point, Seconds]) -> tuple[Seconds, Seconds]:
     """Start and end of a behavior."""
     return times[chain.points[0]], times[chain.points[-1]]
-
-
-def _is_free(
-    arm: str, wanted: tuple[Seconds, Seconds], others: Iterable[Chain], times: Mapping[Point, Seconds]
-) -> bool:
-    since, to = wanted
-    windows: Sequence[tuple[Seconds, Seconds]] = [window(each, times) for each in others if arm in each.parts]
-    return all(end <= since + EPSILON or start >= to - EPSILON for start, end in windows)
 
 
 def hands_refused(block: Block, chosen: Block, estimates: Iterable[Estimate]) -> set[tuple[str, Hand]]:

@@ -20,7 +20,15 @@ from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, asse
 from engage_hri.services.realizer.plan.comparison import compared
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
 from engage_hri.services.realizer.plan.given_up import times_of
-from engage_hri.services.realizer.plan.handover import Arrangement, Conflict, Turn, arrange, kept_points, with_hands
+from engage_hri.services.realizer.plan.handover import (
+    Arrangement,
+    Conflict,
+    Hands,
+    Turn,
+    arrange,
+    kept_points,
+    with_hands,
+)
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner, eased, standing
@@ -258,13 +266,15 @@ class _Planner:
             yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
             rounds = assembly.rounds(solution.times)
+            kept = present.held.union(*(holder.kept for holder in self.known.holders.values()))
+            hands = Hands({**self.chains, **given}, everywhere, kept, self.barred)
             yield len(times) // 4
             arranged, conflicts = yield from arrange(
-                self.chains, present, arrangement, everywhere, rounds, self.barred, given, self.known.begun
+                self.chains, present, arrangement, everywhere, rounds, hands, self.known.begun
             )
             undated = foresight.without_date(assembly, self.known) if given else ()
             waits = foresight.waits(assembly, self.known)
-            sharing = share(self.chains, present, self.known, arranged, everywhere, self.barred, undated, waits)
+            sharing = share(self.chains, present, self.known, arranged, everywhere, hands, undated, waits)
             arranged, others = yield from sharing
             conflicts = [
                 each for each in (*conflicts, *others) if each.is_open(self.known.begun, self.overlaps | self.turns)

@@ -10,7 +10,7 @@ from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import slack
-from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, family
+from engage_hri.services.realizer.points import EPSILON, SHIFTS, WITH_STROKE, Point, family
 
 NOTICEABLE: Seconds = 0.0005
 """Seconds by which a phase may differ before it makes another plan."""
@@ -107,13 +107,16 @@ def behavior_times(
 
 
 def _is_met_there(plan: Plan, hold: Point, known: Known, before: Seconds) -> bool:
-    """True if one comes to this instant who cannot wait: who is at the hold point waits until that is measured.
+    """True if one comes to this instant who cannot wait, or a look: who is at the hold point waits for its report.
 
     before: when it is at the point before. If a point of another block has come by then, it need not stop for it.
     """
-    members = plan.members[plan.at[hold]]
-    others = (each for each in members if each.behavior != hold.behavior and each.kind in ("passive", "prompt"))
-    return any(known.points.get(each.point, inf) > before for each in others)
+    others = (each for each in plan.members[plan.at[hold]] if each.behavior != hold.behavior)
+    return any(
+        known.points.get(each.point, inf) > before
+        for each in others
+        if not each.can_wait or plan.chains[each.behavior].type not in WITH_STROKE
+    )
 
 
 def _taken(plan: Plan, id: str, at: Callable[[Point], Seconds]) -> Seconds:

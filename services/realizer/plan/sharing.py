@@ -9,14 +9,13 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.handover import (
     RELAX,
     Arrangement,
     Conflict,
+    Hands,
     Turn,
-    free_hand,
     is_overlaid,
     last_kept,
     least,
@@ -50,18 +49,19 @@ def share(
     known: Known,
     arranged: Arrangement,
     times: Mapping[Point, Seconds],
-    barred: Container[tuple[str, Hand]] = (),
+    hands: Hands,
     undated: Container[str] = (),
     waits: Waits = NOBODY,
 ) -> Steps[tuple[Arrangement, list[Conflict]]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
-    times: of the points of this block, in the schedule that `arranged` is for, and of others. undated: behaviors that
-    wait for points of which nobody knows yet when they come; they are planned again once it is known.
+    times: of the points of this block, in the schedule that `arranged` is for, and of others. hands: as of `arrange`.
+    undated: behaviors that wait for points of which nobody knows yet when they come; once it is known they are
+    planned again.
     """
     if not known.holders and not known.given:
         return arranged, []
-    shared = _Sharing(chains, relations, known, arranged, times, barred, waits)
+    shared = _Sharing(chains, relations, known, arranged, times, hands, waits)
     for id in chains:
         yield 2 + len(known.holders) // 8
         shared.give(id)
@@ -83,14 +83,14 @@ class _Sharing:
         known: Known,
         arranged: Arrangement,
         times: Mapping[Point, Seconds],
-        barred: Container[tuple[str, Hand]],
+        hands: Hands,
         waits: Waits,
     ) -> None:
         self.waits = waits
         self.chains = chains
         self.known = known
         self.times = times
-        self.barred = barred
+        self.hands = hands
         self.natural = arranged.natural
         self.successors = dict(arranged.successors)
         self.cuts = dict(arranged.cuts)
@@ -250,8 +250,7 @@ class _Sharing:
         turn: Turn = (id, self._behind_all(id, point))
         if turn in self.turns:
             return
-        others = {**self.chains, **{name: holder.chain for name, holder in self.known.holders.items()}}
-        self.conflicts.append(Conflict(turn, free_hand((id,), others, self.times, self.barred)))
+        self.conflicts.append(Conflict(turn, self.hands.choose((id,))))
 
 
 def naming_others(present: Relations, arrangement: Arrangement) -> Relations:
