@@ -12,7 +12,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import canonical_sync
-from engage_hri.schemas.behaviors import Behavior, Event, Head, Reference, Speech, Wait
+from engage_hri.schemas.behaviors import LONGEST_SPEECH, Behavior, Event, Head, Reference, Speech, Wait
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import LONGEST_WITHIN, TurnFragment
 from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
@@ -151,6 +151,9 @@ def _values(behavior: Behavior) -> Iterator[tuple[str, str, str]]:
     if isinstance(behavior, Head) and not 1 <= behavior.repetition <= MOST_NODS:
         yield f"repetition {behavior.repetition}", "repetition", f"1 to {MOST_NODS}"
     if isinstance(behavior, Speech):
+        if len(behavior.text) > LONGEST_SPEECH:
+            reason = f"{len(behavior.text)} characters of speech, at most {LONGEST_SPEECH} are said in one go"
+            yield reason, "text", "say it in several pieces"
         yield from _marks(behavior)
 
 

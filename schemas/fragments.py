@@ -147,6 +147,8 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
     fragment: str
     status: Literal["done", "failed", "interrupted", "unknown", "refused"]
     spoken: tuple[SpokenText, ...] = ()
+    unsaid: tuple[str, ...] = ()
+    """Ids of the speeches and references of which no word was said, though they have words, in order."""
     references: tuple[ReferenceMade, ...] = ()
     """How each reference really was made, in order."""
     eye_contact: bool | None = None

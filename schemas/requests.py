@@ -57,6 +57,13 @@ class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
         return self
 
 
+LAPSED = "nobody has renewed it"
+GONE = "requester is gone"
+CLOSED = "requester closed"
+ORPHANED = frozenset((LAPSED, GONE, CLOSED))
+"""Reasons of a `Cancel` that nobody wants: there is nobody any more who asked."""
+
+
 class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=True):
     """cmd: end one's own request `id`, as interrupted. It counts only from the process that has asked.
 

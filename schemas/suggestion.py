@@ -26,6 +26,12 @@ def suggestion(name: str, known: Iterable[str], none: str = "known: none") -> st
     return f"known: {', '.join(names[:MOST])}{', ...' if len(names) > MOST else ''}"
 
 
+def in_other_letters(name: str, known: Iterable[str]) -> str:
+    """The one known name that is this one but for capital letters; empty: there is none, or several."""
+    same = [each for each in known if each.casefold() == name.casefold()]
+    return same[0] if len(same) == 1 else ""
+
+
 def _nearest(name: str, names: list[str], cutoff: float) -> str:
     """The name that is most like this one, whatever its case; empty if none is."""
     folded = {each.casefold(): each for each in reversed(names)}

@@ -8,7 +8,6 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.speakable import joined
@@ -63,7 +62,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     eye_contact: the person returned the look at the end of the turn; absent: the turn goes on, or the robot
     did not look.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
-    absent: the turn expects none, or recognition has gone.
+    absent: the turn expects none, or has been broken off before its end, or recognition has gone.
     answered_by: id of the person who answered.
     heard: what people have said during and after the turn, and before it since the last, in order.
     problems: what went wrong, in words.
@@ -115,7 +114,9 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     return Summary(
         status=status,
         said=joined(each.text for each in spoken),
-        cut_short=bool(statuses - {"done", "refused"}) or not all(each.complete for each in spoken),
+        cut_short=bool(statuses & {"failed", "interrupted"})
+        or any(outcome.unsaid for outcome in outcomes)
+        or not all(each.complete for each in spoken),
         references=tuple(
             Referred(
                 object=each.object,
@@ -137,23 +138,13 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     )
 
 
-def refusal(fault: Fault) -> Summary:
-    """Summary of a refused fragment: nothing was said or done, and why."""
-    return Summary(status="refused", problems=_problems([str(fault)]))
-
-
-def unknown(fault: Fault) -> Summary:
-    """Summary of a fragment of which nobody knows what became of it: it may have been said and done."""
-    return Summary(status="unknown", problems=_problems([str(fault)]))
-
-
 def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
     return max(events, key=lambda event: event.started.seconds, default=None)
 
 
 def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal["none", "pending"] | None:
     """Answer to the turn, as in `Summary`. is_over: the turn ended early, so no answer is waited for any more."""
-    if pair is None or pair.state == "lost" or (is_over and pair.state == "started"):
+    if pair is None or pair.state in ("lost", "withdrawn") or (is_over and pair.state == "started"):
         return None
     if pair.state == "started":
         return "pending"

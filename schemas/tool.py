@@ -137,6 +137,8 @@ MOST_VALUES = 1000
 """Values that all lists of a schema may have together, by the documentation of OpenAI's strict functions."""
 MANY, MOST_LETTERS = 250, 15_000
 """A list of more values than that may have so many letters in all, by the same."""
+MOST_LETTERS_IN_ALL = 120_000
+"""Letters that all lists of a schema and the names of its fields may have together, by the same."""
 
 
 def tool_definition(format: Format = "anthropic", world: World | None = None) -> Schema:
@@ -174,7 +176,7 @@ def input_schema(world: World | None = None) -> Schema:
             "look": look["properties"]["look"],
             "addressee": whole["properties"]["addressee"],
         }
-        for field, ids in _listed(world, MOST_VALUES - sum(map(len, _lists(whole)))).items():
+        for field, ids in _listed(world, whole).items():
             if ids:
                 places[field]["enum"] = ids
         if told := _inventory(world):
@@ -184,12 +186,8 @@ def input_schema(world: World | None = None) -> Schema:
 
 def unlisted(world: World) -> tuple[str, ...]:
     """Fields whose ids the tool of this world does not list, since its readers would not take as many."""
-    return tuple(field for field, ids in _ids(world).items() if ids and not _listed(world, _left())[field])
-
-
-def _left() -> int:
-    """Number of values that the lists without ids leave of those that are allowed."""
-    return MOST_VALUES - sum(map(len, _lists(input_schema())))
+    listed = _listed(world, input_schema())
+    return tuple(field for field, ids in _ids(world).items() if ids and not listed[field])
 
 
 def _ids(world: World) -> dict[str, list[str]]:
@@ -202,13 +200,19 @@ def _ids(world: World) -> dict[str, list[str]]:
     }
 
 
-def _listed(world: World, left: int) -> dict[str, list[str]]:
-    """Ids of each field as far as they fit, whole lists only: an id that a list lacks could not be written at all."""
+def _listed(world: World, schema: Schema) -> dict[str, list[str]]:
+    """Ids of each field as far as they fit, whole lists only: an id that a list lacks could not be written at all.
+
+    schema: without ids. All of its letters count, which is some thousand more than is asked for.
+    """
+    left, letters_left = MOST_VALUES - sum(map(len, _lists(schema))), MOST_LETTERS_IN_ALL - len(str(schema))
     listed = {}
     for field, ids in _ids(world).items():
-        fits = len(ids) <= left and (len(ids) <= MANY or sum(map(len, ids)) <= MOST_LETTERS)
+        letters = sum(map(len, ids))
+        fits = len(ids) <= left and letters <= letters_left and (len(ids) <= MANY or letters <= MOST_LETTERS)
         listed[field] = ids if fits else []
-        left -= len(listed[field])
+        if fits:
+            left, letters_left = left - len(ids), letters_left - letters
     return listed
 
 

@@ -11,9 +11,12 @@ SHARE = 3
 """`make test` tries one of so many cases, the first ones."""
 
 
-def share_of(whole: int) -> int:
-    """Number of random cases to try, of so many in all. The profile of Hypothesis decides (`conftest.py`)."""
-    return -(-whole // SHARE) if settings.get_current_profile_name() == "same" else whole
+def share_of(whole: int, one_of: int = SHARE) -> int:
+    """Number of random cases to try, of so many in all. The profile of Hypothesis decides (`conftest.py`).
+
+    one_of: the share that `make test` tries, where the whole takes minutes.
+    """
+    return -(-whole // one_of) if settings.get_current_profile_name() == "same" else whole
 
 
 def trials() -> int | None:

@@ -22,7 +22,6 @@ SHELLS = {
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
-    "services/generation/reconsideration.py",  # waits for what changes, and asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/body.py",  # the interface of bodies: coroutines
     "services/control/ordinary.py",  # a body that moves on the loop's clock
@@ -42,8 +41,6 @@ SHELLS = {
     "services/recording/replay.py",  # says what was said
     "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
-    "services/hostile/trial.py",  # runs services in virtual time, and is the hostile peer
-    "services/hostile/visitor.py",  # an honest client
     "services/console/follow.py",  # subscribes
     "services/console/live.py",  # draws
     "services/console/web/server.py",  # serves the page

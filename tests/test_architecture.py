@@ -52,7 +52,7 @@ PURE_SHARED = {"recording", "text"}
 """Those of them whose files are pure, as those of a service are."""
 LAYERS = {
     "schemas": "documents > *",
-    "services": "commandline > collaboration console control doctor generation hostile realizer recognition"
+    "services": "commandline > collaboration console control doctor generation realizer recognition"
     " simulation study > client > recording > requests > runtime > bus > tangram text",
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
     "services/bus": "memory zenoh > interface > payloads subscription > samples > answering config journal keyring",
@@ -60,8 +60,8 @@ LAYERS = {
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions blame estimates refusals spoken switching told unheard waiting > live warned > body"
     " > calibration > extras fitting > variability > config",
-    "services/generation": "service > fragment_runner > reconsideration > performance > body_link choosing_again"
-    " fragment_check > acts lost pipeline > block head > references turns > permits > config",
+    "services/generation": "service > fragment_runner > performance > body_link choosing_again"
+    " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
     "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
 }

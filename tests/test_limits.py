@@ -46,7 +46,7 @@ async def test_a_speech_too_long_is_refused_in_a_block_and_in_a_fragment(hub: Me
     async with whole_robot(hub) as robot:
         with pytest.raises(InputRefused, match=r"5005 characters of speech, at most 5000.*say it in several"):
             await robot.realize("b", [Gaze(id="g", target="human"), speech])
-        with pytest.raises(InputRefused, match=r"behaviors\[0\].text: 5005 characters.*say it in several fragments"):
+        with pytest.raises(InputRefused, match=r"behaviors\[0\].text: 5005 characters.*say it in several pieces"):
             await robot.perform(TurnFragment(id="f", turn_status="full", behaviors=(speech,)))
         assert (await robot.realize("c", [Wait(id="w")])).status == "done"
 

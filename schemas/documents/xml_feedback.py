@@ -1,4 +1,4 @@
-"""Feedback as XML in the forms of BML 1.0, and back.
+"""Feedback as XML in the forms of BML 1.0.
 
     <blockProgress id="block-1:start" globalTime="12.5" characterId="Melvin"/>
     <syncPointProgress id="block-1:gaze-1:ready" time="0.5" globalTime="13.0"/>
@@ -12,19 +12,16 @@ with a name that no attribute can have is an `ebml:point`. A stream of feedback 
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from itertools import groupby
 from typing import Any, NamedTuple
 
-import msgspec
 from lxml import etree
 
-from engage_hri.schemas.documents.xml_source import BML_1_0, EBML, Source, local_name, split
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.documents.xml_source import BML_1_0, EBML
 from engage_hri.schemas.feedback import (
     BlockProgress,
     Feedback,
-    PlannedPoint,
     PredictionFeedback,
     SyncPointProgress,
     WarningFeedback,
@@ -45,7 +42,7 @@ def _ebml(*names: str) -> dict[str, str]:
     return {name: f"{{{EBML}}}{name}" for name in names}
 
 
-class _Form(NamedTuple):
+class Form(NamedTuple):
     """Form of a message as one element. id: fields that make up its id. attributes: of its other fields, by field."""
 
     kind: type[BlockProgress | SyncPointProgress | WarningFeedback]
@@ -55,19 +52,19 @@ class _Form(NamedTuple):
 
 _GLOBAL_TIME = f"{{{EBML}}}globalTime"
 """Attribute for the time of a warning, which BML does not know."""
-_CLOCK = f"{{{EBML}}}clock"
-_FORMS = {
-    "blockProgress": _Form(
+CLOCK = f"{{{EBML}}}clock"
+FORMS = {
+    "blockProgress": Form(
         BlockProgress, ("block", "progress"), {"at": "globalTime", **_ebml("time", "status")},
     ),
-    "syncPointProgress": _Form(
+    "syncPointProgress": Form(
         SyncPointProgress, ("block", "behavior", "sync"),
         {"time": "time", "at": "globalTime", **_ebml("predicted", "arrived", "skew", "source")},
     ),
-    "warningFeedback": _Form(WarningFeedback, ("block", "behavior"), {"kind": "type", "at": _GLOBAL_TIME}),
+    "warningFeedback": Form(WarningFeedback, ("block", "behavior"), {"kind": "type", "at": _GLOBAL_TIME}),
 }  # fmt: skip
 """Forms of all messages but predictions, by element."""
-_NAMES = {form.kind: name for name, form in _FORMS.items()}
+_NAMES = {form.kind: name for name, form in FORMS.items()}
 
 
 def encode_feedback(message: Feedback, *, in_stream: bool = False) -> str:
@@ -85,7 +82,7 @@ def encode_feedback(message: Feedback, *, in_stream: bool = False) -> str:
 
 def _element(message: BlockProgress | SyncPointProgress | WarningFeedback) -> etree._Element:
     local = _NAMES[type(message)]
-    form = _FORMS[local]
+    form = FORMS[local]
     element = etree.Element(f"{{{BML_1_0}}}{local}", nsmap=_PREFIXES)
     if id := ":".join(getattr(message, field) or "" for field in form.id).rstrip(":"):
         element.set("id", _clean(id))
@@ -100,7 +97,7 @@ def _set(element: etree._Element, name: str, value: Seconds | Stamp | str | None
     """Set an attribute, unless its value is empty; of an instant the clock as well."""
     if isinstance(value, Stamp):
         _set(element, name, float(value.seconds))
-        _set(element, _CLOCK, value.clock)
+        _set(element, CLOCK, value.clock)
     elif value not in (None, ""):
         element.set(name, _number(value) if isinstance(value, float) else _clean(str(value)))
 
@@ -112,7 +109,7 @@ def _prediction(message: PredictionFeedback) -> etree._Element:
         last = max((point.time for point in message.points), default=0.0)
         block.set("globalStart", _number(message.at.seconds))
         block.set("globalEnd", _number(message.at.seconds + last))
-        _set(block, _CLOCK, message.at.clock)
+        _set(block, CLOCK, message.at.clock)
     for (behavior, type), points in groupby(message.points, lambda point: (point.behavior, point.type)):
         is_known = _ATTRIBUTE.fullmatch(type) is not None
         tag = f"{{{EBML if type in _EBML_TYPES else BML_1_0}}}{type}" if is_known else f"{{{EBML}}}behavior"
@@ -135,60 +132,3 @@ def _number(seconds: Seconds) -> str:
 def _clean(text: str) -> str:
     """Replace the characters that XML can't hold (control characters)."""
     return _UNWRITABLE.sub("\ufffd", text)
-
-
-def decode_feedback(data: bytes | str, source: str = "") -> tuple[Feedback, ...]:
-    """Read the messages of one element, or of a stream in `<ebml:feedback>`. Raises InputRefused with the line."""
-    document = Source(data, source)
-    root = document.root
-    elements: Iterable[etree._Element] = root if split(str(root.tag)) == (EBML, "feedback") else (root,)
-    return tuple(_read(document, element) for element in elements)
-
-
-def _read(source: Source, element: etree._Element) -> Feedback:
-    local = local_name(element)
-    if local not in (*_FORMS, "predictionFeedback"):
-        known = "blockProgress, syncPointProgress, predictionFeedback, warningFeedback"
-        raise source.refusal(f"<{local}> is no feedback", element, advice=f"known: {known}")
-    try:
-        return _read_prediction(element) if local == "predictionFeedback" else _read_form(element, _FORMS[local])
-    except (ValueError, LookupError, msgspec.ValidationError) as error:
-        fault = Fault(reason=f"<{local}>: {error}", where=source.name, line=source.line(element))
-        raise InputRefused(fault) from error
-
-
-def _read_form(element: etree._Element, form: _Form) -> Feedback:
-    fields: dict[str, Any] = {"character_id": element.get("characterId", ""), "type": form.kind.__struct_config__.tag}
-    split_id = str.rsplit if form.kind is BlockProgress else str.split
-    fields |= dict(zip(form.id, split_id(str(element.get("id", "")), ":", len(form.id) - 1), strict=False))
-    if form.kind is not SyncPointProgress:
-        fields["block"] = fields["block"] or None
-    fields |= {field: element.get(name) for field, name in form.attributes.items() if name in element.attrib}
-    if seconds := fields.pop("at", None) or element.get("globalTime"):
-        fields["at"] = Stamp(str(element.get(_CLOCK, "")), float(seconds))
-    if form.kind is WarningFeedback:
-        fields["message"] = element.text or ""
-    return msgspec.convert(fields, form.kind, strict=False)
-
-
-def _read_prediction(element: etree._Element) -> PredictionFeedback:
-    about, *behaviors = element
-    points = []
-    for child in behaviors:
-        namespace, type = split(str(child.tag))
-        behavior = str(child.attrib["id"]).rpartition(":")[2]
-        timed = [(str(name), str(time)) for name, time in child.items() if name != "id"]
-        timed += [_named(point) for point in child.iter("{*}sync", "{*}point")]
-        timed.sort(key=lambda point: type == "speech" and point[0] == "end")
-        type = "" if namespace == EBML and type == "behavior" else type
-        points += [PlannedPoint(behavior=behavior, sync=sync, time=float(time), type=type) for sync, time in timed]
-    clock, start = str(about.get(_CLOCK, "")), about.get("globalStart")
-    at = None if start is None else Stamp(clock, float(start))
-    block, character = str(about.attrib["id"]), str(element.get("characterId", ""))
-    return PredictionFeedback(block=block, points=tuple(points), at=at, character_id=character)
-
-
-def _named(point: etree._Element) -> tuple[str, str]:
-    """Name and time of a point that is an element of its own: a mark of a speech, or an `ebml:point`."""
-    name, time = ("id", "ref") if local_name(point) == "sync" else ("sync", "time")
-    return str(point.attrib[name]), str(point.attrib[time])

@@ -19,6 +19,7 @@ from engage_hri.schemas.tool import Part, Refer, Say
 from engage_hri.services.text.ear import heard
 from engage_hri.services.text.ends import next_end
 from engage_hri.services.text.marks import Reader
+from engage_hri.services.text.patterns import PUNCTUATION, is_silent
 from engage_hri.services.text.pieces import Ids, Piece, problems
 
 Chunk = tuple[Part, ...]
@@ -30,7 +31,7 @@ WORDS_OF_REFERENCE = 2
 """Words that a reference counts as, such as "the square": which ones will be chosen is not known yet."""
 _AT_ONCE = 4096
 """Characters that are looked through for ends at once: so the time to read a long text grows with its length only."""
-_LITERAL = frozenset("*_[]<>`~&\\|#()!")
+_MARK = re.compile(PUNCTUATION)
 UNKNOWN = Ids(None)
 
 
@@ -41,8 +42,7 @@ class Chunker:
         self._clause_words = clause_words
         self._reader = Reader()
         self._text = ""
-        """Text for the ear that may still become the end of a clause with what comes. A backslash stands before a
-        character that is no mark, though it looks like one."""
+        """Text for the ear that may still become the end of a clause with what comes."""
         self._since = 0
         """Characters of it in which there is no end."""
         self._is_between_words = True
@@ -83,10 +83,8 @@ class Chunker:
     def _take(self, pieces: list[Piece]) -> Iterator[Chunk]:
         run: list[str] = []
         for piece in pieces:
-            if piece.kind == "say":
+            if piece.kind in ("say", "symbol"):
                 run.append(piece.text)
-            elif piece.kind == "symbol":
-                run.append(f"\\{piece.text}" if piece.text in _LITERAL else piece.text)
             elif piece.kind == "silent":
                 run.append(piece.text if piece.text.isprintable() else " ")
             elif piece.kind == "left":
@@ -143,7 +141,7 @@ class Chunker:
         return sum(word_count(part.say) if isinstance(part, Say) else WORDS_OF_REFERENCE for part in self._parts)
 
     def _say(self, text: str) -> None:
-        if not (said := " ".join(_plain(text).split())):
+        if not (said := " ".join(text.split())):
             return
         before = self._parts[-1] if self._parts else None
         if isinstance(before, Say):
@@ -155,8 +153,8 @@ class Chunker:
         self._is_between_words = False
 
     def _taken(self) -> Chunk:
-        taken, self._parts = tuple(self._parts), []
-        return taken
+        taken, self._parts = self._parts, []
+        return tuple(Say(say=_written(part.say)) if isinstance(part, Say) else part for part in taken)
 
 
 def parts_of(text: str, ids: Ids) -> tuple[Chunk, tuple[str, ...]]:
@@ -171,12 +169,10 @@ def parts_of(text: str, ids: Ids) -> tuple[Chunk, tuple[str, ...]]:
     return tuple(parts), chunker.left_out
 
 
-def _plain(text: str) -> str:
-    """The text without backslashes, unless they are needed: whoever says it reads it as any other text."""
-    if "\\" not in text:
-        return text
-    plain = re.sub(r"\\([^\w\s])", r"\1", text)
-    return plain if heard(plain).text == plain else text
+def _written(words: str) -> str:
+    """Write words for the ear so that they are read as they are: with backslashes if they look like marks."""
+    plain = "".join(" " if is_silent(each) else each for each in words)
+    return words if heard(words).text.split() == plain.split() else _MARK.sub(r"\\\g<0>", words)
 
 
 def _means_something(text: str) -> bool:

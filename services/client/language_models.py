@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment, TurnStatus
-from engage_hri.schemas.summary import Summary, refusal, summary, unknown
+from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
 from engage_hri.schemas.units import Seconds
@@ -57,9 +57,14 @@ async def perform_call(
 
 def summary_of(error: EngageError) -> Summary:
     """Summary of a fragment for which `Robot.perform` raised `error`."""
+    return summary(_outcome_of(error, ""))
+
+
+def _outcome_of(error: EngageError, id: str) -> FragmentOutcome:
     if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
-        return summary(error.outcome)
-    return unknown(error.fault) if isinstance(error, OutcomeUnknown) else refusal(error.fault)
+        return error.outcome
+    is_unknown = isinstance(error, OutcomeUnknown)
+    return FragmentOutcome(id=id, fragment=id, status="unknown" if is_unknown else "refused", fault=error.fault)
 
 
 async def stream(
@@ -166,11 +171,9 @@ class _Speaking:
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self.left_out: tuple[str, ...] = ()
         """What of the text was not said, or otherwise than it may have been meant."""
-        self._refused: set[str] = set()
         self._sent: set[str] = set()
         """Ids of the fragments with a task that has begun, and so has sent its request."""
         self._is_finished = False
-        self._last = ""
         self._closed: TurnClosed | None = None
         """Set when the turn was aborted while no piece came."""
 
@@ -220,7 +223,8 @@ class _Speaking:
 
     async def leave_no_turn_open(self) -> None:
         """End a turn of which a fragment was refused: that may have been the one to end it, or the last one read."""
-        if self._refused and self._performing[0].get_name() not in self._refused:
+        statuses = [task.result().status for task in self._performing]
+        if "refused" in statuses[1:] and statuses[0] != "refused":
             with suppress(EngageError):  # there was none
                 await self._robot.perform(self._fragment((), "end"))
 
@@ -229,13 +233,12 @@ class _Speaking:
         sent = [task for task in self._performing if task.get_name() in self._sent]
         ended = [task.result() for task in sent if not task.cancelled() and task.exception() is None]
         is_silent = bool(sent) and [outcome.status for outcome in ended] == ["done"] * len(sent)
-        if is_silent and (self._last not in self._sent or not self._is_finished):
+        if is_silent and (len(sent) < len(self._performing) or not self._is_finished):
             self._robot.begin_to_perform(self._fragment((), "end"))
 
     def _send(self, chunk: Chunk, status: TurnStatus) -> None:
         self._is_finished = status in ("end", "full")
         fragment = self._fragment(chunk, status)
-        self._last = fragment.id
         # Requests keep the order of these tasks: each is sent in its task's first step.
         self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))
 
@@ -248,20 +251,7 @@ class _Speaking:
         try:
             outcome = await self._robot.perform(fragment, await_answer=self._await_answer)
         except EngageError as error:
-            outcome = self._as_outcome(fragment.id, error)
+            outcome = _outcome_of(error, fragment.id)
         if outcome.status != "done":
             self._reading.cancel()
         return outcome
-
-    def _as_outcome(self, id: str, error: EngageError) -> FragmentOutcome:
-        if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
-            return error.outcome
-        if is_refused := isinstance(error, InputRefused):
-            self._refused.add(id)
-        is_unknown = isinstance(error, OutcomeUnknown)
-        return FragmentOutcome(
-            id=id,
-            fragment=id,
-            status="refused" if is_refused else "unknown" if is_unknown else "failed",
-            fault=error.fault,
-        )

@@ -44,8 +44,6 @@ COMMANDS = {
     "Exit 2 if the name is too long.",
     "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate body). "
     "Exit 2 if nobody sees where it points.",
-    "hostile": "Attack the whole robot, in memory and virtual time only. "
-    "Exit 1 if anything came of it that should not have.",
     "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
     "check-body": "Hold a body to the contract of bodies, and tell where it breaks which. Exit 1 if it breaks one.",
     "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",

@@ -7,7 +7,15 @@ from typing import Annotated
 import msgspec
 import typer
 
-from engage_hri.schemas.tool import MANY, MOST_LETTERS, MOST_VALUES, Format, tool_definition, unlisted
+from engage_hri.schemas.tool import (
+    MANY,
+    MOST_LETTERS,
+    MOST_LETTERS_IN_ALL,
+    MOST_VALUES,
+    Format,
+    tool_definition,
+    unlisted,
+)
 from engage_hri.services.commandline.patient import complain, print_format
 from engage_hri.services.commandline.process import DONE
 from engage_hri.services.commandline.sources import read_world
@@ -26,8 +34,9 @@ def main(options: Options) -> int:
     made = tool_definition(options.format, world)
     if world is not None and (fields := unlisted(world)):
         complain(
-            f"tool: {' and '.join(map(repr, fields))} take any text: the APIs take at most {MOST_VALUES} values in"
-            f" all, and {MOST_LETTERS} letters in a list of more than {MANY}. What is no id is refused when performed"
+            f"tool: {' and '.join(map(repr, fields))} take any text: the APIs take at most {MOST_VALUES} values and"
+            f" {MOST_LETTERS_IN_ALL} letters in all, and {MOST_LETTERS} letters in a list of more than {MANY}. What"
+            " is no id is refused when performed"
         )
     print_format(msgspec.json.format(msgspec.json.encode(made), indent=2).decode())
     return DONE

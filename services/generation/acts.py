@@ -21,7 +21,7 @@ from engage_hri.schemas.syncref import SyncRef
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.block.parts import Made
 from engage_hri.services.generation.turns.policy import TurnPlan
-from engage_hri.services.text.ear import said
+from engage_hri.services.text.ear import is_spoken, said
 
 DECIDED = ("succeeded", "completed", "failed")
 """States of an event that a person has decided, for good or not."""
@@ -194,6 +194,21 @@ def _made(tries: Sequence[tuple[Act, Made]], events: Mapping[str, ConnectionEven
         looked=answered is not None if decided else None,
         delay=answered.delay if answered else None,
     )
+
+
+def unsaid(acts: Iterable[Act]) -> tuple[str, ...]:
+    """Ids of the speeches and references with words of which none was said; of several tries the last one counts."""
+    owed: dict[str, bool] = {}
+    for act in acts:
+        told = {each.behavior for each in act.spoken if has_words(each.text)}
+        phrases = {made.phrase: made.reference for made in act.plan.made}
+        owed |= {made.reference: False for made in act.plan.made}
+        owed |= {
+            phrases.get(each.id, each.id): is_spoken(each.text) and each.id not in told
+            for each in act.plan.block.behaviors
+            if isinstance(each, Speech)
+        }
+    return tuple(id for id, is_owed in owed.items() if is_owed)
 
 
 def eye_contact(acts: Sequence[Act], events: Iterable[ConnectionEvent]) -> bool | None:

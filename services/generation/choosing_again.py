@@ -16,6 +16,7 @@ from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.units import Meters
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.acts import Act
+from engage_hri.services.generation.names import names
 from engage_hri.services.generation.references.motions import Motions
 
 MOVED: Meters = 0.02
@@ -24,9 +25,7 @@ MOVED: Meters = 0.02
 
 def named_objects(fragment: TurnFragment, world: World) -> dict[str, Entity]:
     """Objects that the fragment refers to, or names as distractors, as they are now."""
-    references = [each for each in fragment.behaviors if isinstance(each, Reference)]
-    named = {each.target for each in references}
-    named |= {id for each in references for option in each.options or () for id in option.distractors}
+    named = {each.id for each in names(fragment) if each.kind == "object"}
     return {each.id: each for each in world.objects if each.id in named}
 
 

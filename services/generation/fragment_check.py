@@ -3,27 +3,20 @@
 A bad fragment is refused as a whole, and the fault says where it is wrong.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import (
-    LONGEST_SPEECH,
-    Gaze,
-    GazeShift,
-    HeadDirectionShift,
-    Pointing,
-    Reference,
-    Speech,
-)
+from engage_hri.schemas.behaviors import Reference
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.tool_call import in_call
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import World
+from engage_hri.services.generation.names import known, names, spelled
 
 EMPTY = "the world is empty"
 """Advice where there is nothing that could be named."""
@@ -43,7 +36,7 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
 def check_world(fragment: TurnFragment, world: World, robot: str) -> None:
     """Check again that the world has all that a checked fragment names. Raises InputRefused, as `checked`."""
     with _places_as_written(fragment):
-        _check_targets(fragment, world, robot)
+        _check_names(fragment, world, robot)
 
 
 @contextmanager
@@ -57,29 +50,21 @@ def _places_as_written(fragment: TurnFragment) -> Iterator[None]:
 
 
 def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
-    fragment = validated(fragment)
-    for index, behavior in enumerate(fragment.behaviors):
-        if isinstance(behavior, Speech) and len(behavior.text) > LONGEST_SPEECH:
-            reason = f"{len(behavior.text)} characters of speech, at most {LONGEST_SPEECH} can be said in one go"
-            advice = "say it in several fragments"
-            raise _refused(fragment, f"$.behaviors[{index}].text", reason, behavior.line, advice)
-    _check_targets(fragment, world, robot)
+    fragment, _ = spelled(validated(fragment), known(world, robot))
+    _check_names(fragment, world, robot)
     for index, behavior in enumerate(fragment.behaviors):
         if isinstance(behavior, Reference):
             _check_timing(fragment, index, behavior)
     return replace(fragment, addressee=addressee(fragment, world), delay_target=_delay_target(fragment, world))
 
 
-def _check_targets(fragment: TurnFragment, world: World, robot: str) -> None:
-    known = {entity.id: entity for entity in world.entities}
-    for path, target, line in _targets(fragment):
-        if target not in known and target != robot:
-            advice = suggestion(target, known, EMPTY)
-            raise _refused(fragment, path, f"the world does not know {target!r}", line, advice)
-    objects = {id: entity for id, entity in known.items() if entity.kind == "object"}
-    for index, behavior in enumerate(fragment.behaviors):
-        if isinstance(behavior, Reference):
-            _check_objects(fragment, index, behavior, objects)
+def _check_names(fragment: TurnFragment, world: World, robot: str) -> None:
+    ids = known(world, robot)
+    for name in names(fragment):
+        if name.kind != "person" and name.id not in ids[name.kind]:
+            reason = f"the world does not know {'the object ' if name.kind == 'object' else ''}{name.id!r}"
+            advice = suggestion(name.id, ids[name.kind] - {robot}, EMPTY)
+            raise _refused(fragment, name.path, reason, name.line, advice)
 
 
 def lacks_people(fragment: TurnFragment, world: World) -> bool:
@@ -119,22 +104,6 @@ def _delay_target(fragment: TurnFragment, world: World) -> str:
     return next((entity.id for entity in world.entities if entity.kind == "surface"), "")
 
 
-def _check_objects(fragment: TurnFragment, index: int, reference: Reference, objects: Mapping[str, Entity]) -> None:
-    if reference.target not in objects:
-        reason = f"the world does not know the object {reference.target!r}"
-        path = f"$.behaviors[{index}].target"
-        raise _refused(fragment, path, reason, reference.line, suggestion(reference.target, objects, EMPTY))
-    for number, option in enumerate(reference.options or ()):
-        if objects.keys() >= set(option.distractors):
-            continue
-        for place, distractor in enumerate(option.distractors):
-            if distractor not in objects:
-                path = f"$.behaviors[{index}].options[{number}].distractors[{place}]"
-                reason = f"the world does not know the object {distractor!r}"
-                line = option.line or reference.line
-                raise _refused(fragment, path, reason, line, suggestion(distractor, objects, EMPTY))
-
-
 def _check_timing(fragment: TurnFragment, index: int, reference: Reference) -> None:
     for place, timing in enumerate(reference.timing):
         if timing.sync not in ("start", "end"):
@@ -144,14 +113,6 @@ def _check_timing(fragment: TurnFragment, index: int, reference: Reference) -> N
         if SyncRef.parse(timing.ref).behavior == reference.id:
             path = f"$.behaviors[{index}].timing[{place}].ref"
             raise _refused(fragment, path, "a reference cannot be timed by itself", reference.line, "")
-
-
-def _targets(fragment: TurnFragment) -> Iterator[tuple[str, str, int]]:
-    for index, behavior in enumerate(fragment.behaviors):
-        if isinstance(behavior, Gaze | GazeShift | Pointing | HeadDirectionShift):
-            yield f"$.behaviors[{index}].target", behavior.target, behavior.line
-    if fragment.delay_target:
-        yield "$.delay_target", fragment.delay_target, fragment.line
 
 
 def _refused(fragment: TurnFragment, path: str, reason: str, line: int, advice: str) -> InputRefused:

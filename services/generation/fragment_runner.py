@@ -1,4 +1,7 @@
-"""Runs fragments: takes them, sends their blocks in order, follows these, and answers with the outcomes."""
+"""Runs fragments: takes them, sends their blocks in order, follows these, and answers with the outcomes.
+
+While a fragment goes on, what its references were chosen for may move or leave. Then the choice is looked at again.
+"""
 
 import asyncio
 from collections.abc import Callable, Collection, Iterable
@@ -10,7 +13,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
-from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import AbortBehavior, WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
@@ -21,16 +24,24 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, is_asked_to_stop
 from engage_hri.services.generation.body_link import BodyLink
-from engage_hri.services.generation.choosing_again import barred, named_objects, remembered, with_other_words, without
+from engage_hri.services.generation.choosing_again import (
+    barred,
+    changed,
+    first_that_differs,
+    named_objects,
+    open_references,
+    remembered,
+    with_other_words,
+    without,
+)
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import check_world, checked
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.lost import bearable, unsaid
+from engage_hri.services.generation.lost import bearable, left_unsaid
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, planning, targets
-from engage_hri.services.generation.reconsideration import Reconsideration
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -75,7 +86,8 @@ class FragmentRunner:
         self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
         self._blocks: dict[asyncio.Task[None], str] = {}
         """Tasks that wait for the end of a fragment's block, and the turn of each."""
-        self._choosing = Reconsideration(bus, config, requests, leases, self._body, self._live)
+        self._news = asyncio.Event()
+        """Set when something has changed, in the world or of a fragment."""
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Part of each request id, so that the ids differ after a restart."""
         self._signals = 0
@@ -96,7 +108,7 @@ class FragmentRunner:
         fragment = checked(fragment, world, self._bus.robot)
         turn = self._turns.accept(fragment, fragment.addressee)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
-        performance.warn((*lost, *unsaid(fragment)))
+        performance.warn((*lost, *left_unsaid(fragment)))
         performance.known = named_objects(fragment, world)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)
@@ -169,7 +181,7 @@ class FragmentRunner:
         # A fragment that has ended is second choice, but it still hears of its events.
         performance = min(named, key=lambda each: each.is_over)
         performance.feed(progress)
-        self._choosing.look_again(self._world)
+        self._news.set()
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn)
         self._follow_gaze(performance)
@@ -198,7 +210,7 @@ class FragmentRunner:
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
-        self._choosing.look_again(self._world)
+        self._news.set()
         if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
             self._recognition_lost_at = None
             self._events.lose()
@@ -239,13 +251,13 @@ class FragmentRunner:
         The blocks of one turn are sent at once: each names the points of the others that it follows.
         """
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._choosing.keep(), name="choices")
+            tasks.create_task(self._keep_choices(), name="choices")
             while True:
                 performance = await self._line.get()
                 turn = performance.turn.turn
                 if before := [block for block, its in self._blocks.items() if its != turn]:
                     await asyncio.wait(before)
-                await self._choosing.all_made(turn)
+                await self._all_made(turn)
                 if not performance.is_over and (pending := await self._begin(performance)) is not None:
                     block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
                     self._blocks[block] = turn
@@ -298,7 +310,7 @@ class FragmentRunner:
                 named = [mention.object for mention in made.mentions]
                 self._discourse = self._heard_in(turn).naming(fragment.id, named)
                 performance.is_sent = True
-                self._choosing.look_again(self._world)
+                self._news.set()
                 return pending
         except RequestRefused as error:
             performance.refuse(error.fault, self._bus.now())
@@ -347,7 +359,7 @@ class FragmentRunner:
                 if performance.is_over:
                     break
                 self._follow_gaze(performance)
-                self._discourse = self._discourse.without(performance.fragment.id, performance.unsaid)
+                self._discourse = self._discourse.without(performance.fragment.id, performance.unmentioned)
                 if (following := await self._begin(performance)) is None:
                     return
                 outcome = await following.outcome
@@ -357,11 +369,66 @@ class FragmentRunner:
             self._block_ended(performance)
             self._changed(self._bus.now())
 
+    # -- references, chosen again while their fragments go on -----------------------------------------------------
+
+    async def _all_made(self, turn: str) -> None:
+        """Wait until no reference of the turn's fragments under way is chosen again: words follow on words."""
+        while any(each.acts and each.may_choose_again for each in self._live.values() if each.turn.turn == turn):
+            await self._changes()
+
+    async def _keep_choices(self) -> None:
+        """Choose again where objects have moved or left since the choice, until cancelled."""
+        while True:
+            for performance in list(self._live.values()):
+                if self._has_changed(performance):
+                    with self._bus.containing(f"another choice for fragment {performance.fragment.id}"):
+                        await self._choose_again(performance)
+            await self._changes()
+
+    async def _changes(self) -> None:
+        if self._news.is_set():
+            self._news = asyncio.Event()
+        await self._news.wait()
+
+    def _has_changed(self, performance: FragmentPerformance) -> bool:
+        then, now = performance.world, self._world
+        is_going_on = performance.plan is not None and performance.is_sent and not performance.is_over
+        return is_going_on and then is not None and now is not None and changed(performance.acts[-1], then, now)
+
+    async def _choose_again(self, performance: FragmentPerformance) -> None:
+        """Take out the gestures of the first reference that would be made otherwise in the world as it is now.
+
+        What needs them falls, and the rest of the fragment is performed by another block.
+        """
+        act, turn, now = performance.acts[-1], performance.turn_left, self._world
+        assert now is not None
+        performance.world = world = remembered(now, performance.known)
+        fragment = open_references(performance.left, act)
+        bars = barred(targets(fragment), now, performance.known, performance.barred)
+        permits, body = self._leases.permits(), self._body
+        try:
+            motions = without(await body.motions(targets(fragment), permits.only_hand), bars)
+            made = await body.planned(
+                planning(fragment, turn, world, body.capabilities, motions, permits, self._config)
+            )
+            choices = made.choices
+        except Unreferable:
+            choices = ()
+        except EngageError:
+            return  # the body does not answer: the realizer will tell
+        if performance.is_over or performance.plan is None or performance.acts[-1] is not act:
+            return
+        for gesture in first_that_differs(act, choices, bars):
+            id = f"{performance.block_id}/{gesture}:again"
+            self._requests.send(keys.BLOCK, InterruptBehavior(id=id, block=performance.fragment.id, behavior=gesture))
+
+    # -- ends -----------------------------------------------------------------------------------------------------
+
     def _block_ended(self, performance: FragmentPerformance) -> None:
         """Draw the consequences of a block that has ended, or that will never be, for turn, head and discourse."""
         now, fragment = self._bus.now(), performance.fragment
         self._follow_gaze(performance)
-        self._discourse = self._discourse.without(fragment.id, performance.unsaid)
+        self._discourse = self._discourse.without(fragment.id, performance.unmentioned)
         if performance.refusal is not None:
             aborted = self._turns.fragment_refused(fragment.id, now)
         else:

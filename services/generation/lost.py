@@ -5,23 +5,17 @@ A speaker says the words all the same. Only a fragment of which nothing at all c
 of a turn never is, for that would cost the rest of the turn.
 """
 
+from collections.abc import Set
 from string import ascii_letters, digits
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import (
-    FragmentBehavior,
-    Gaze,
-    GazeShift,
-    HeadDirectionShift,
-    Pointing,
-    Reference,
-    Speech,
-    Wait,
-)
+from engage_hri.schemas.behaviors import FragmentBehavior, Reference, Speech, Wait
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.references import rewritten
 from engage_hri.schemas.suggestion import meant
 from engage_hri.schemas.world import World
+from engage_hri.services.generation.names import Aimed, Ids, known, spelled
 from engage_hri.services.generation.references.phrases import noun_in
 from engage_hri.services.text.ear import heard, is_spoken
 
@@ -32,28 +26,27 @@ _NAME = f"{ascii_letters}{digits}_"
 def bearable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFragment, tuple[str, ...]]:
     """The fragment without what the world does not know, with words in place of references to it, and warnings.
 
-    Phrases that have no words, such as an emoji alone, are left out, too: they name nothing.
+    Ids are spelled as the world spells them. Phrases that have no words, such as an emoji alone, are left out, too:
+    they name nothing.
     """
-    known = {each.id for each in world.entities} | {robot}
-    objects = {each.id for each in world.objects}
-    warnings: list[str] = []
-    behaviors = [_bearable(each, objects, known, warnings) for each in fragment.behaviors]
+    ids = known(world, robot)
+    fragment, told = spelled(fragment, ids)
+    warnings = list(told)
+    behaviors = [_bearable(each, ids, warnings) for each in fragment.behaviors]
     is_piece = fragment.turn_status in ("beginning", "middle", "end")
     pairs = zip(fragment.behaviors, behaviors, strict=True)
     if not is_piece and not any(_is_performed(after) for before, after in pairs if type(after) is type(before)):
-        return fragment, ()  # what it names is refused, if that is wrong
+        return fragment, told  # what it names is refused, if that is wrong
     delay = fragment.delay_target
-    if delay and delay not in known:
-        warnings.append(f"{_unknown(delay, known)}; the robot looks elsewhere while it is silent")
+    if delay and delay not in ids["entity"]:
+        warnings.append(f"{_unknown(delay, ids['entity'])}; the robot looks elsewhere while it is silent")
         delay = ""
-    if not warnings:
-        return fragment, ()
     left_out = {each.id for each in set(behaviors) - set(fragment.behaviors) if isinstance(each, Wait)}
     changed = replace(fragment, behaviors=tuple(behaviors), delay_target=delay)
     return _retied(changed, left_out) if left_out else changed, tuple(warnings)
 
 
-def unsaid(fragment: TurnFragment) -> tuple[str, ...]:
+def left_unsaid(fragment: TurnFragment) -> tuple[str, ...]:
     """Say what of a fragment's words is for the eye alone, and so is not said."""
     speeches = [each for each in fragment.behaviors if isinstance(each, Speech)]
     return tuple(f"{each.id}: {problem}" for each in speeches for problem in heard(each.text).problems)
@@ -63,21 +56,19 @@ def _is_performed(behavior: FragmentBehavior) -> bool:
     return is_spoken(behavior.text) if isinstance(behavior, Speech) else True
 
 
-def _bearable(
-    behavior: FragmentBehavior, objects: set[str], known: set[str], warnings: list[str]
-) -> FragmentBehavior:
+def _bearable(behavior: FragmentBehavior, ids: Ids, warnings: list[str]) -> FragmentBehavior:
     """The behavior, or what is done in its place; a wait takes no time, but others may be tied to it."""
     if isinstance(behavior, Reference):
-        behavior = _with_words(behavior, objects, warnings)
-        return behavior if behavior.target in objects else _as_speech(behavior, objects, warnings)
-    if isinstance(behavior, Gaze | GazeShift | Pointing | HeadDirectionShift) and behavior.target not in known:
-        warnings.append(f"{behavior.id}: {_unknown(behavior.target, known)}; left out")
+        behavior = _with_words(behavior, ids["object"], warnings)
+        return behavior if behavior.target in ids["object"] else _as_speech(behavior, ids["object"], warnings)
+    if isinstance(behavior, Aimed) and behavior.target not in ids["entity"]:
+        warnings.append(f"{behavior.id}: {_unknown(behavior.target, ids['entity'])}; left out")
         begins = tuple(each for each in behavior.timing if each.sync == "start")
         return Wait(id=behavior.id, duration=0.0, timing=begins, line=behavior.line)
     return behavior
 
 
-def _with_words(reference: Reference, objects: set[str], warnings: list[str]) -> Reference:
+def _with_words(reference: Reference, objects: Set[str], warnings: list[str]) -> Reference:
     """The reference with phrases that have words, to be told apart from objects that there are."""
     kept = []
     for each in reference.options or ():
@@ -92,35 +83,22 @@ def _with_words(reference: Reference, objects: set[str], warnings: list[str]) ->
     return reference if tuple(kept) == (reference.options or ()) else replace(reference, options=tuple(kept) or None)
 
 
-def _as_speech(reference: Reference, objects: set[str], warnings: list[str]) -> Speech:
+def _as_speech(reference: Reference, objects: Set[str], warnings: list[str]) -> Speech:
     text = next((each.text for each in reference.options or () if is_spoken(each.text)), noun_in(reference.target))
     how = f"only said: {text!r}" if text else "left out"
     warnings.append(f"{reference.id}: {_unknown(reference.target, objects, 'the object ')}; {how}")
     return Speech(id=reference.id, text=text, timing=reference.timing, line=reference.line)
 
 
-def _retied(fragment: TurnFragment, gone: set[str]) -> TurnFragment:
+def _retied(fragment: TurnFragment, gone: Set[str]) -> TurnFragment:
     """The fragment tied to the start of what is left out where it was tied to another point of that."""
 
     def to_start(ref: str) -> str:
         id, _, rest = ref.partition(":")
         return f"{id}:start{rest.lstrip(_NAME)}" if id in gone else ref
 
-    behaviors = [
-        replace(each, timing=tuple(replace(tie, ref=to_start(tie.ref)) for tie in each.timing))
-        for each in fragment.behaviors
-    ]
-    constraints = [
-        replace(
-            each,
-            operators=tuple(
-                replace(one, ref=to_start(one.ref), syncs=tuple(map(to_start, one.syncs))) for one in each.operators
-            ),
-        )
-        for each in fragment.constraints
-    ]
-    return replace(fragment, behaviors=tuple(behaviors), constraints=tuple(constraints))
+    return rewritten(fragment, to_start)
 
 
-def _unknown(id: str, known: set[str], kind: str = "") -> str:
+def _unknown(id: str, known: Set[str], kind: str = "") -> str:
     return f"the world does not know {kind}{id!r}{meant(id, known)}"

@@ -31,6 +31,7 @@ from engage_hri.services.generation.acts import (
     reasons,
     references_made,
     rest_of,
+    unsaid,
     unshown,
 )
 from engage_hri.services.generation.block.emission import FragmentPlan
@@ -179,7 +180,7 @@ class FragmentPerformance:
         )
 
     @property
-    def unsaid(self) -> frozenset[str]:
+    def unmentioned(self) -> frozenset[str]:
         """Ids of the objects that the fragment was to refer to, and has not."""
         mentions = [(mention, mention.by in act.reached) for act in self.acts for mention in act.plan.mentions]
         said = {mention.object for mention, has_come in mentions if has_come}
@@ -301,6 +302,7 @@ class FragmentPerformance:
             fragment=self.fragment.id,
             status=self._ended.status,
             spoken=tuple(each for act in self.acts for each in act.words),
+            unsaid=unsaid(self.acts),
             references=made,
             eye_contact=eye_contact(self.acts, mine),
             replaced_by=self._ended.replaced_by,

@@ -16,7 +16,7 @@ from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
-from engage_hri.schemas.requests import Cancel, Request, Unreadable
+from engage_hri.schemas.requests import GONE, LAPSED, Cancel, Request, Unreadable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received
@@ -26,7 +26,6 @@ from engage_hri.services.generation.fragment_runner import FragmentRunner
 from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.requests.ends import RequestDesk, Requester
-from engage_hri.services.requests.serving import GONE, LAPSED
 from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.runtime.publisher import Publisher
 from engage_hri.services.runtime.reports import GoesOn, Told

@@ -30,6 +30,7 @@ from engage_hri.schemas.faults import (
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import (
+    CLOSED,
     Accepted,
     Answer,
     Cancel,
@@ -168,7 +169,7 @@ class Requester:
     def close(self) -> None:
         """Stop sending again; what has not ended is cancelled at its server."""
         for id in self._asking.ids:
-            self.cancel(id, "requester closed")
+            self.cancel(id, CLOSED)
         self._fail_all(self._broken or RunFailed("the client is closed"))
 
     def _fail_all(self, error: EngageError) -> None:

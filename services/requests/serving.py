@@ -16,6 +16,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.requests import (
+    GONE,
+    LAPSED,
     Accepted,
     Answer,
     Cancel,
@@ -42,8 +44,6 @@ GRACE: Seconds = 2.0
 """Seconds that a requester may be gone before its requests end: a restart of the router looks like a death."""
 LIFELESS_KEPT: Seconds = 10.0
 """Seconds for which an ended request that names no life is remembered: longer than any wait to send one again."""
-LAPSED = "nobody has renewed it"
-GONE = "requester is gone"
 
 # Members that are used with each message: an enum is slow to look one up.
 _ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN

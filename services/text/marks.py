@@ -18,8 +18,9 @@ from html import unescape
 from string import digits
 
 import regex
+from msgspec import Struct
 
-from engage_hri.schemas.suggestion import meant
+from engage_hri.schemas.suggestion import in_other_letters, meant
 from engage_hri.services.text import patterns as mark
 from engage_hri.services.text.acts import LISTS
 from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason
@@ -34,6 +35,14 @@ _END = "\n\n"
 _FRESH = frozenset(".!?…。！？:\n\"'”’»)")
 """Characters after which a sentence may begin."""
 Found = regex.Match[str]
+
+
+class _Bracket(Struct):
+    """An open bracket. is_index: of the word before it. words: in it so far."""
+
+    is_index: bool
+    is_image: bool
+    words: str = ""
 
 
 class Reader:
@@ -56,8 +65,7 @@ class Reader:
         """The element of which the content is not said, and that has not been closed."""
         self._fence = ""
         """The fence that began a block of code."""
-        self._open: list[tuple[str, bool]] = []
-        """For each open bracket the words in it so far, and whether it is the index of the word before it."""
+        self._open: list[_Bracket] = []
         self._was_index = False
         """True if the bracket that closed last was one: `array[0][1]`."""
         self._links = 0
@@ -128,8 +136,7 @@ class Reader:
     def _say(self, text: str, at: int, size: int) -> None:
         """Say characters. at: their place in the text at hand. size: characters that they take up there."""
         self._piece("say" if len(text) == size else "symbol", text, at, size)
-        if self._open and len(self._open[-1][0]) < _WORDS:
-            self._open[-1] = (self._open[-1][0] + text, self._open[-1][1])
+        self._note(text)
         if not text.isspace():
             self._last = text[-1]
             self._has_paragraph, self._is_item = True, False
@@ -177,16 +184,10 @@ class Reader:
         self._break(found)
         self._is_heading, self._is_line_start = True, False
 
-    def _ends_heading(self, found: Found) -> bool:
-        return self._is_heading
-
     def _bullet(self, found: Found) -> None:
         self._break(found)
         self._is_list = self._is_item = True
         self._has_stars = found[0] == "*"
-
-    def _task(self, found: Found) -> bool:
-        return self._is_item
 
     def _number(self, found: Found) -> None:
         if found["number"] == "1" or self._is_list or not self._has_paragraph:
@@ -281,7 +282,7 @@ class Reader:
     def _refer(self, found: Found) -> bool:
         id, is_other = found["id"], not self._ids.is_unknown and found["id"] not in self._ids.ids
         if is_other:
-            id = self._ids.meant(id)
+            id = in_other_letters(id, self._ids.ids)
         if not id or (self._ids.is_unknown and self._is_index(found.start())):
             return False
         if is_other:
@@ -298,17 +299,16 @@ class Reader:
         is_index = self._is_index(found.start())
         if is_index:
             self._spaces(found)
-        self._open.append(("", is_index))
+        self._open.append(_Bracket(is_index, is_image=_IMAGE.match(self._text, found.start() - 1) is not None))
 
     def _link(self, found: Found) -> bool:
-        if is_link := len(self._open) > self._links:
-            self._pop()
+        if (is_link := len(self._open) > self._links) and not self._pop().is_image:
             self._links = len(self._open)
         return is_link
 
     def _label(self, found: Found) -> bool:
         """Take `][label]`, unless it is an index or a reference of its own."""
-        is_label = bool(self._open) and not self._open[-1][1]
+        is_label = bool(self._open) and not self._open[-1].is_index
         if not self._ids.is_unknown and self._ids.exact.match(self._text, found.start() + 1) is not None:
             is_label = False
         if is_label:
@@ -320,17 +320,22 @@ class Reader:
         if not self._open:
             self._spaces(found)
             return
-        words, is_index = self._pop()
+        bracket = self._pop()
+        words = bracket.words.strip()
         self._leave("bracket", f"[{words}]{meant(words, self._ids.ids)}")
-        if is_index or self._text[found.end()].isalnum():
+        if bracket.is_index or self._text[found.end()].isalnum():
             self._spaces(found)
 
-    def _pop(self) -> tuple[str, bool]:
-        words, self._was_index = self._open.pop()
+    def _pop(self) -> "_Bracket":
+        bracket = self._open.pop()
+        self._was_index = bracket.is_index
         self._links = min(self._links, len(self._open))
-        if self._open and len(self._open[-1][0]) < _WORDS:
-            self._open[-1] = (self._open[-1][0] + words, self._open[-1][1])
-        return words.strip(), self._was_index
+        self._note(bracket.words)
+        return bracket
+
+    def _note(self, words: str) -> None:
+        if self._open and len(self._open[-1].words) < _WORDS:
+            self._open[-1].words += words
 
     # -- elements -------------------------------------------------------------------------------------------------
 
@@ -374,7 +379,7 @@ def _table(*rules: tuple[str, str, Take]) -> dict[str, list[Rule]]:
 
 
 _LINE = _table(
-    (" \t", r"[ \t]+", Reader._spaces),
+    (" \t", r"[ \t]", Reader._spaces),
     (">", ">", Reader._skips),
     ("`~", mark.FENCE, Reader._begins_fence),
     ("-_*=|:", mark.RULE, Reader._break),
@@ -394,7 +399,7 @@ _INLINE = _table(
     ("*", r"\*+(?=[^*])", Reader._skips),
     ("_", "_+(?=[^_])", Reader._skips),
     ("~", "~~+(?=[^~])", Reader._skips),
-    ("#", mark.HEADING_ENDS, Reader._ends_heading),
+    ("#", mark.HEADING_ENDS, lambda reader, found: reader._is_heading),
     ("|", r"\|(?:[ \t]*:?-+:?[ \t]*\|)+", Reader._break),  # XML makes one line of a table
     ("|", r"\|", Reader._bar),
     ("!", mark.IMAGE, Reader._skips),
@@ -404,7 +409,7 @@ _INLINE = _table(
     ("<", mark.TOKEN, Reader._skips),
     ("<", mark.AUTOLINK, Reader._address),
     ("<", mark.TAG, Reader._tag),
-    ("[", mark.TASK, Reader._task),
+    ("[", mark.TASK, lambda reader, found: reader._is_item),
     ("[", mark.DEFINITION, Reader._defined),
     ("[", mark.FOOTNOTE, Reader._cited),
     ("[", mark.CITATION, Reader._cited),
@@ -417,4 +422,4 @@ _INLINE = _table(
 )
 _PLAIN = _table((".", mark.PLAIN, Reader._says))["."]
 _OPENING, _NEWLINE, _LINE_OF_CODE, _CONTENT = map(regex.compile, (r"\[", r"\n", r"[^\n]+", r"<|[^<]+"))
-_HOST, _INDEX, _PUNCTUATION = map(regex.compile, (mark.HOST, mark.INDEX, mark.PUNCTUATION))
+_HOST, _INDEX, _IMAGE, _PUNCTUATION = map(regex.compile, (mark.HOST, mark.INDEX, mark.IMAGE, mark.PUNCTUATION))

@@ -28,9 +28,11 @@ COMMENT = r"<(?:!--[\s\S]*?--|!\[CDATA\[[\s\S]*?\]\]|\?[\s\S]*?\?|![A-Za-z][^>]*
 AUTOLINK = r"<(?P<address>[A-Za-z][A-Za-z0-9+.-]{1,31}:[^\s<>]*|[\w.+-]+@[\w-]+(?:\.[\w-]+)+)>"
 _NO_ADDRESS, _STOPS = r"\s<>\[\]*`|{}\"", ".,;:!?'_~&"
 ADDRESS = (
-    rf"(?i)(?<![\w@.])(?P<address>(?:(?:https?|ftps?|file|mailto|tel):(?://)?|(?=www\.))"
-    rf"(?:[^{_NO_ADDRESS}()]|\([^{_NO_ADDRESS}()]*\))+(?<![{_STOPS}]))(?=[{_STOPS}]*[{_NO_ADDRESS}()])"
+    rf"(?i)(?<![\w@.])(?P<address>(?:(?:https?|ftps?|file|mailto|tel):(?://)?(?=[\w+/])|(?=www\.\w))"
+    rf"(?:[^{_NO_ADDRESS}()]|\([^{_NO_ADDRESS}()]*\))+(?<![{_STOPS}]))"
+    rf"(?=[{_STOPS}]*(?:[{_NO_ADDRESS})]|\([^{_NO_ADDRESS}()]*+[{_NO_ADDRESS}(]))"
 )
+"""With brackets in it that are closed: `https://x.org/a_(b)`, but `(see https://x.org)`."""
 HOST = r"(?i)(?:[a-z]+:/*)?(?:[^/@\s]*@)?(?:www\.)?(?P<host>[^/?#:\s]*)"
 ENTITY = r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#[0-9]{1,7}|#[xX][0-9A-Fa-f]{1,6});"
 _TITLE = r"(?:\"[^\"]*\"|'[^']*'|\([^()]*\))"
@@ -69,7 +71,8 @@ HEADING_ENDS = r"(?<=[ \t])#+[ \t]*(?=\n)"
 BULLET = r"[-+*](?=\s)"
 NUMBER = r"(?P<number>\d{1,9})[.)](?=\s)"
 PLAIN = r"[^\W_ℹ\ufe0f\u20e3]+|[,;:'.?\"/%$+)}={-]+"
-PUNCTUATION = r"[!-/:-@\[-`{-~]"
+PUNCTUATION = r"[!-/:-@\[-`{-~【]"
+"""Characters with which a mark may begin, and that a backslash makes words."""
 
 _SILENT = frozenset(("So", "Sk", "Cf", "Cs", "Co", "Cn", "Cc"))
 """Categories of characters that are not given to an engine: emoji, which it would read out by name, and controls."""

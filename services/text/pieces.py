@@ -75,10 +75,5 @@ class Ids:
         named = r"\[(?P<id>\L<ids>)(?P<certain>!?)\]"
         self.exact = _ANY if ids is None else regex.compile(named, ids=self.ids)
         """Pattern of a bracket that names an object, `[id]` or `[id!]`; the longest id counts."""
-        self.folded = regex.compile(named, regex.IGNORECASE, ids=self.ids) if self.ids else self.exact
+        self.folded = regex.compile(named, regex.I | regex.F, ids=self.ids) if self.ids else self.exact
         """Pattern of one that does in other letters, maybe."""
-
-    def meant(self, written: str) -> str:
-        """Find the one id that was written in other letters; empty: there are several."""
-        found = [each for each in self.ids if each.lower() == written.lower()]
-        return found[0] if len(found) == 1 else ""

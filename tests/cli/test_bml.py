@@ -8,8 +8,8 @@ import pytest
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import read
-from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.grammar import violations
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from tests.cli.command import Engage
 from tests.cli.test_play import lines
+from tests.schemas.feedback_reader import decode_feedback
 
 PLAY = ("play", "--embedded", "--virtual-time", "--quiet")
 REFUSED = {

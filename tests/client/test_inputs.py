@@ -91,6 +91,7 @@ def things(number: int, letters: int) -> World:
     [
         (2, 3, ()), (250, 100, ("look",)),
         (249, 100, ()), (251, 59, ()), (251, 60, ("refer", "look")), (480, 5, ()), (500, 5, ("look",)),
+        (100, 500, ()), (150, 600, ("look",)), (220, 600, ("refer", "look")),
         (900, 5, ("look",)), (976, 5, ("look",)), (1200, 5, ("refer", "look")), (5000, 5, ("refer", "look")),
     ],
 )  # fmt: skip
@@ -104,6 +105,7 @@ def test_a_tool_has_no_more_values_than_its_readers_take(
 
     assert unlisted(world) == left_out
     assert sum(map(len, lists)) <= MOST_VALUES
+    assert sum(len(str(value)) for each in lists for value in each) <= 120_000
     assert all(len(each) <= 250 or sum(len(str(id)) for id in each) <= MOST_LETTERS for each in lists)
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.summary import Summary
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK
@@ -31,6 +30,7 @@ from tests.docs.pages import (
     left_to_the_reader,
     spans,
 )
+from tests.schemas.feedback_reader import decode_feedback
 
 pytestmark = pytest.mark.real_time
 
@@ -60,7 +60,7 @@ ELSEWHERE = {
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
-    ("docs/hostile.md", "sh"): "tests/cli/test_hostile.py",
+    ("docs/hostile.md", "sh"): "tests/hostile/test_command.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }
 """Blocks that the tests of their part hold to what they say."""

@@ -1,6 +1,7 @@
-"""The reference policy as it was before it asked only for what it needs: a slow oracle, kept as it stood.
+"""The reference policy as it was before it asked only for what it needs: a slow oracle.
 
-It needs every motion from every pose that an earlier reference may leave, each fully estimated (`all_motions`).
+It has one rule more than then: that of decision 0109. It needs every motion from every pose that an earlier reference
+may leave, each fully estimated (`all_motions`).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -15,11 +16,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.distractors import in_gaze_cone, in_pointing_cylinder, in_zone
+from engage_hri.services.generation.references.distractors import in_zone
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, arm_of, hand_of
 from engage_hri.services.generation.references.pairs import ReferenceScene
 from engage_hri.services.generation.references.policy import Choices, Unreferable
 from engage_hri.services.generation.references.reliability import channel_reliability, reliability
+from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
 """All gestures, the set J of the thesis, from fewer movements to more."""
@@ -41,6 +43,7 @@ class Pair(Struct, frozen=True, kw_only=True):
     channel: Probability
     reliability: Probability
     ruled_out: str = ""
+    by_look: int = 0
 
     @property
     def preference(self) -> tuple[bool, float, int, int]:
@@ -126,6 +129,11 @@ def choose(
                 f"{reference.id}: nothing reaches the minimum reliability {minimum:g}; chose "
                 f"{_pair_name(pair.gesture, pair.option.text)} with R {pair.reliability:.4g}"
             )
+        if pair.by_look:
+            warnings.append(
+                f"{reference.id}: {pair.option.text!r} may mean {pair.by_look + 1} objects, and the look alone tells "
+                "which; a higher minimum reliability asks for a point, where one is possible"
+            )
         if choice.gesture == "directed_gaze_with_pointing" and (
             hand := hand_of(motions.point(CURRENT_POSE, choice.target))
         ):
@@ -176,6 +184,7 @@ def considered(
                     channel=channel,
                     reliability=reliability(len(distractors), channel),
                     ruled_out=ruled_out,
+                    by_look=len(said - gazed) if option.text and not points and gesture != "none" else 0,
                 )
             )
     return tuple(pairs)
@@ -238,7 +247,9 @@ def _candidates(
         most = max(round(pair.reliability, ROUNDING) for pair in possible)
         good = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
     best: dict[GestureChoice, Pair] = {}
-    for pair in sorted(good, key=lambda pair: (round(_speaking(pair, config), ROUNDING), pair.preference)):
+    for pair in sorted(
+        good, key=lambda pair: (pair.by_look, round(_speaking(pair, config), ROUNDING), pair.preference)
+    ):
         best.setdefault(pair.gesture, pair)
     return best
 
@@ -321,6 +332,12 @@ def _explain(
             reason = hindrance
         elif short:
             reason = f"R {pair.reliability:.4g} below {minimum:g}"
+        elif any(
+            other.gesture == pair.gesture and other.by_look < pair.by_look
+            for other in table
+            if not other.ruled_out and not _below(other.reliability, minimum)
+        ):
+            reason = f"the look alone rules out {pair.by_look}"
         elif round(seconds - least, ROUNDING) == 0:
             reason = "same cost, less preferred"
         elif seconds > least:

@@ -59,17 +59,24 @@ class Problem(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """A pair: the numbers of gesture and option, R, and what it costs whatever the posture. rank: decision B13."""
+    """A pair: the numbers of gesture and option, R, and what it costs whatever the posture. rank: decision B13.
+
+    by_look: number of the objects that its words may mean, and that only the look rules out (decision 0109).
+    """
 
     gesture: int
     option: int
     reliability: Fraction
     fixed: int
+    by_look: int
     rank: tuple[bool, Fraction, int, int]
 
 
 def allowed(problem: Problem, reference: Reference) -> list[Choice]:
-    """The pairs that may be chosen: those that reach the minimum, or else the most reliable."""
+    """The pairs that may be chosen: those that reach the minimum, or else the most reliable.
+
+    Of those with one gesture, only the ones that leave the fewest objects to the look alone.
+    """
     target, places = reference.target, problem.places
     others = set(places) - {target}
     gazed = {id for id in others if dist(places[id], places[target]) < 0.2}
@@ -93,13 +100,19 @@ def allowed(problem: Problem, reference: Reference) -> list[Choice]:
             left &= pointed
         if option.text and not option.deictic:
             left &= set(option.distractors)
+        by_look = len(others.intersection(option.distractors) - gazed) if option.text and gesture in (1, 2) else 0
         reliability = 1 / (len(left) + 1 / r)
         fixed = (WORD * int(option.cost) if option.text else 0) + (WAIT if gesture in WAITS else 0)
         rank = (not (option.deictic and gesture in POINTS), -reliability, gesture, number)
-        pairs.append(Choice(gesture, number, reliability, fixed, rank))
+        pairs.append(Choice(gesture, number, reliability, fixed, by_look, rank))
     good = [pair for pair in pairs if pair.reliability >= Fraction(str(reference.minimum_reliability))]
     most = max((pair.reliability for pair in pairs), default=0)
-    return good or [pair for pair in pairs if pair.reliability == most]
+    good = good or [pair for pair in pairs if pair.reliability == most]
+    return [
+        pair
+        for pair in good
+        if not any(other.gesture == pair.gesture and other.by_look < pair.by_look for other in good)
+    ]
 
 
 Best = tuple[int, tuple[tuple[bool, Fraction, int, int], ...], tuple[tuple[int, int], ...]]

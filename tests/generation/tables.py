@@ -6,10 +6,15 @@ from typing import Any
 from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.body import Estimate, EstimateItem, Ray
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.units import Vector
+from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.pipeline import planned, planning
+from engage_hri.services.generation.references.distractors import (
+    Layout,
+    in_gaze_cones,
+    in_pointing_cylinders,
+)
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
 from engage_hri.services.generation.references.pairs import ReferenceScene
 
@@ -43,6 +48,16 @@ def apart(ids: Sequence[str] = TANGRAMS) -> World:
 def scene(world: World, **fields: object) -> ReferenceScene:
     """Gaze means what is within 0.2 m of where it goes, pointing what is within 0.1 m."""
     return ReferenceScene(world=world, half_angle=0.2 / HEIGHT, pointing_radius=0.1, **fields)  # type: ignore[arg-type]
+
+
+def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[str]:
+    """Ids of the objects in the cone around one gaze axis."""
+    return in_gaze_cones([gaze], half_angle, layout)[0]
+
+
+def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozenset[str]:
+    """Ids of the objects in the half-cylinder ahead of one hand."""
+    return in_pointing_cylinders([forearm], radius, layout)[0]
 
 
 def body(

@@ -146,6 +146,39 @@ async def test_what_a_service_that_died_was_doing_is_unknown_and_not_refused(hub
     assert told.said.startswith("one two three") is (service == "realizer")
 
 
+@pytest.mark.parametrize("dies_after", [0.2, 1.0, 2.5])
+@pytest.mark.parametrize("answers", [True, False])
+async def test_who_was_asked_has_answered_though_the_realizer_died_after_the_question(
+    hub: MemoryHub, dies_after: float, *, answers: bool
+) -> None:
+    async with robot(hub, "realizer") as (client, life), perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        call = {"turn_status": "full", "parts": [{"say": "Which one do you like?"}]}
+        performing = asyncio.create_task(perform_call(client, call, await_answer=True))
+        await asyncio.sleep(2.0 + dies_after)
+        await life.aclose()
+        if answers:
+            await ann.say("the blue one")
+        told = await performing
+
+    assert (told.status, told.answer) == ("done", "speak" if answers else "none")
+    assert [each.text for each in told.heard] == ["the blue one"] * answers
+
+
+async def test_whether_a_turn_is_answered_of_which_the_realizer_died_is_not_known(hub: MemoryHub) -> None:
+    async with robot(hub, "realizer") as (client, life), perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        call = {"turn_status": "full", "parts": [{"say": "one two three four five six seven eight nine ten " * 3}]}
+        performing = asyncio.create_task(perform_call(client, call, await_answer=True))
+        await asyncio.sleep(3.0)
+        await life.aclose()
+        told = await performing
+
+    assert (told.status, told.answer) == ("unknown", None)
+
+
 async def test_a_stream_whose_first_fragment_is_refused_is_refused(hub: MemoryHub) -> None:
     async def pieces() -> AsyncIterator[str]:
         yield "Hello there."

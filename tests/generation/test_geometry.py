@@ -11,11 +11,10 @@ from engage_hri.schemas.world import Entity
 from engage_hri.services.generation.references.distractors import (
     angle_off_axis,
     extent,
-    in_gaze_cone,
-    in_pointing_cylinder,
     in_zone,
     laid_out,
 )
+from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
 DOWN = Ray(origin=(0.0, 0.0, 1.0), axis=(0.0, 0.0, -1.0))
 """Straight down on a table at height 0: the cone cuts a circle of radius tan(half-angle)."""

@@ -15,7 +15,7 @@ from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.references.phrases import Proposals, proposed
 from engage_hri.services.generation.turns.policy import plan_turn
 from engage_hri.services.tangram.table import tangram_table
-from tests.generation.tables import body, plan
+from tests.generation.tables import HEIGHT, body, plan
 
 SMALL, BIG = 0.02, 0.04
 CONFIG = GenerationConfig()
@@ -247,6 +247,40 @@ def test_the_outcome_of_a_plan_explains_the_proposed_phrases() -> None:
     assert {pair.phrase for pair in choice.pairs} == set(table(SQUARES, "a"))
     assert choice.phrase in table(SQUARES, "a")
     assert len(choice.pairs) == 4 * len(table(SQUARES, "a"))
+
+
+def in_a_row(*squares: dict[str, str]) -> World:
+    """Squares of which a look means one."""
+    places = [(0.5, 0.3 * index, 0.7) for index in range(len(squares))]
+    return world(*(thing(f"s{i}", shape="square", position=places[i], **it) for i, it in enumerate(squares)))
+
+
+def chosen(around: World, minimum: float = 0.85) -> tuple[str, str, tuple[str, ...]]:
+    """Gesture, phrase and warnings of a reference to the first of them. A point costs much."""
+    fragment = TurnFragment(id="f", behaviors=(replace(refer("ref", "s0"), minimum_reliability=minimum),))
+    motions = body(around, ["s0"], arm=lambda since, target: 300.0)
+    config = GenerationConfig(gaze_half_angle=0.2 / HEIGHT, pointing_radius=0.1)
+    made = plan(fragment, plan_turn(fragment, "f", "human"), around, None, motions, Permits(), config)
+    (choice,) = made.choices
+    return choice.gesture, choice.phrase, made.warnings
+
+
+RED, BLUE, GREEN = {"color": "red"}, {"color": "blue"}, {"color": "green"}
+
+
+def test_one_of_four_squares_is_called_by_what_tells_it_apart_although_a_look_would_do() -> None:
+    assert chosen(in_a_row(RED, BLUE, GREEN, BLUE)) == ("directed_gaze", "the red square", ())
+
+
+def test_where_no_words_tell_it_apart_a_warning_says_that_the_look_does_the_rest() -> None:
+    gesture, phrase, (warning,) = chosen(in_a_row(RED, RED, BLUE, BLUE))
+
+    assert (gesture, phrase) == ("directed_gaze", "the red square")
+    assert warning.startswith("ref: 'the red square' may mean 2 objects, and the look alone tells which")
+
+
+def test_with_a_point_one_word_is_enough() -> None:
+    assert chosen(in_a_row(RED, RED, BLUE), 0.95) == ("directed_gaze_with_pointing", "this", ())
 
 
 def test_an_attribute_cannot_be_preferred_twice() -> None:

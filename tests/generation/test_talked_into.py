@@ -93,6 +93,22 @@ async def test_words_decide_and_not_their_length(hub: MemoryHub, words: str, sec
     assert told.status == ("interrupted" if stops else "done")
 
 
+@pytest.mark.parametrize(("seconds", "stops"), [(0.6, False), (1.2, True)])
+async def test_where_no_words_come_while_somebody_speaks_the_seconds_of_voice_decide(
+    hub: MemoryHub, seconds: float, *, stops: bool
+) -> None:
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        performing = asyncio.create_task(perform_call(client, call(LONG), await_answer=True))
+        await asyncio.sleep(1.5)
+        await ann.say("yes yes okay", seconds=seconds, partial=False)
+        told = await performing
+
+    assert told.status == ("interrupted" if stops else "done")
+    assert [each.text for each in told.heard] == ["yes yes okay"]
+
+
 # -- one act, and two judges of it ---------------------------------------------------------------------------------
 
 

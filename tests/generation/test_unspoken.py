@@ -10,6 +10,7 @@ from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.torso.body import SimulatedBody
@@ -121,6 +122,24 @@ async def test_one_spoken_word_is_enough_and_what_nobody_wanted_is_not_missed(
 
     assert outcome.status == status
     assert (outcome.fault is not None) == (status == "failed")
+
+
+@pytest.mark.parametrize(
+    ("fields", "unsaid"),
+    [
+        ({"dropped": ("s",), "spoken": (SpokenText(behavior="t", text="three"),)}, ("s",)),
+        ({"interrupted": ("t",), "spoken": (SpokenText(behavior="s", text="one two"),)}, ("t",)),
+        ({"spoken": (SpokenText(behavior="s", text="one two"), SpokenText(behavior="t", text="three"))}, ()),
+    ],
+)
+async def test_a_speech_of_which_no_word_came_makes_the_words_of_the_fragment_cut_short(
+    hub: MemoryHub, fields: dict[str, object], unsaid: tuple[str, ...]
+) -> None:
+    async with stage(hub) as partners:
+        outcome = await ended(partners, **fields)
+
+    assert (outcome.status, outcome.unsaid) == ("done", unsaid)
+    assert summary(outcome).cut_short == bool(unsaid)
 
 
 async def test_a_fragment_without_words_of_which_nothing_was_performed_fails_and_its_turn_goes_on(

@@ -17,10 +17,10 @@ from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.roster import ROBOT
-from engage_hri.services.hostile.payloads import Payloads
-from engage_hri.services.hostile.typed import RandomMessages, Words
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
+from tests.rigs.hostile.payloads import Payloads
+from tests.rigs.hostile.typed import RandomMessages, Words
 
 ENTITIES = ("human", "rectangle", "blue-square")
 AT_A_TIME = 25

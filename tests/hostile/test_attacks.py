@@ -2,11 +2,11 @@
 
 import pytest
 
-from engage_hri.services.commandline.hostile import attack
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.hostile.trial import Kind, Report
 from tests.hostile.own import CarelessBody, broken_client, deaf_client, good_client
 from tests.random_cases import share_of
+from tests.rigs.hostile.attacks import attack
+from tests.rigs.hostile.trial import Kind, Report
 
 
 def told(reports: list[Report]) -> str:

@@ -5,7 +5,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted, Refused
-from engage_hri.services.hostile.audit import Audit
+from tests.rigs.hostile.audit import Audit
 
 KEY = keys.command(keys.BLOCK, "manager", "ann")
 ASK = PerformBlock(id="1", life="a", block=Block(id="b"))

@@ -3,8 +3,8 @@
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.hostile import whole_robot
-from engage_hri.services.hostile.trial import Attack, trial
+from tests.rigs.hostile.attacks import whole_robot
+from tests.rigs.hostile.trial import Attack, trial
 
 
 @pytest.mark.real_time

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from engage_hri.services.commandline.hostile import whole_robot
-from engage_hri.services.hostile.trial import Attack, _Trial, run
 from engage_hri.services.requests.ends import RequestDesk, Requester
+from tests.rigs.hostile.attacks import whole_robot
+from tests.rigs.hostile.trial import Attack, _Trial, run
 
 
 class Ends:

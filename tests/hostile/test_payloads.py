@@ -12,9 +12,9 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message, encode
 from engage_hri.schemas.requests import Cancel
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.hostile.markup import document
-from engage_hri.services.hostile.payloads import Payloads
-from engage_hri.services.hostile.typed import KINDS, RandomMessages, Words, distorted
+from tests.rigs.hostile.markup import document
+from tests.rigs.hostile.payloads import Payloads
+from tests.rigs.hostile.typed import KINDS, RandomMessages, Words, distorted
 
 ENTITIES = ("cup", "ann")
 

@@ -25,12 +25,12 @@ from engage_hri.services.realizer.net.petri_net import (
     is_live,
     is_safe,
 )
-from engage_hri.services.realizer.net.pnml import read_pnml
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.oracle import estimated, random_blocks
+from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together
 
 GRAMMAR = etree.RelaxNG(etree.parse(Path(__file__).with_name("ptnet.rng")))

@@ -23,9 +23,9 @@ from engage_hri.services.realizer.net.petri_net import (
     is_safe,
     order,
 )
-from engage_hri.services.realizer.net.pnml import read_pnml
 from engage_hri.services.realizer.points import Point
 from tests.realizer.planning import at, plan, timed
+from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together
 
 

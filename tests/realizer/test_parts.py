@@ -1,5 +1,6 @@
 """Several behaviors of one block that move the same part."""
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -66,6 +67,17 @@ def test_a_gesture_that_names_no_hand_finds_none_free() -> None:
     made = plan(block((both, beat)))
 
     assert made.dropped == ("q",)
+
+
+def test_arms_take_turns_where_one_alone_would_keep_words_waiting() -> None:
+    words = [Speech(id=f"s{number}", text="one") for number in range(25)]
+    beats = [timed(Gesture(id=f"g{number}", lexeme="BEAT"), stroke=f"s{number}:start") for number in range(25)]
+    made = plan(block((*words, *beats)))
+
+    assert made.problems == ()
+    assert [at(made, f"s{number}:start") for number in range(25)] == [1.25 + number for number in range(25)]
+    hands = [each.mode for each in made.block.behaviors if isinstance(each, Gesture)]
+    assert all(one != other for one, other in pairwise(hands[1:]))
 
 
 def test_a_gesture_that_nobody_asked_for_now_waits_for_the_arm() -> None:

@@ -96,7 +96,7 @@ def test_estimates_differ_by_their_most_different_phase_or_in_kind(
 
 @settings(max_examples=150, deadline=None)
 @given(estimates(), estimates(), st.sampled_from((0.0, 0.5, 1.0)))
-def test_between_two_answers_phases_are_means_with_the_haste_of_who_can_hurry_less(
+def test_between_two_answers_phases_are_means_with_the_limits_of_who_can_hurry_or_dawdle_less(
     before: list[Estimate], later: list[Estimate], weight: float
 ) -> None:
     found = between(before, later, weight)
@@ -113,7 +113,7 @@ def test_between_two_answers_phases_are_means_with_the_haste_of_who_can_hurry_le
             assert it.natural == pytest.approx(a.natural + weight * (b.natural - a.natural))
             shares = [each.shortest / each.natural for each in (a, b) if each.natural]
             assert it.shortest == pytest.approx(max(shares, default=0.0) * it.natural)
-            limit = a.longest if b.hold and b.longest is None else b.longest
+            limit = a.longest if b.longest is None else b.longest
             assert it.longest == (None if limit is None else max(limit, it.natural))
 
 

@@ -80,8 +80,8 @@ def test_speed_is_the_median_of_what_the_parts_did_lately(phases: list[tuple[str
             for part in parts.get(who, ()):
                 ratios[part].append((took / 100) / (expected / 100))
                 middle = median_low(ratios[part][-9:])
-                middle = middle if abs(middle - 1.0) > 0.05 else 1.0
-                if abs(middle - factor[part]) > 0.05 * factor[part]:
+                middle = middle if abs(middle - 1.0) > 0.02 else 1.0
+                if abs(middle - factor[part]) > 0.02 * factor[part]:
                     factor[part] = middle
         changed = {id for id, each in parts.items() if any(before[part] != factor[part] for part in each)}
         assert set(experience.learn(who, expected / 100, took / 100)) == changed

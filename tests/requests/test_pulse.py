@@ -11,14 +11,14 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
 from engage_hri.schemas.faults import ServerRestarted
-from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Request
+from engage_hri.schemas.requests import LAPSED, Accepted, Cancel, Heard, KeepAlive, Kept, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_effects import Publish, Renew, TellEnd
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.serving import LAPSED, Serving
+from engage_hri.services.requests.serving import Serving
 from engage_hri.services.requests.serving_effects import Hand, Hold
 from engage_hri.services.requests.serving_effects import Publish as Answered
 

@@ -7,9 +7,10 @@ import pytest
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
-from engage_hri.schemas.documents.xml_feedback import decode_feedback, encode_feedback
+from engage_hri.schemas.documents.xml_feedback import encode_feedback
 from engage_hri.schemas.feedback import PlannedPoint, PredictionFeedback, WarningFeedback
 from engage_hri.schemas.units import Stamp
+from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.grammar import violations
 from tests.schemas.test_feedback_xml import FORMS
 

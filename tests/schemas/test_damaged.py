@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.documents.xml_feedback import decode_feedback
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message, decode, encode, encode_json
 from engage_hri.schemas.requests import Cancel
@@ -20,6 +19,7 @@ from engage_hri.schemas.utf8 import utf8
 from engage_hri.services.commandline.config import load
 from engage_hri.services.simulation.still import EXAMPLE, load_world
 from tests.random_cases import share_of
+from tests.schemas.feedback_reader import decode_feedback
 
 FORMS: dict[str, Callable[[Message], bytes]] = {"application/json": encode_json, "application/msgpack": encode}
 XML = b'<bml id="b">\n<speech id="s">caf\xc3\xa9 <sync id="m"/></speech><gaze id="g" target="cup" start="s:m"/></bml>'

@@ -18,8 +18,8 @@ from engage_hri.schemas.export import BUNDLE, EXPORTED, ID, bundle, files, stale
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message, decode
-from engage_hri.services.hostile.typed import RandomMessages, Words, distorted
 from tests.random_cases import share_of
+from tests.rigs.hostile.typed import RandomMessages, Words, distorted
 from tests.schemas.strategies import blocks, fragments
 
 SCHEMA: dict[str, Any] = json.loads((EXPORTED / BUNDLE).read_bytes())

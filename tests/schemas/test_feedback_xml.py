@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.documents.xml_feedback import HEAD, TAIL, decode_feedback, encode_feedback
+from engage_hri.schemas.documents.xml_feedback import HEAD, TAIL, encode_feedback
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.feedback import (
     BlockProgress,
@@ -18,6 +18,7 @@ from engage_hri.schemas.feedback import (
     WarningKind,
 )
 from engage_hri.schemas.units import Stamp
+from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.strategies import ids
 
 BML = 'xmlns="http://www.bml-initiative.org/bml/bml-1.0"'

@@ -8,7 +8,7 @@ from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, ReferenceMade
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
-from engage_hri.schemas.summary import LONGEST_PROBLEM, Summary, refusal, summary, unknown
+from engage_hri.schemas.summary import LONGEST_PROBLEM, Summary, summary
 from engage_hri.schemas.units import Stamp
 
 
@@ -95,7 +95,7 @@ def test_who_did_not_look_and_who_was_not_waited_for() -> None:
     assert [(each.by, each.looked) for each in told] == [("pointing", False), ("a look", None), ("words alone", None)]
 
 
-def test_an_answer_is_pending_none_or_none_expected() -> None:
+def test_an_answer_is_pending_none_or_not_waited_for() -> None:
     answers = [
         summary(outcome(events=events)).answer
         for events in (
@@ -107,7 +107,7 @@ def test_an_answer_is_pending_none_or_none_expected() -> None:
         )
     ]
 
-    assert answers == ["pending", "none", "none", "speak", None]
+    assert answers == ["pending", "none", None, "speak", None]
 
 
 def test_the_fragments_of_a_turn_are_told_together_each_event_in_its_last_state() -> None:
@@ -125,7 +125,8 @@ def test_the_fragments_of_a_turn_are_told_together_each_event_in_its_last_state(
 
 
 def test_a_refusal_says_why_and_that_nothing_happened() -> None:
-    told = refusal(Fault(reason="no 'cop'", where="$.parts[1].refer", advice="did you mean 'cup'?"))
+    fault = Fault(reason="no 'cop'", where="$.parts[1].refer", advice="did you mean 'cup'?")
+    told = summary(outcome(status="refused", fault=fault))
 
     assert told == Summary(status="refused", problems=("$.parts[1].refer: no 'cop' (did you mean 'cup'?)",))
     assert told.text.startswith("Refused, nothing was said or done. Problems: ")
@@ -167,7 +168,7 @@ def test_a_turn_is_as_its_worst_fragment_and_refused_only_if_nothing_was_done(
 
 
 def test_what_nobody_knows_is_not_told_as_refused() -> None:
-    told = unknown(Fault(reason="generation is gone"))
+    told = summary(outcome(status="unknown", fault=Fault(reason="generation is gone")))
 
     assert told.json == '{"status":"unknown","problems":["generation is gone"]}'
     assert told.text == (

@@ -14,7 +14,7 @@ from engage_hri.schemas.documents.json_codec import decode_json, encode_json, re
 from engage_hri.schemas.export import EXPORTED
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.schemas.tool import FILE, PARTS, Format, ToolInput, input_schema, tool_definition
+from engage_hri.schemas.tool import DESCRIPTION, FILE, PARTS, Format, ToolInput, input_schema, tool_definition
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 
@@ -122,6 +122,11 @@ def test_openais_strict_functions_require_every_field(format: Format) -> None:
     for node in nodes(schema(format)):
         if node.get("type") == "object":
             assert node["required"] == list(node["properties"])
+
+
+def test_the_description_of_the_tool_is_no_longer_than_chat_completions_take() -> None:
+    """1024 characters. Descriptions of parameters, which name the objects of a world, may be of any length."""
+    assert len(DESCRIPTION) <= 1024
 
 
 def test_each_api_gets_the_form_it_takes() -> None:

@@ -115,12 +115,26 @@ class Maker:
             mark = self.random.choice(["*", "**", "***", "_", "__", "~~"])
             return self.wrapped(mark, mark)
         if pick < 0.92:
-            code = self.random.choice(["ls -l", "a*b*c", "x[0]", "<b>", "[laughs]", "f(x)", "**no**"])
+            code = self.random.choice(
+                [
+                    "ls -l",
+                    "a*b*c",
+                    "x[0]",
+                    "<b>",
+                    "[laughs]",
+                    "f(x)",
+                    "**no**",
+                    "https://example.org/a?b",
+                    "www.x.org/y",
+                ]
+            )
             return f"`{code}`", f"`{code}`"
         words, seen = self.words(3)
         return self.random.choice(
             [(f"[{words}](https://example.com/p)", f"[{seen}](/u)"), (f"![{words}](a.png)", f"![{seen}](/u)"),
-             (f"[{words}](<a b> 'title')", f"[{seen}](/u)")]
+             (f"[{words}](<a b> 'title')", f"[{seen}](/u)"),
+             (f"[![{words}](a.png)](https://example.com/p)", f"[![{seen}](/u)](/u)"),
+             (f"[{words} ![{words}](a.png)](/u 'title') ", f"[{seen} ![{seen}](/u)](/u) ")]
         )  # fmt: skip
 
     def inline(self, most: int = 6) -> tuple[str, str]:

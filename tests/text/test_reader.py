@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from random import Random
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.tool import Say
+from engage_hri.services.client.chunking import Chunker
 from engage_hri.services.control.body import Spoke
 from engage_hri.services.control.spoken import progress_of, spoken
 from engage_hri.services.control.voice.timeline import uttered
@@ -102,6 +102,8 @@ def test_the_words_that_a_voice_says_are_those_of_a_parser_of_commonmark(seed: i
         ('<tool_call>{"look": "cup"}</tool_call>Yes', "Yes"),
         ("[Robot]: Hello.", "Robot: Hello."),
         ("Title\n=====\n\n---\ntext", "Title, text"),
+        ("[![a cat](cat.png)](https://example.org/cats) sleeps", "a cat sleeps"),
+        ("Go to https://x.org/a_(b), or www.(sighs)https://x.org", "Go to x.org, or www.x.org"),
     ],
 )
 def test_what_is_for_the_eye_is_not_said(text: str, words_of_it: str) -> None:
@@ -169,22 +171,48 @@ def test_an_emoji_alone_is_no_words() -> None:
     assert is_spoken("*very*")
 
 
-odd = st.lists(
-    st.sampled_from([*"ab1 *_[]()<>`~#!&|\\\n.-+=:/^@\"'{}", "<think>", "https://", "😊", "【1†"]), max_size=80
-).map("".join)
+ODD = [
+    *"ab1A *_[]()<>`~#!&|\\\n.-+=:/^@\"'{}", "https://", "http:", "www.", "mailto:", "x.y", "@x.y", "https://x.y/z ",
+    "<think>", "</think>", "<b>", "<!--", "-->", "<|x|>", "<x@y.z>", "&amp;", "😊", "é", "方", "【1†", "】",
+    "(sighs)", "[laughs]", "*waves*", "[a]", "[A!]", "](", "![", "[^1]", "[1]", "[x]", "[r]: ", "```", "~~~\n",
+    "`(sighs)`", "`https://x.y/z`", "`www.x.y`", "\n\n", "- ", "1. ", "# ",
+]  # fmt: skip
+"""Beginnings, ends and wholes of marks."""
 
 
-@settings(max_examples=300)
-@given(odd, st.data())
-def test_any_text_is_read_and_the_bits_do_not_matter(text: str, data: st.DataObject) -> None:
-    cuts = sorted(data.draw(st.lists(st.integers(0, len(text)), max_size=8)))
-    parts = [text[start:end] for start, end in zip([0, *cuts], [*cuts, len(text)], strict=True)]
-    whole = read([text], Ids(("a", "b]")))
+def plain_pieces(pieces: Iterable[Piece]) -> list[tuple[object, ...]]:
+    """Pieces without regard to where words are cut: what the author wrote next to each other is one piece."""
+    found: list[tuple[object, ...]] = []
+    for each in pieces:
+        if each.kind == "say" and found and found[-1][0] == "say" and found[-1][3] == each.place:
+            found[-1] = ("say", f"{found[-1][1]}{each.text}", found[-1][2], each.end)
+        else:
+            found.append(tuple(each) if each.kind != "say" else tuple(each)[:4])
+    return found
 
-    assert words(read(parts, Ids(("a", "b]")))) == words(whole)
-    assert [each.place for each in whole if each.kind == "say"] == sorted(
-        each.place for each in whole if each.kind == "say"
-    )
+
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+def test_any_text_is_read_and_the_bits_do_not_matter(seed: int) -> None:
+    for number in range(seed * 50, seed * 50 + 50):
+        random, ids = Random(number), Ids(("a", "b]"))
+        text = "".join(random.choices(ODD, k=random.choice((4, 14, 40))))
+        whole = plain_pieces(read([text], ids))
+
+        assert plain_pieces(read(text, ids)) == plain_pieces(read(bits(text, random), ids)) == whole, text
+        assert [each[2] for each in whole if each[0] == "say"] == sorted(
+            each[2] for each in whole if each[0] == "say"
+        )
+
+
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+def test_of_a_stream_is_said_what_is_said_of_the_whole_text(seed: int) -> None:
+    for number in range(seed * 50, seed * 50 + 50):
+        random, ids, chunker = Random(number), Ids(()), Chunker()
+        text = "".join(random.choices(ODD, k=random.choice((4, 14, 40))))
+        chunks = [*(chunk for bit in bits(text, random) for chunk in chunker.feed(bit, ids)), chunker.rest(ids)]
+        said = [heard(part.say).text for chunk in chunks for part in chunk if isinstance(part, Say)]
+
+        assert letters("".join(said)) == letters(heard(text).text), text
 
 
 @pytest.mark.parametrize("unit", ["[", "[a ", "<a ", "*a ", "`x ", "|", "\n", "(a ", "&", "【", "[x](", "<!--", "# "])

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterat
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
@@ -28,7 +28,7 @@ from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.receipts import Receipts
 from engage_hri.services.console.web.service import Window
-from engage_hri.services.console.web.sessions import CLOSED, Guest, Session, Sessions
+from engage_hri.services.console.web.sessions import CLOSED, Session, Sessions
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
 
@@ -53,7 +53,6 @@ MESSAGES = "/messages"
 PAGES = "/pages"
 """Path of pages of others."""
 MOST_PROGRAMS = 100
-G = TypeVar("G", bound=Guest)
 NO_TEXT = 1003
 """Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
@@ -70,7 +69,7 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
         given = browser.query_params.get("token", "")
         window.viewers += 1
         try:
-            await _shown(browser, sessions, secrets.compare_digest(given.encode(), token.encode()), _live(window))
+            await _shown(browser, sessions, secrets.compare_digest(given.encode(), token.encode()))
         finally:
             window.viewers -= 1
 
@@ -96,7 +95,7 @@ def recorded(recording: Recording, hosts: Hosts) -> App:
     sessions = Sessions(lambda receipts, trusted: _Played(recording, receipts), MOST_VIEWERS)
 
     async def frames(browser: WebSocket) -> None:
-        await _shown(browser, sessions, False, lambda session, viewer: session.guest.frame(viewer))
+        await _shown(browser, sessions, False)
 
     return Guarded(_app(recording.robot, frames, sessions.close), hosts)
 
@@ -152,10 +151,8 @@ async def _text(socket: WebSocket) -> str:
     return str(text)
 
 
-async def _shown(
-    browser: WebSocket, sessions: Sessions[G], trusted: bool, frame: Callable[[Session[G], Viewer], bytes | None]
-) -> None:
-    """Serve one link of a page, until it ends. frame: makes the next one for this viewer; None: there is none."""
+async def _shown(browser: WebSocket, sessions: Sessions, trusted: bool) -> None:
+    """Serve one link of a page, until it ends."""
     await browser.accept()  # who is refused before learns no reason
     session = await sessions.enter(browser.query_params.get("session", ""), trusted)
     if session is None:
@@ -163,14 +160,14 @@ async def _shown(
         return
     link, code = session.links, CLOSED[0]
     try:
-        await _show(browser, session, frame)
+        await _show(browser, session)
     except WebSocketDisconnect as end:
         code = end.code
     finally:
         await sessions.part(session, link, code)
 
 
-async def _show(browser: WebSocket, session: Session[G], frame: Callable[[Session[G], Viewer], bytes | None]) -> None:
+async def _show(browser: WebSocket, session: Session) -> None:
     """Send frames until the browser has made another link. Raises WebSocketDisconnect when it has gone."""
     viewer, drawn, receipts = Viewer(), asyncio.Event(), session.receipts
 
@@ -192,7 +189,7 @@ async def _show(browser: WebSocket, session: Session[G], frame: Callable[[Sessio
     session.link = listening = asyncio.create_task(listen(), name="browser")
     try:
         while not listening.done():
-            if (made := frame(session, viewer)) is not None:
+            if (made := session.guest.frame(viewer)) is not None:
                 drawn.clear()
                 await browser.send_text(made.decode())
                 waiting = asyncio.ensure_future(drawn.wait())
@@ -203,14 +200,6 @@ async def _show(browser: WebSocket, session: Session[G], frame: Callable[[Sessio
             listening.result()
     finally:
         listening.cancel()
-
-
-def _live(window: Window) -> Callable[[Session[Visitor], Viewer], bytes | None]:
-    def frame(session: Session[Visitor], viewer: Viewer) -> bytes | None:
-        window.picture.advance(window.bus.now())
-        return viewer.frame(window.picture, window.bus.now(), session.guest.you, session.receipts)
-
-    return frame
 
 
 class _Played:

@@ -7,9 +7,10 @@ news of its orders as before. A page that was closed, or does not come back in t
 import asyncio
 import secrets
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.web.frames import Viewer
 from engage_hri.services.console.web.orders import Given
 from engage_hri.services.console.web.receipts import Receipts
 
@@ -28,14 +29,14 @@ class Guest(Protocol):
     async def leave(self) -> None:
         """End all that was begun."""
 
+    def frame(self, viewer: Viewer) -> bytes | None:
+        """The next frame for this viewer; None: there is none."""
 
-G = TypeVar("G", bound=Guest)
 
-
-class Session(Generic[G]):
+class Session:
     """One page. links: number of its links so far; only the last one counts."""
 
-    def __init__(self, receipts: Receipts, guest: G, trusted: bool) -> None:
+    def __init__(self, receipts: Receipts, guest: Guest, trusted: bool) -> None:
         self.receipts = receipts
         self.guest = guest
         self.trusted = trusted
@@ -51,15 +52,15 @@ class Session(Generic[G]):
             self.guest.take(given)
 
 
-class Sessions(Generic[G]):
+class Sessions:
     """The sessions of all pages of a window. make: makes the guest of a page. most: number of sessions."""
 
-    def __init__(self, make: Callable[[Receipts, bool], G], most: int) -> None:
+    def __init__(self, make: Callable[[Receipts, bool], Guest], most: int) -> None:
         self._make = make
         self._most = most
-        self._known: dict[str, Session[G]] = {}
+        self._known: dict[str, Session] = {}
 
-    async def enter(self, id: str, trusted: bool) -> Session[G] | None:
+    async def enter(self, id: str, trusted: bool) -> Session | None:
         """The session of a page that opens a link; None: there is no room for it.
 
         id: of the session that the page says that it had; empty: none. trusted: it has the token of the window.
@@ -77,7 +78,7 @@ class Sessions(Generic[G]):
         session.links += 1
         return session
 
-    async def part(self, session: Session[G], link: int, code: int) -> None:
+    async def part(self, session: Session, link: int, code: int) -> None:
         """Take note that a link has ended. link: its number. code: of RFC 6455, with which it did."""
         if session.links != link or session.receipts.session not in self._known:
             return
@@ -99,7 +100,7 @@ class Sessions(Generic[G]):
             await self._end(session)
         return session is not None
 
-    async def _end(self, session: Session[G], after: Seconds = 0.0) -> None:
+    async def _end(self, session: Session, after: Seconds = 0.0) -> None:
         if after:
             await asyncio.sleep(after)
         elif session.ending is not None:

@@ -19,7 +19,7 @@ from engage_hri.services.client.perceive import check_id, perceive
 from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
 from engage_hri.services.console.web.company import Invitation
-from engage_hri.services.console.web.frames import You
+from engage_hri.services.console.web.frames import Viewer, You
 from engage_hri.services.console.web.laying import laid
 from engage_hri.services.console.web.receipts import Panel, Receipts
 from engage_hri.services.console.web.seats import SETTLED
@@ -60,6 +60,12 @@ class Visitor:
             faults=body.faults if body else (),
             inhibits=self._inhibits,
         )
+
+    def frame(self, viewer: Viewer) -> bytes | None:
+        """The next frame for this viewer."""
+        picture, now = self._window.picture, self._window.bus.now()
+        picture.advance(now)
+        return viewer.frame(picture, now, self.you, self.receipts)
 
     def take(self, given: orders.Given) -> None:
         """Carry out an order, or begin to; what fails is told."""

@@ -127,7 +127,7 @@ def _stays_clear(torso: Parts, part: str, course: Course, leaning: Motion, aroun
     return (
         track.aim is None
         and _are_clear(track.motion.at(inf).q[track.columns].tolist(), track.joints, around)
-        and _clears(track.motion, track.columns, track.joints, None, leaning, columns, now)
+        and _least_above(track.motion, track.columns, track.joints, None, leaning, columns, now) >= 0.0
     )
 
 
@@ -135,8 +135,9 @@ def check_carried(torso: Parts, course: Course, path: Path) -> None:
     """Check that an arm that sets out to a place is clear of the table as the trunk carries it. Raises Impossible."""
     trunk, now = torso.tracks["torso"], torso.clock.time()
     columns, every = range(trunk.columns.start, trunk.columns.stop), range(len(course.joints))
-    if is_arm(course) and not _clears(
-        Motion(path, now), every, course.joints, course.aim, trunk.motion, columns, now
+    if (
+        is_arm(course)
+        and _least_above(Motion(path, now), every, course.joints, course.aim, trunk.motion, columns, now) < 0.0
     ):
         raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm, as the torso moves")
 
@@ -183,7 +184,7 @@ def _given_way(
         if path is None or not _are_clear(path.legs[-1].goal, course.joints, around):
             return None
         motion, every = run.foreseen(path, now), range(len(course.joints))
-        is_clear = _clears(motion, every, course.joints, course.aim, trunk, columns, now)
+        is_clear = _least_above(motion, every, course.joints, course.aim, trunk, columns, now) >= 0.0
         return (course, path) if is_clear else None
     start = tracks.joined([torso.tracks[part].at(now) for part in run.course.parts])
     here = tuple(start.q.tolist())
@@ -207,7 +208,7 @@ def _given_way(
                 return None  # All of them end there.
             continue
         motion = run.foreseen(path, now)
-        if _clears(motion, range(len(joints)), joints, None, trunk, columns, now):
+        if _least_above(motion, range(len(joints)), joints, None, trunk, columns, now) >= 0.0:
             return replace(run.course, trunks=around), path
     return None
 
@@ -230,19 +231,6 @@ def keep_clear(torso: Parts, run: Run) -> None:
     )
     if asked_for < 0.0 and asked_for < free:
         run.forget_pace(now)
-
-
-def _clears(
-    arms: Motion,
-    which: Sequence[int] | slice,
-    joints: tuple[str, ...],
-    aim: Aim | None,
-    trunk: Motion,
-    columns: Sequence[int],
-    now: Seconds,
-) -> bool:
-    """True if arms stay clear of the table as both move at once."""
-    return _least_above(arms, which, joints, aim, trunk, columns, now) >= 0.0
 
 
 def _least_above(

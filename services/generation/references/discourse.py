@@ -34,11 +34,11 @@ class Discourse(Struct, frozen=True):
         """The discourse after a fragment that refers, or is going to refer, to `objects`."""
         return replace(self, named=(*self.named, *(Named(fragment, each) for each in objects)))
 
-    def without(self, fragment: str, unsaid: Collection[str]) -> "Discourse":
-        """The discourse after a fragment that has ended before it referred to the objects in `unsaid`."""
+    def without(self, fragment: str, unmentioned: Collection[str]) -> "Discourse":
+        """The discourse after a fragment that has ended before it referred to the objects in `unmentioned`."""
 
         def said(named: tuple[Named, ...]) -> tuple[Named, ...]:
-            return tuple(each for each in named if each.fragment != fragment or each.object not in unsaid)
+            return tuple(each for each in named if each.fragment != fragment or each.object not in unmentioned)
 
         return replace(self, named=said(self.named), before=said(self.before))
 

@@ -63,11 +63,6 @@ def in_gaze_cones(gazes: Sequence[Ray], half_angle: Radians, layout: Layout) -> 
     return [frozenset(layout.ids[index] for index in layout.owner[each].tolist()) for each in inside]
 
 
-def in_gaze_cone(gaze: Ray, half_angle: Radians, layout: Layout) -> frozenset[str]:
-    """Ids of the objects in the cone around one gaze axis."""
-    return in_gaze_cones([gaze], half_angle, layout)[0]
-
-
 def in_pointing_cylinders(forearms: Sequence[Ray], radius: Meters, layout: Layout) -> list[frozenset[str]]:
     """Ids of the objects in the half-cylinder ahead of each hand, around the axis from elbow to hand (decision B5).
 
@@ -83,11 +78,6 @@ def in_pointing_cylinders(forearms: Sequence[Ray], radius: Meters, layout: Layou
     wider = np.tan([forearm.error for forearm in forearms])[:, None] * from_elbow.clip(min=0.0)
     inside = (along >= -TOLERANCE) & (off_axis <= radius + wider + layout.radii + TOLERANCE)
     return [frozenset(layout.ids[index] for index in np.flatnonzero(each).tolist()) for each in inside]
-
-
-def in_pointing_cylinder(forearm: Ray, radius: Meters, layout: Layout) -> frozenset[str]:
-    """Ids of the objects in the half-cylinder ahead of one hand."""
-    return in_pointing_cylinders([forearm], radius, layout)[0]
 
 
 def extent(entity: Entity) -> Meters:

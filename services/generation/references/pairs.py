@@ -53,12 +53,14 @@ class Pair(Struct, frozen=True, kw_only=True):
     """A gesture with a phrase, as far as posture does not matter.
 
     order: the place of the phrase among the reference's options. ruled_out: why it cannot be performed, or empty.
+    by_look: ids of the objects that the words may mean, too, and that the look alone rules out.
     """
 
     gesture: GestureChoice
     order: int
     option: SpeechOption
     distractors: frozenset[str]
+    by_look: frozenset[str] = frozenset()
     channel: Probability
     reliability: Probability
     ruled_out: str = ""
@@ -133,6 +135,7 @@ def considered(
                     order=order,
                     option=option,
                     distractors=distractors,
+                    by_look=frozenset() if points or not option.text else said[order] - distractors,
                     channel=channel,
                     reliability=known[0],
                     ruled_out=ruled_out,
@@ -171,14 +174,19 @@ class Table:
 def candidates(possible: Sequence[Pair], config: GenerationConfig) -> Mapping[GestureChoice, Pair]:
     """The pair of each gesture that may win, whatever the posture: the one with the best phrase.
 
-    Only pairs that are reliable enough count or, if there are none, the most reliable ones (decision B10).
+    Only pairs that are reliable enough count or, if there are none, the most reliable ones (decision B10). Of their
+    phrases, one that leaves less to the look alone is better, whatever it costs (decision 0109).
     """
     good = [pair for pair in possible if not pair.is_short]
     if not good:
         most = max(round(pair.reliability, ROUNDING) for pair in possible)
         good = [pair for pair in possible if round(pair.reliability, ROUNDING) == most]
     best: dict[GestureChoice, Pair] = {}
-    for pair in sorted(good, key=lambda pair: (round(speaking(pair, config), ROUNDING), pair.preference)):
+
+    def rank(pair: Pair) -> tuple[int, Seconds, tuple[bool, float, int, int]]:
+        return len(pair.by_look), round(speaking(pair, config), ROUNDING), pair.preference
+
+    for pair in sorted(good, key=rank):
         best.setdefault(pair.gesture, pair)
     return best
 

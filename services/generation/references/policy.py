@@ -102,6 +102,11 @@ def choice(
                 f"{table.reference.id}: nothing reaches the minimum reliability {table.minimum:g}; chose "
                 f"{_pair_name(pair)} with R {pair.reliability:.4g}"
             )
+        if pair.by_look:
+            warnings.append(
+                f"{table.reference.id}: {pair.option.text!r} may mean {len(pair.by_look) + 1} objects, and the look "
+                "alone tells which; a higher minimum reliability asks for a point, where one is possible"
+            )
         if made.gesture == POINT and (hand := hand_of(motions.point(CURRENT_POSE, made.target))):
             hands[made.reference] = hand
     return Choices(choices, tuple(warnings), hands)
@@ -126,6 +131,8 @@ def _explain(table: Table, chosen: Pair | None, posture: HeadAndArms, movements:
             reason = hindrance
         elif short:
             reason = f"R {pair.reliability:.4g} below {minimum:g}"
+        elif len(pair.by_look) > len(table.candidates(0)[pair.gesture].by_look):
+            reason = f"the look alone rules out {len(pair.by_look)}"
         elif round(seconds - least, ROUNDING) == 0:
             reason = "same cost, less preferred"
         elif seconds > least:

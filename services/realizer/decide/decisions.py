@@ -231,7 +231,7 @@ class Decisions:
 
     def _conclude(self, now: Seconds) -> None:
         """Decide again about instants that are expected at another time than before."""
-        for transition in self.foresight.update(now):
+        for transition in self.foresight.update(now, self.grants.may_pass):
             self.grants.moved(transition)
 
     def _decide(self, now: Seconds, *, only_measured: bool) -> list[str]:

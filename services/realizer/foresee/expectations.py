@@ -5,7 +5,7 @@ told waits until `update`. What is asked of them is in `foresight.py`.
 """
 
 import heapq
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from math import inf
 from typing import Any
 
@@ -17,6 +17,7 @@ from engage_hri.services.realizer.foresee.utterances import Interval, Utterances
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.slack import BRAKING
 from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, frozen, performer, stands_soon
 
 SURPRISE: Seconds = 0.008
@@ -32,10 +33,11 @@ Pace = tuple[tuple[str, Seconds], ...]
 class Expectations(Observer):
     """Expectations of a block.
 
-    paces: the pace that each behavior was last told. is_surprised: something has moved by `SURPRISE` since the last
-    call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen: expected
-    times of points of other blocks that this one is tied to. followed: points that others are tied to. forecast:
-    None if nothing in the block needs one.
+    paces: the pace that each behavior was last told. paced: those that ever hurried or dawdled: a gesture that was
+    made smaller says nothing about speed from there on. is_surprised: something has moved by `SURPRISE` since the
+    last call of `expected`. not_before: when a behavior that is overdue is expected at its next point. foreseen:
+    expected times of points of other blocks that this one is tied to. followed: points that others are tied to.
+    forecast: None if nothing in the block needs one.
     """
 
     forecast: Forecast | None
@@ -44,6 +46,7 @@ class Expectations(Observer):
         self.experience = Experience(plan.estimates)
         self.utterances = Utterances(self.experience)
         self.paces: dict[str, Pace] = {}
+        self.paced: set[str] = set()
         self.may_be_slower: set[str] = set()
         """Behaviors that were told to pass a hold point before its instant."""
         self._missed: dict[Point, Seconds] = {}
@@ -213,7 +216,7 @@ class Expectations(Observer):
         """
         chain = self.plan.chains.get(point.behavior)
         number = self._facts.next_number(point.behavior)
-        if chain is None or number == 0 or chain.points[number] != point or self.paces.get(point.behavior):
+        if chain is None or number == 0 or chain.points[number] != point or point.behavior in self.paced:
             return
         before, natural = chain.points[number - 1], chain.segments[number - 1].natural
         if self.utterances.follows(point.behavior):
@@ -281,11 +284,11 @@ class Expectations(Observer):
             function(*arguments)
         self._news.clear()
 
-    def update(self, now: Seconds) -> Iterable[int]:
+    def update(self, now: Seconds, may_pass: Callable[[Point], bool]) -> Iterable[int]:
         """Draw the conclusions of all that happened; returns the instants that are expected at another time now.
 
         A behavior that is overdue by a second is expected a second from now; the time for which it is held does not
-        count.
+        count, nor that in which it brakes for a hold point. may_pass: False for one that it has to stop at.
         """
         if self.forecast is None:
             return ()
@@ -306,6 +309,8 @@ class Expectations(Observer):
                 continue
             expected = max(expected, self.asked(chain.points[number], expected))
             until = due = expected + facts.held_between(facts.reached[chain.points[number - 1]], now, behavior)
+            if not may_pass(chain.points[number]):
+                until = due = due + BRAKING
             if facts.is_held(behavior):
                 until = max(now, due)
             elif due < now - EPSILON:  # and not slower on purpose

@@ -14,7 +14,7 @@ PLAUSIBLE = (0.5, 4.0)
 
 Less, and the part was nearer than believed; more, and it stood still.
 """
-NOISE = 0.05
+NOISE = 0.02
 """Difference of a ratio from 1 below which the estimate counts as right."""
 REMEMBERED = 9
 """Number of the latest phases of a part that count, and of the latest words of a speech."""

@@ -300,8 +300,10 @@ class Forecast(LongestPaths):
         """Most seconds that the phase may take that ends at `target`; inf where the body can wait."""
         return self._longest.get((behavior, target), inf) * self._factor(behavior)
 
-    def is_hurried(self, behavior: str) -> bool:
-        """True if a phase of the behavior is to be faster than is natural."""
+    def is_hurried(self, behavior: str, target: int | None = None) -> bool:
+        """True if a phase of the behavior is to be faster than is natural. target: where it ends; None: anywhere."""
+        if target is not None:
+            return self._phase_to.get((behavior, target)) in self._given_way
         hurried = (number for number in self._given_way if not self._arcs[number].is_bound)
         return any(self._arcs[number].behavior == behavior for number in hurried)
 

@@ -36,7 +36,8 @@ class Foresight(Expectations):
     def pace(self, behavior: str, now: Seconds, may_pass: Callable[[Point], bool]) -> Pace:
         """Instants for the behavior's points up to the next where it must ask; empty if it comes to them anyway.
 
-        Who is to hurry is told of all points: a gesture that is made smaller in time need not stop for it.
+        It is told of all points up to the last for which it hurries, waits or dawdles: a gesture that is made smaller
+        in time need not stop for it. The others come as is natural, also where that changes on the way.
         """
         forecast, plan, facts = self.forecast, self.plan, self._facts
         if forecast is None or behavior not in plan.chains:
@@ -49,36 +50,40 @@ class Foresight(Expectations):
         points, segments = plan.chains[behavior].points, plan.chains[behavior].segments
         number = facts.next_number(behavior)
         at = self._since(behavior) if number else now
-        is_paced = is_hurried = forecast.is_hurried(behavior)
+        is_hurried, told = forecast.is_hurried(behavior), 0
         stops = self._stops[behavior] = set()
         planned: list[tuple[str, Seconds]] = []
         before = plan.at[points[number - 1]] if number else -1
         for index, point in enumerate(points[number:], start=number):
-            here = plan.at[point]
+            here, is_off = plan.at[point], False
             if here != before:
                 is_cut = is_moving or plan.successors.get(behavior, ("", None))[1] == point
                 if is_cut and index and forecast.phase(behavior, here) == 0.0 < segments[index - 1].natural:
                     break  # another takes its part before this point: it need not hurry there
                 natural, latest = at + forecast.phase(behavior, here), at + forecast.longest(behavior, here)
+                is_off = forecast.is_hurried(behavior, here)
                 if point is points[number] and not self.paces.get(behavior):
                     natural = max(natural, self.not_before.get(behavior, natural))  # overdue, not slower on purpose
                 at = max(natural, now) if facts.holds(point) else natural
                 if forecast.times[here] > natural + SURPRISE and self._net.part_of[point].kind == "passive":
                     at = max(natural, min(forecast.times[here], latest))
-                    is_paced = is_paced or at > natural + SURPRISE
+                    is_off = is_off or at > natural + SURPRISE
                 if behavior in self.may_be_slower and self._net.part_of[point].can_wait and may_pass(point):
-                    is_paced = is_paced or forecast.times[here] > at + EPSILON
+                    is_off = is_off or forecast.times[here] > at + EPSILON
                     at = max(at, min(forecast.times[here], at + slack(plan, point)))
             before = here
-            if not may_pass(point):
-                if is_hurried and index:
-                    at = max(at, forecast.times[here])
+            is_end = not may_pass(point)
+            if is_end and is_hurried and index:
+                at, is_off, is_end = max(at, forecast.times[here]), True, False
+                if self._net.part_of[point].point == point:
                     stops.add(point.sync)
-                else:
-                    planned.append((point.sync, at))
-                    break
             planned.append((point.sync, at))
-        return tuple(planned) if is_paced else ()
+            told = len(planned) if is_off else told
+            if is_end:
+                break
+        if told:
+            self.paced.add(behavior)
+        return tuple(planned[:told])
 
     # -- expected times ------------------------------------------------------------------------------------------
 

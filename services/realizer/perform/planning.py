@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import LONGEST_SPEECH, Hand, Speech
+from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Estimates
 from engage_hri.schemas.check import validated
@@ -43,13 +43,6 @@ class Planning:
     async def plan(self, live: Live) -> Plan:
         """Plan a block. Of the blocks that it may refer to (`elsewhere`), those stay that it does refer to."""
         block = live.block
-        for each in block.behaviors:
-            if isinstance(each, Speech) and len(each.text) > LONGEST_SPEECH:
-                reason = f"{len(each.text)} characters of speech, at most {LONGEST_SPEECH} are said in one go"
-                advice = "say it in several"
-                raise BlockRefused(
-                    Fault(reason=reason, where=f"{block.id}: {each.id}", line=each.line, advice=advice)
-                )
         if (held := extent(block)) > self._config.most:
             reason = f"{held} behaviors, marks and sync references; at most {self._config.most} are planned in time"
             advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"

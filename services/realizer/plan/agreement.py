@@ -63,6 +63,8 @@ class Rounds:
         self.estimates = first
         self.turns: frozenset[Turn] = frozenset()
         self._answers = [(question, first)]
+        self._rounds = [(first, first)]
+        """For each answer: with what the plan was made, and what the body said."""
         self._begun = len(self._tried)
         """Number of plans that were tried in other manners."""
         self._has_jumped = False
@@ -87,6 +89,7 @@ class Rounds:
             return None
         self._believing = self._believing or plan
         off = difference(self.estimates, told)
+        off = off._replace(natural=max(off.natural, _too_slow(plan, told)))
         if len(plan.dropped) > len(self._believing.dropped) and not self._is_resigned:
             return self.give_way()
         is_agreed = max(off) <= NOTICEABLE
@@ -103,8 +106,9 @@ class Rounds:
         self._answers.append((question, told))
         if not self._is_free and not is_early:
             self.turns |= plan.turns
-        earlier = [answer for _, answer in self._answers[-SURE:-1]]
-        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, earlier)
+        weight, earlier = 1.0 if is_settled or is_early else 0.5, self._rounds[1 - SURE :]
+        self._rounds.append((self.estimates, told))
+        self.estimates = between(self.estimates, told, weight, earlier)
         return None
 
     @property
@@ -145,6 +149,15 @@ def _refuted(plan: Plan, before: Sequence[Estimate], after: Sequence[Estimate]) 
                 yield from (Point(each.behavior, sync) for sync in holds[-1:])
 
 
+def _too_slow(plan: Plan, told: Sequence[Estimate]) -> Seconds:
+    """Seconds by which a phase is planned to take longer than the body says it can, at most."""
+    phases = [(each.behavior, phase) for each in told for phase in each.phases if each.behavior in plan.chains]
+    ends = [(Point(id, phase.since), Point(id, phase.to), phase.longest) for id, phase in phases]
+    return max(
+        (plan.predicted(to) - plan.predicted(at) - most for at, to, most in ends if most is not None), default=0.0
+    )
+
+
 class Difference(NamedTuple):
     """Seconds by which phases are other than expected, at most; inf if something else is. short: by which they take
     longer, at their shortest."""
@@ -180,23 +193,29 @@ def between(
     before: Sequence[Estimate],
     after: Sequence[Estimate],
     weight: float = 0.5,
-    earlier: Sequence[Sequence[Estimate]] = (),
+    earlier: Sequence[tuple[Sequence[Estimate], Sequence[Estimate]]] = (),
 ) -> tuple[Estimate, ...]:
-    """Estimates on the way from `before` to `after`, which is at weight 1.
+    """Estimates on the way from `before` to `after`, which is at weight 1. earlier: the same of the rounds before.
 
-    Where each answer of the body makes the plan that calls for the other, the right one lies between; not for a phase
-    of which all `earlier` answers say the same. What could not be hurried in one plan cannot in the next; a behavior
-    that the body could not do then stays out.
+    Where each answer of the body makes the plan that calls for the other, the right one lies between: if one answer
+    was more than was planned with, and the next is less, where a line through both says that it is neither. A phase
+    of which all `earlier` answers say the same is taken as it is. What could not be hurried or slowed in one plan
+    cannot in the next; a behavior that the body could not do then stays out.
     """
     known = {each.behavior: each for each in before}
-    said = [
-        {(each.behavior, phase.to): phase.natural for each in answer for phase in each.phases} for answer in earlier
-    ]
-    return tuple([_between(known.get(each.behavior, each), each, weight, said) for each in after])
+    rounds = [(_naturals(made_with), _naturals(told)) for made_with, told in earlier]
+    return tuple([_between(known.get(each.behavior, each), each, weight, rounds) for each in after])
+
+
+def _naturals(estimates: Sequence[Estimate]) -> dict[tuple[str, str], Seconds]:
+    return {(each.behavior, phase.to): phase.natural for each in estimates for phase in each.phases}
 
 
 def _between(
-    one: Estimate, other: Estimate, weight: float, said: Sequence[Mapping[tuple[str, str], Seconds]]
+    one: Estimate,
+    other: Estimate,
+    weight: float,
+    rounds: Sequence[tuple[Mapping[tuple[str, str], Seconds], Mapping[tuple[str, str], Seconds]]],
 ) -> Estimate:
     if not one.feasible:
         return one
@@ -204,12 +223,17 @@ def _between(
         return other
     phases = []
     for a, b in zip(one.phases, other.phases, strict=True):
-        is_sure = bool(said) and all(
-            abs(answer.get((one.behavior, b.to), inf) - b.natural) <= NOTICEABLE for answer in said
-        )
-        share = 1.0 if is_sure else weight
-        natural = (1.0 - share) * a.natural + share * b.natural
-        longest = a.longest if b.longest is None and b.hold else b.longest
+        key = (one.behavior, b.to)
+        is_sure = bool(rounds) and all(abs(told.get(key, inf) - b.natural) <= NOTICEABLE for _, told in rounds)
+        natural = (1.0 - weight) * a.natural + weight * b.natural
+        if is_sure:
+            natural = b.natural
+        elif weight < 1.0 and rounds and key in rounds[-1][0] and key in rounds[-1][1]:
+            planned, said = rounds[-1][0][key], rounds[-1][1][key]
+            was_off, is_off = said - planned, b.natural - a.natural
+            if was_off * is_off < 0.0:
+                natural = a.natural + is_off * (a.natural - planned) / (was_off - is_off)
+        longest = a.longest if b.longest is None else b.longest
         longest = None if longest is None else max(longest, natural)
         phases.append(replace(b, natural=natural, shortest=max(map(_haste, (a, b))) * natural, longest=longest))
     return replace(other, phases=tuple(phases))

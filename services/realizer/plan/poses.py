@@ -9,7 +9,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.slack import slack
+from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import EPSILON, SHIFTS, WITH_STROKE, Point, family
 
 NOTICEABLE: Seconds = 0.0005
@@ -98,7 +98,8 @@ def behavior_times(
         if to == cut and surplus < -NOTICEABLE:
             break
         is_just_in_time = chain.type in SHIFTS and comes >= taken - EPSILON
-        is_due = _is_met_there(plan, to, known, begins) if segment.hold else is_just_in_time
+        is_due = _is_met_there(plan, to, known, begins, at) if segment.hold else is_just_in_time
+        is_due = is_due and not (plan.at[since] == plan.at[to] and times[-1].sync == since.sync)
         if abs(surplus) > NOTICEABLE or is_due:
             is_slower = EPSILON < surplus <= slack(plan, to)
             when = comes + (APART if id in plan.natural else 0.0)
@@ -106,17 +107,24 @@ def behavior_times(
     return tuple(times)
 
 
-def _is_met_there(plan: Plan, hold: Point, known: Known, before: Seconds) -> bool:
-    """True if one comes to this instant who cannot wait, or a look: who is at the hold point waits for its report.
+def _is_met_there(plan: Plan, hold: Point, known: Known, before: Seconds, at: Callable[[Point], Seconds]) -> bool:
+    """True if one comes to this instant who cannot wait, or if this waits for one that comes at the same time.
 
-    before: when it is at the point before. If a point of another block has come by then, it need not stop for it.
+    Who is at the hold point waits until that is measured. before: when it is at the point before. If a point of
+    another block has come by then, it need not stop for it.
     """
-    others = (each for each in plan.members[plan.at[hold]] if each.behavior != hold.behavior)
-    return any(
-        known.points.get(each.point, inf) > before
-        for each in others
-        if not each.can_wait or plan.chains[each.behavior].type not in WITH_STROKE
+    here, net = plan.at[hold], plan.net
+    others = (
+        each
+        for each in plan.members[here]
+        if each.behavior != hold.behavior
+        and (each.kind == "passive" or (each.kind == "prompt" and plan.chains[each.behavior].type not in WITH_STROKE))
     )
+    if any(known.points.get(each.point, inf) > before for each in others):
+        return True
+    awaited = (net.places[each] for each in net.inputs[here])
+    sources = {each.source for each in awaited if each.kind not in ("phase", "idle") and each.source}
+    return any(at(point) > at(hold) - UNNOTICED for each in sources for point in net.transitions[each].points[:1])
 
 
 def _taken(plan: Plan, id: str, at: Callable[[Point], Seconds]) -> Seconds:

@@ -15,12 +15,15 @@ BRAKING: Seconds = 0.1
 
 
 def slack(plan: Plan, point: Point) -> Seconds:
-    """Seconds by which a behavior may be early at a hold point that it shares with nobody, and not stop there."""
+    """Seconds by which a behavior may be early at a hold point that it shares with nobody, and not stop there.
+
+    point: any that comes with the hold point.
+    """
     members = plan.members[plan.at[point]]
-    if len(members) > 1 or not members[0].can_wait or point in plan.manner.stands:
+    if len(members) > 1 or not members[0].can_wait or (hold := members[0].point) in plan.manner.stands:
         return 0.0
-    chain = plan.chains[point.behavior]
-    number = chain.points.index(point) - 1
+    chain = plan.chains[hold.behavior]
+    number = next(index for index, each in enumerate(chain.points) if plan.at[each] == plan.at[hold]) - 1
     longest = chain.longest[number]
     room = inf if longest is None else longest - chain.segments[number].natural
     return min(BRIEF, max(0.0, room) + UNNOTICED)

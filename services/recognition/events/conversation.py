@@ -103,11 +103,11 @@ class Conversation:
         self.speaks_since, self.silent_since = None, at
         self._scene.falls_silent(self.id, at)
         since = self.own_backchannel.undecided_since
-        words = "" if since is None else self._writer.text_of(self.id, since)
-        if words and self.pair.robot_holds_turn and not is_listening(words):
-            self._takes_floor(at, "words")
-        elif since is not None:
-            self._brief = since, at
+        if since is not None:
+            if self._listens(since) is False:
+                self._takes_floor(at, "words")
+            else:
+                self._brief = since, at
         self._backchannel_speech_ends(self.own_backchannel, at)
         self._floor_is_free(at)
         self._ends("speak", at, by_robot=False)
@@ -118,10 +118,8 @@ class Conversation:
         Until then its length has decided: a "stop" was too short for an answer, and "yes, yes, okay" too long for a
         backchannel.
         """
-        words, pair = self._writer.text_of(self.id, since), self.pair
-        if not words or not pair.robot_holds_turn or pair.event is None or since < pair.event.started:
-            return  # said to no turn, or before this one
-        if is_listening(words):
+        pair, listens = self.pair, self._listens(since)
+        if listens:
             if pair.was_listening(since):
                 self._brief = since, self.silent_since
                 event = self._backchannel(self._scene.robot, self.id, since, self._speech_confidence)
@@ -129,10 +127,17 @@ class Conversation:
                 self.own_backchannel.gestures(event)
                 if self.silent_since is not None:
                     self.own_backchannel.ends(self.silent_since)
-        elif self._brief is not None and self._brief[0] == since:
+        elif listens is False and self._brief is not None and self._brief[0] == since:
             is_answer = pair.human_begins("speak", since, self._speech_confidence)
             if is_answer and self._brief[1] is not None:
                 pair.ends("speak", self._brief[1], by_robot=False)
+
+    def _listens(self, since: Seconds) -> bool | None:
+        """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
+        words, pair = self._writer.text_of(self.id, since), self.pair
+        if not words or not pair.robot_holds_turn or pair.event is None or since < pair.event.started:
+            return None
+        return is_listening(words)
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a nod or a shake of the person."""

@@ -320,10 +320,16 @@ class Person:
         self.forget_idle(at)
         self.conversation.block_ended(block, at, aborted=aborted)
 
-    def withdraw(self, event: OngoingEvent, at: Seconds) -> None:
-        """Withdraw an event of the robot."""
-        if self.conversation.pair.event is event:
-            self.conversation.pair.abort(at)
+    def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
+        """Withdraw an event of the robot.
+
+        is_orphan: whoever asked for it is gone. What the robot has said until the end of its turn is answered all the
+        same, so that such a pair stays.
+        """
+        pair = self.conversation.pair
+        if pair.event is event:
+            if pair.robot_holds_turn or not is_orphan:
+                pair.abort(at)
             return
         for machine in self.gaze_machines():
             if machine.event is event:

@@ -18,7 +18,7 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
-from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.schemas.requests import ORPHANED, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -139,8 +139,8 @@ class Session:
                 self._request(observation, at)
             case SignalTurn():
                 self._signal(observation, at)
-            case Cancel(id=id):
-                self._cancel(id, at)
+            case Cancel():
+                self._cancel(observation, at)
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
                 self._people.apply_to_all(at, lambda person: person.point_realised(block, name, at))
@@ -357,10 +357,11 @@ class Session:
         else:
             backchannel.announced(event)
 
-    def _cancel(self, id: str, at: Seconds) -> None:
-        event = self._live.pop(id, None)
-        if event is not None and event.request == id:
-            self._people.apply(event.responder, at, lambda person: person.withdraw(event, at))
+    def _cancel(self, cancel: Cancel, at: Seconds) -> None:
+        event = self._live.pop(cancel.id, None)
+        if event is not None and event.request == cancel.id:
+            is_orphan = cancel.reason in ORPHANED
+            self._people.apply(event.responder, at, lambda person: person.withdraw(event, at, is_orphan=is_orphan))
 
     # -- turns and blocks ---------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ const LOOK = 250; // ms between two looks at how the link is
 const SILENCE = 16; // looks without any frame after which the window is away
 const DEAD = 60; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
 const NOTED = 0.5; // seconds after which an order without an answer is shown
-const KEPT = "engage-orders"; // what is left over as the page is loaded anew
+const KEPT = `engage-orders ${location.pathname}`; // what is left over as the page is loaded anew; another path is another robot
 const clock = () => Date.now() / 1000; // goes on while a computer sleeps
 
 // take: gets each frame, and whether it is the first of a link. tell: whether the window is there, and why not. report: what was not done. wait: names of orders without an answer.

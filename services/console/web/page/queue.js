@@ -77,7 +77,7 @@ export function queue(kept) {
     // What a refusal says, with the name of the order.
     refusal({ refused, text }) {
       const order = sent.find((each) => each.number === refused)?.order;
-      return order ? `Not done: ${named(order)}. ${text}` : text;
+      return order ? `Not done: ${named(order)}: ${text}` : text;
     },
     taken(last) {
       sent = sent.filter((each) => each.number > last);

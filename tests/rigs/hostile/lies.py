@@ -1,4 +1,4 @@
-"""Lies of a body about its behaviors. Pure, from chance alone; services/hostile/service.py carries them out."""
+"""Lies of a body about its behaviors. Pure, from chance alone; tests/rigs/hostile/service.py carries them out."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -10,7 +10,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Face, FaceFacs, FaceLexe
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.hostile.chance import Chance, happens
+from tests.rigs.hostile.chance import Chance, happens
 
 Status = Literal["done", "taken_over", "aborted", "failed"]
 FAR = (1e9, -1e9, 1e308, -1e308, -1.0, 60.0)

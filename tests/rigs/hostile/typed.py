@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.hostile.chance import Chance, happens
+from tests.rigs.hostile.chance import Chance, happens
 
 SURROGATE = "\u2620"
 """Stands for half a surrogate pair, which no encoder takes: `payloads` replaces its bytes."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from lxml import etree
 
-from engage_hri.services.hostile.chance import Chance, happens
+from tests.rigs.hostile.chance import Chance, happens
 
 SEEDS = (
     """<bml xmlns="org.mindmakers.bml" id="{id}"><gaze id="g" target="{entity}"/>

@@ -33,9 +33,9 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.hostile import plausible
-from engage_hri.services.hostile.chance import Chance, happens
-from engage_hri.services.hostile.typed import NASTY_FLOATS, NASTY_INTS, RandomMessages, Words
+from tests.rigs.hostile import plausible
+from tests.rigs.hostile.chance import Chance, happens
+from tests.rigs.hostile.typed import NASTY_FLOATS, NASTY_INTS, RandomMessages, Words
 
 IDS = ("1", "2", "3", "same", "1~2")
 """Request ids that all peers share."""

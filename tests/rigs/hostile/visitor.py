@@ -11,8 +11,8 @@ from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.hostile import plausible
 from engage_hri.services.requests.ends import Pending, Requester
+from tests.rigs.hostile import plausible
 
 NAME = "visitor"
 MOST = 5

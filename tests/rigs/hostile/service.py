@@ -1,4 +1,4 @@
-"""A service `control` that lies: it takes behaviors as control does, and then follows services/hostile/lies.py."""
+"""A service `control` that lies: it takes behaviors as control does, and then follows tests/rigs/hostile/lies.py."""
 
 import asyncio
 from random import Random
@@ -24,9 +24,9 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.hostile.lies import Lie, Status, Step, estimate, lie
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
+from tests.rigs.hostile.lies import Lie, Status, Step, estimate, lie
 
 NAME = "control"
 TERM: Seconds = 2.0

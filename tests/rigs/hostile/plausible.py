@@ -22,7 +22,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.services.hostile.chance import Chance, happens
+from tests.rigs.hostile.chance import Chance, happens
 
 TEXT = "Please move the blue piece"
 

@@ -23,9 +23,9 @@ from engage_hri.schemas.requests import Cancel, KeepAlive, Request
 from engage_hri.schemas.settings import ServiceSettings
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.hostile.chance import Chance, happens
-from engage_hri.services.hostile.markup import document
-from engage_hri.services.hostile.typed import SURROGATE, RandomMessages, distorted
+from tests.rigs.hostile.chance import Chance, happens
+from tests.rigs.hostile.markup import document
+from tests.rigs.hostile.typed import SURROGATE, RandomMessages, distorted
 
 BROKEN = 0.05
 """Share of the payloads that have bits flipped, or end early."""

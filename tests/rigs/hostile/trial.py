@@ -27,17 +27,17 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import LOG, Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.hostile.audit import REFUSED, Audit, Entry
-from engage_hri.services.hostile.payloads import Payload, Payloads
-from engage_hri.services.hostile.schemes import Move, Schemer
-from engage_hri.services.hostile.service import NAME as BODY
-from engage_hri.services.hostile.service import LyingBody
-from engage_hri.services.hostile.typed import RandomMessages, Words
-from engage_hri.services.hostile.visitor import NAME as VISITOR
-from engage_hri.services.hostile.visitor import Visitor, client_fault
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, serve
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop
+from tests.rigs.hostile.audit import REFUSED, Audit, Entry
+from tests.rigs.hostile.payloads import Payload, Payloads
+from tests.rigs.hostile.schemes import Move, Schemer
+from tests.rigs.hostile.service import NAME as BODY
+from tests.rigs.hostile.service import LyingBody
+from tests.rigs.hostile.typed import RandomMessages, Words
+from tests.rigs.hostile.visitor import NAME as VISITOR
+from tests.rigs.hostile.visitor import Visitor, client_fault
 
 Kind = Literal["messages", "requests", "body"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
