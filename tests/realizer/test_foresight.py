@@ -124,7 +124,7 @@ async def test_a_gesture_in_words_to_come_is_not_held_up_during_those_before() -
 
     times = seen.times("two")
     assert (times["g:start"], times["g:stroke"], times["t:m"]) == (3.375, 5.0, 5.0)
-    assert seen.body.stops == []
+    assert seen.body.stops == ["g:stroke_start"]
 
 
 async def test_nobody_is_late_for_a_look_that_another_block_has_ended() -> None:
