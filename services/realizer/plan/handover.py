@@ -144,7 +144,7 @@ class Hands:
         return all(end <= since + EPSILON or start >= to - EPSILON for start, end in windows)
 
     def _needed(self, chain: Chain) -> tuple[Seconds, Seconds]:
-        """From when until when a behavior needs its arm."""
+        """Start and end of the time in which a behavior needs its arm."""
         times, points = self._times, chain.points
         kept = [number for number, point in enumerate(points) if point in self._kept]
         since, to = times[points[0]], times[points[max([least(chain), *kept])]]
