@@ -24,10 +24,10 @@ class Media(NamedTuple):
     relative: str
 
 
-def eaf(tiers: Sequence[Tier], *, date: str, media: Media | None = None, author: str = "engage") -> bytes:
+def eaf(tiers: Sequence[Tier], *, date: str, media: Media | None = None) -> bytes:
     """An ELAN document. date: of the recording, as XML Schema has it. media: a film of it."""
     root = etree.Element("ANNOTATION_DOCUMENT", nsmap={"xsi": _XSI})
-    for name, value in (("AUTHOR", author), ("DATE", date), ("FORMAT", "3.0"), ("VERSION", "3.0")):
+    for name, value in (("AUTHOR", "engage"), ("DATE", date), ("FORMAT", "3.0"), ("VERSION", "3.0")):
         root.set(name, value)
     root.set(f"{{{_XSI}}}noNamespaceSchemaLocation", _FORMAT)
     header = etree.SubElement(root, "HEADER", MEDIA_FILE="", TIME_UNITS="milliseconds")

@@ -46,9 +46,9 @@ def sheet(scenes: Sequence[Scene], format: str = "png") -> bytes:
     return file.getvalue()
 
 
-def pictures(scenes: Sequence[Scene], size: tuple[int, int] = (400, 560)) -> list["NDArray[np.uint8]"]:
-    """Draw each scene as an array of height x width x 3, 0..255."""
-    figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100)
+def pictures(scenes: Sequence[Scene]) -> list["NDArray[np.uint8]"]:
+    """Draw each scene as an array of 560 x 400 x 3 (height, width, colors), 0..255."""
+    figure = Figure(figsize=(4.0, 5.6), dpi=100)
     canvas, in_view = FigureCanvasAgg(figure), _frame(scenes)
     drawn = []
     for scene in scenes:

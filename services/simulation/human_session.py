@@ -27,6 +27,8 @@ from engage_hri.services.simulation.table_2_1 import TABLE
 Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | SignalTurn
 
 EXPLAINER, LISTENER = "robot", "human"
+CLOCK = "loop"
+"""Clock of the stamps."""
 OBJECTS = ("cracker", "knife", "cheese", "olives", "peppers", "plate", "salmon")
 """Objects of directed gazes, used in turn, so that none comes again while its last time still counts."""
 SHARED: Seconds = 0.5
@@ -149,29 +151,28 @@ def _event(kind: EventKind, number: int, start: Seconds, chance: Chance, answers
 # -- its observations -------------------------------------------------------------------------------------------
 
 
-def observations(plan: Sequence[Planned], clock: str = "loop") -> list[tuple[Observation, Seconds]]:
-    """Observations of the session, in order, each with its time. clock: of the stamps."""
-    seen = [*_arrival(clock)]
+def observations(plan: Sequence[Planned]) -> list[tuple[Observation, Seconds]]:
+    """Observations of the session, in order, each with its time."""
+    seen = [*_arrival()]
     for number, event in enumerate(plan, start=1):
-        seen += _PlannedObservations(event, number, clock).all()
+        seen += _PlannedObservations(event, number).all()
     return sorted(seen, key=lambda observation: observation[1])
 
 
-def _arrival(clock: str) -> Iterator[tuple[Observation, Seconds]]:
+def _arrival() -> Iterator[tuple[Observation, Seconds]]:
     things = (Entity(id=name, kind="object", position=(0.6, 0.1 * y - 0.3, 0.7)) for y, name in enumerate(OBJECTS))
     table = Entity(id="table", kind="surface", position=(0.6, 0.0, 0.7))
     listener = Entity(id=LISTENER, kind="person", position=(1.3, 0.0, 1.2))
-    yield World(entities=(table, *things, listener), at=Stamp(clock, 0.0)), 0.0
-    yield ActorFound(actor=LISTENER, at=Stamp(clock, 0.0)), 0.0
+    yield World(entities=(table, *things, listener), at=Stamp(CLOCK, 0.0)), 0.0
+    yield ActorFound(actor=LISTENER, at=Stamp(CLOCK, 0.0)), 0.0
 
 
 class _PlannedObservations:
     """Observations of one planned event. Gazes come from and go back to nowhere."""
 
-    def __init__(self, event: Planned, number: int, clock: str) -> None:
+    def __init__(self, event: Planned, number: int) -> None:
         self._event = event
         self._number = number
-        self._clock = clock
 
     def all(self) -> Iterable[tuple[Observation, Seconds]]:
         match self._event.kind:
@@ -249,7 +250,7 @@ class _PlannedObservations:
         yield ActionEnded(actor=actor, action=action, targets=targets, at=self._at(until)), until
 
     def _at(self, at: Seconds) -> Stamp:
-        return Stamp(self._clock, at)
+        return Stamp(CLOCK, at)
 
     @property
     def _name(self) -> str:

@@ -25,6 +25,7 @@ Point = tuple[float, float]
 
 LENGTH_TOLERANCE: Meters = 0.005
 GAP_TOLERANCE: Meters = 0.012
+OVERLAP_TOLERANCE: Meters = 0.004
 ANGLE_TOLERANCE: Radians = math.radians(12.0)
 
 
@@ -164,13 +165,13 @@ def poses_touching(piece: Entity, landmark: Entity, side: Side) -> Iterable[Piec
             yield PiecePose(place.middle[0] - (cos * dx - sin * dy), place.middle[1] - (sin * dx + cos * dy), yaw)
 
 
-def overlap(piece: Entity, other: Entity, margin: Meters = 0.004) -> bool:
-    """True if two pieces (convex) lie on one another by more than `margin`."""
+def overlap(piece: Entity, other: Entity) -> bool:
+    """True if two pieces (convex) lie on one another by more than `OVERLAP_TOLERANCE`."""
     for edge in (*edges(piece), *edges(other)):
         normal = (math.cos(edge.facing), math.sin(edge.facing))
         low, high = _extent(piece, normal)
         other_low, other_high = _extent(other, normal)
-        if high - other_low <= margin or other_high - low <= margin:
+        if high - other_low <= OVERLAP_TOLERANCE or other_high - low <= OVERLAP_TOLERANCE:
             return False
     return True
 

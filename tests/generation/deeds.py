@@ -39,6 +39,8 @@ SERVICES = (*roster.ROBOT, "simulation")
 DYING = ("generation", "realizer", "control", "recognition")
 STARTED_AGAIN = 20.0
 """Seconds after which a program that has died runs again, if its turn still goes on."""
+LAST_WORDS = ("itisverynice", "now")
+"""Letters of the last words of a call, and of a stream."""
 SAMPLE = 0.06
 """Seconds from an instant within which the body's log has a sample."""
 SEEN = 1.0
@@ -139,8 +141,11 @@ class Reader:
             "eye_contact": next((each for each in reversed(contact) if each is not None), None),
         }  # fmt: skip
 
-    def status(self, blocks: list[str], since: float) -> set[str]:
-        """What may be told of a turn of these fragments, from the ends of blocks and the deaths of programs."""
+    def status(self, blocks: list[str], since: float, *, is_whole: bool) -> set[str]:
+        """What may be told of a turn of these fragments, from the ends of blocks and the deaths of programs.
+
+        is_whole: its last words were said.
+        """
         ends = [self.ends.get(block, []) for block in blocks]
         gone = {name for time, name in self.gone if time >= since}
         if not any(ends):
@@ -154,7 +159,9 @@ class Reader:
         for worst in ("failed", "interrupted"):
             if worst in last:
                 return {worst}
-        return {"done"} if all(each == "done" for each in last) else {"failed", "interrupted"}
+        # A block may be done that a new choice has cut short, and the body gone when the rest was to be planned.
+        is_done = all(each == "done" for each in last) and (is_whole or "control" not in gone)
+        return {"done"} if is_done else {"failed", "interrupted"}
 
 
 def angle(origin: Vector, axis: Vector, place: Vector) -> float:
@@ -327,7 +334,8 @@ def compared(
     until: float,
 ) -> list[str]:
     told, found, known = told_by(result), [], [tuple(blocks)]
-    allowed = reader.status(blocks, since)
+    is_whole = reader.judged(blocks, written, until)["said"].endswith(LAST_WORDS)
+    allowed = reader.status(blocks, since, is_whole=is_whole)
     if result.status not in allowed:
         ends = [reader.ends.get(block) for block in blocks]
         found.append(f"{id}: status: told {result.status}, seen {sorted(allowed)}: {ends} {reader.gone} {result}")

@@ -132,7 +132,7 @@ def choose(
         if pair.by_look:
             warnings.append(
                 f"{reference.id}: {pair.option.text!r} may mean {pair.by_look + 1} objects, and the look alone tells "
-                "which; a higher minimum reliability asks for a point, where one is possible"
+                "which (a higher certainty, or minimum reliability, asks for a point, if one is possible)"
             )
         if choice.gesture == "directed_gaze_with_pointing" and (
             hand := hand_of(motions.point(CURRENT_POSE, choice.target))

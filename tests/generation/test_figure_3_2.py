@@ -170,8 +170,8 @@ def test_where_no_words_tell_the_triangles_apart_a_look_does_and_a_warning_says_
 
     assert choices(made)[0] == ("gaze", "the triangle")
     assert made.warnings == (
-        "ref-1: 'the triangle' may mean 3 objects, and the look alone tells which; "
-        "a higher minimum reliability asks for a point, where one is possible",
+        "ref-1: 'the triangle' may mean 3 objects, and the look alone tells which "
+        "(a higher certainty, or minimum reliability, asks for a point, if one is possible)",
     )
 
 

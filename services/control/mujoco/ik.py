@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.services.control.mujoco.description import Place
-from engage_hri.services.runtime.steps import Steps, finished
+from engage_hri.services.runtime.steps import Steps
 
 Array = NDArray[np.float64]
 
@@ -72,22 +72,15 @@ class Chain:
         origin, axis, tip = self._axis()
         return Ray(origin=_vector(origin), axis=_vector(axis), tip=None if self._hand is None else _vector(tip))
 
-    def aim(
-        self, qpos: Array, target: Vector, preferred: Mapping[str, Radians], *, floor: Meters = -math.inf,
-        distance: Meters = 0.0,
-    ) -> Solution:  # fmt: skip
-        """Angles whose axis runs through `target`, as near to the preferred ones as that leaves open.
-
-        qpos: of all other joints. floor: height under which elbow and hand may not come. distance: from the hand to
-        the target, at least.
-        """
-        return finished(self.aiming(qpos, target, preferred, floor=floor, distance=distance))
-
     def aiming(
         self, qpos: Array, target: Vector, preferred: Mapping[str, Radians], *, floor: Meters = -math.inf,
         distance: Meters = 0.0,
     ) -> Steps[Solution]:  # fmt: skip
-        """Aim in steps, each a round. Between them the chain may be asked for other things."""
+        """Angles whose axis runs through `target`, as near to the preferred ones as that leaves open.
+
+        qpos: of all other joints. floor: height under which elbow and hand may not come. distance: from the hand to
+        the target, at least. In steps, each a round: between them the chain may be asked for other things.
+        """
         wanted, like = np.asarray(target), np.array([preferred[joint] for joint in self.joints])
         middle = (self._low + self._high) / 2
         best: Solution | None = None

@@ -105,7 +105,7 @@ def choice(
         if pair.by_look:
             warnings.append(
                 f"{table.reference.id}: {pair.option.text!r} may mean {len(pair.by_look) + 1} objects, and the look "
-                "alone tells which; a higher minimum reliability asks for a point, where one is possible"
+                "alone tells which (a higher certainty, or minimum reliability, asks for a point, if one is possible)"
             )
         if made.gesture == POINT and (hand := hand_of(motions.point(CURRENT_POSE, made.target))):
             hands[made.reference] = hand

@@ -29,7 +29,7 @@ from engage_hri.services.realizer.plan.manner import AT_EASE, Manner
 from engage_hri.services.realizer.plan.outcome import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE
-from engage_hri.services.realizer.plan.slack import UNNOTICED
+from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
 from engage_hri.services.realizer.points import Point, frozen
 
 STRAIGHT, MOST = 2, 12
@@ -150,12 +150,19 @@ def _refuted(plan: Plan, before: Sequence[Estimate], after: Sequence[Estimate]) 
 
 
 def _too_slow(plan: Plan, told: Sequence[Estimate]) -> Seconds:
-    """Seconds by which a phase is planned to take longer than the body says it can, at most."""
-    phases = [(each.behavior, phase) for each in told for phase in each.phases if each.behavior in plan.chains]
-    ends = [(Point(id, phase.since), Point(id, phase.to), phase.longest) for id, phase in phases]
-    return max(
-        (plan.predicted(to) - plan.predicted(at) - most for at, to, most in ends if most is not None), default=0.0
-    )
+    """Seconds by which a phase is planned to take longer than the body says it can, at most.
+
+    Who waits at its end may take any time.
+    """
+    found = [0.0]
+    for each in told:
+        for phase in each.phases if each.behavior in plan.chains else ():
+            end = Point(each.behavior, phase.to)
+            seconds = plan.predicted(end) - plan.predicted(Point(each.behavior, phase.since))
+            waits = any(it.behavior == each.behavior and it.can_wait for it in plan.members[plan.at[end]])
+            if phase.longest is not None and not (waits and seconds - phase.natural > slack(plan, end)):
+                found.append(seconds - phase.longest)
+    return max(found)
 
 
 class Difference(NamedTuple):

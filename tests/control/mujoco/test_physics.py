@@ -21,6 +21,7 @@ from engage_hri.services.control.mujoco.model import MOTORS, scene
 from engage_hri.services.control.mujoco.physics import Physics
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.torso import kinematics
+from engage_hri.services.runtime.steps import finished
 from engage_hri.services.tangram.table import tangram_table
 
 NEAR_ALREADY = (
@@ -80,7 +81,7 @@ def test_inverse_kinematics_agrees_with_the_closed_form():
     built = model()
     chain = Chain(built, ("neck_yaw", "neck_pitch"), Place(body="head", at=(0.05, 0.0, 0.07)))
     for entity in WORLD.entities:
-        found = chain.aim(built.qpos0, entity.position, {"neck_yaw": 0.0, "neck_pitch": 0.0})
+        found = finished(chain.aiming(built.qpos0, entity.position, {"neck_yaw": 0.0, "neck_pitch": 0.0}))
         assert tuple(found.angles.values()) == pytest.approx(
             kinematics.neck_angles(entity.position, kinematics.HOME), abs=2e-3
         )
