@@ -164,8 +164,7 @@ class Reporter:
     def _broken(self, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
         """Warn of what is broken by more than is tolerated. times: of points that have come, or are planned."""
         is_past = verb == "came"
-        is_of_plan = not is_past and not is_foreign(broken.early.behavior + broken.late.behavior)
-        if broken.seconds > (UNNOTICED if is_of_plan else self._tolerance):
+        if broken.seconds > (self._tolerance if is_past else UNNOTICED):
             point = broken.point
             late = point.behavior if broken.direction == "later" else ""
             why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""
