@@ -141,7 +141,8 @@ class Assembler:
         return tuple(members)
 
     def _gate(self, chain: Chain, syncs: tuple[str, ...]) -> Gate:
-        """As `gate` says; but a movement of which nobody says when it comes begins with the block, and waits."""
+        """Kind of a point, by `gate`; but a movement of which nobody says when it comes begins with the block, and
+        waits."""
         kind = gate(chain.type, syncs)
         is_anytime = kind == "prompt" and chain.type in WITH_STROKE and chain.behavior.id not in self.placed
         return "hold" if is_anytime else kind
