@@ -67,7 +67,7 @@ class Reporter:
         self._tolerance = tolerance
         self.spelling = spelling
         self._late: dict[tuple[Point, str], Seconds] = {}
-        """Instants of behaviors that were reported as late, and what the block says: seconds planned; inf: it came."""
+        """Instants that were reported as late, and what the block says of them: seconds planned; inf: it came."""
         self._character = ""
         self._latest: Seconds = -inf
         """Time of the latest message; none after it has an earlier one."""
@@ -162,8 +162,11 @@ class Reporter:
             self._broken(broken, "is planned", plan, plan.times)
 
     def _broken(self, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
-        """Warn of what is broken by more than is tolerated: at planning of each thing that is said of an instant, as it
-        comes once, if that is later than was planned. times: of points that have come, or are planned."""
+        """Warn of what is broken by more than is tolerated.
+
+        At planning of each thing that is said of an instant; as it comes once, if that is later than was planned.
+        times: of points that have come, or are planned.
+        """
         is_past = verb == "came"
         if broken.seconds > (self._tolerance if is_past else UNNOTICED):
             point = broken.point
