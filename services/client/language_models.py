@@ -37,8 +37,6 @@ WORLD_PATIENCE: Seconds = 0.3
 """Time from the start of a stream for which a bracket waits for the world: it alone says what a reference is."""
 SETTLED: Seconds = 1.0
 """Silence after which a finished sentence is sent: bits of one sentence come faster, a look-up takes longer."""
-SILENCE: Seconds = 10.0
-"""Silence after which a writer of whom nothing was sent is cancelled; generation waits as long once something was."""
 PLAIN_TURN = ToolInput(turn_status="full", parts=())
 
 
@@ -128,39 +126,30 @@ def _unreadable(reason: str, id: str) -> Fault:
 async def _read(robot: Robot, pieces: AsyncIterable[Piece], chunker: Chunker, speaking: "_Speaking") -> None:
     with robot.worlds() as worlds:
         objects = _Objects(worlds, robot.now)
-        waits = _waits(chunker, UNKNOWN, speaking)
+        settling: asyncio.TimerHandle | None = None
         try:
             async for piece in pieces:
-                _end(waits)
+                if settling is not None:
+                    settling.cancel()
                 if not isinstance(piece, Piece):
                     raise _NoPiece(_unreadable(f"the piece {piece!r} is neither text nor a `Part`", speaking.id))
                 ids = await objects.ids(is_needed=isinstance(piece, str) and "[" in piece)
                 for chunk in chunker.feed(piece, ids):
                     speaking.go_on(chunk)
-                waits = _waits(chunker, ids, speaking)
-            _end(waits)
+                settling = asyncio.get_running_loop().call_later(SETTLED, _settle, chunker, ids, speaking)
             chunk = chunker.rest(await objects.ids(is_needed=False))
             speaking.left_out = chunker.left_out
             speaking.finish(chunk)
         finally:
-            _end(waits)
+            if settling is not None:
+                settling.cancel()
             speaking.left_out += chunker.left_out
 
 
-def _waits(chunker: Chunker, ids: Ids, speaking: "_Speaking") -> tuple[asyncio.TimerHandle, ...]:
-    """Say what is to be done while no piece comes."""
-    loop = asyncio.get_running_loop()
-
-    def settle() -> None:
-        for chunk in chunker.settled(ids):
-            speaking.go_on(chunk)
-
-    return loop.call_later(SETTLED, settle), loop.call_later(SILENCE, speaking.give_up)
-
-
-def _end(waits: tuple[asyncio.TimerHandle, ...]) -> None:
-    for each in waits:
-        each.cancel()
+def _settle(chunker: Chunker, ids: Ids, speaking: "_Speaking") -> None:
+    """Send what is finished, since no piece comes."""
+    for chunk in chunker.settled(ids):
+        speaking.go_on(chunk)
 
 
 class _Objects:
@@ -201,8 +190,6 @@ class _Speaking:
         self._is_finished = False
         self._closed: TurnClosed | None = None
         """Set when the turn was aborted while no piece came."""
-        self._has_waited = False
-        """True if nothing was sent, and the writer was silent for too long."""
 
     @asynccontextmanager
     async def watched(self) -> AsyncIterator[None]:
@@ -235,19 +222,10 @@ class _Speaking:
                     id=id, fragment=id, status="interrupted", events=closed.events, heard=closed.heard, fault=fault
                 )
             )
-        if self._has_waited:
-            fault = Fault(reason=f"silence for {SILENCE:g} s", where=self.id)
-            outcomes.append(FragmentOutcome(id=self.id, fragment=self.id, status="interrupted", fault=fault))
         if outcomes and self.left_out:
             told = tuple(dict.fromkeys((*outcomes[-1].warnings, *self.left_out)))
             outcomes[-1] = replace(outcomes[-1], warnings=told)
         return tuple(outcomes)
-
-    def give_up(self) -> None:
-        """Read no more of a writer of whom nothing was sent; once something was, generation ends the turn."""
-        if not self._performing:
-            self._has_waited = True
-            self._reading.cancel()
 
     def go_on(self, chunk: Chunk) -> None:
         self._send(chunk, "middle" if self._performing else "beginning")
