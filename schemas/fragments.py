@@ -4,11 +4,12 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import Action, Constraint, FragmentBehavior
+from engage_hri.schemas.behaviors import Action, Constraint, FragmentBehavior, Reference, Speech
 from engage_hri.schemas.blocks import SpokenText, Unread
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.speakable import has_words
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 TurnStatus = Literal["beginning", "middle", "end", "full", "backchannel"]
@@ -52,6 +53,12 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     """True for a language model's tool call: each behavior is one part, and refusals name it
     (schemas/tool_call.py)."""
     line: int = 0
+
+    @property
+    def worded(self) -> tuple[str, ...]:
+        """Ids of its speeches and references that have words, in order."""
+        spoken = [each for each in self.behaviors if isinstance(each, Reference | Speech)]
+        return tuple(each.id for each in spoken if isinstance(each, Reference) or has_words(each.text))
 
 
 class PerformFragment(Request, frozen=True, kw_only=True, tag="perform_fragment", omit_defaults=True):

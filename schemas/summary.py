@@ -114,9 +114,8 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     return Summary(
         status=status,
         said=joined(each.text for each in spoken),
-        cut_short=bool(statuses & {"failed", "interrupted"})
-        or any(outcome.unsaid for outcome in outcomes)
-        or not all(each.complete for each in spoken),
+        cut_short=status != "refused"
+        and (any(it.unsaid for it in outcomes) or not all(it.complete for it in spoken)),
         references=tuple(
             Referred(
                 object=each.object,

@@ -12,13 +12,16 @@ the other.
 import asyncio
 from collections.abc import AsyncIterable, AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from typing import Any
+from typing import Any, Literal
 
 from msgspec.structs import replace
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment, TurnStatus
+from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import Part, ToolInput
 from engage_hri.schemas.tool_call import fragment_of
@@ -29,6 +32,7 @@ from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.inputs import call_in
 from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot
+from engage_hri.services.requests.ends import Patience, Pending
 from engage_hri.services.text.pieces import Ids
 
 Piece = str | Part
@@ -62,11 +66,12 @@ def summary_of(error: EngageError) -> Summary:
     return summary(_outcome_of(error, ""))
 
 
-def _outcome_of(error: EngageError, id: str) -> FragmentOutcome:
+def _outcome_of(error: EngageError, id: str, unsaid: tuple[str, ...] = ()) -> FragmentOutcome:
     if isinstance(error, PerformFailed) and isinstance(error.outcome, FragmentOutcome):
         return error.outcome
     is_unknown = isinstance(error, OutcomeUnknown)
-    return FragmentOutcome(id=id, fragment=id, status="unknown" if is_unknown else "refused", fault=error.fault)
+    status: Literal["unknown", "refused"] = "unknown" if is_unknown else "refused"
+    return FragmentOutcome(id=id, fragment=id, status=status, unsaid=unsaid, fault=error.fault)
 
 
 async def stream(
@@ -185,8 +190,12 @@ class _Speaking:
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self.left_out: tuple[str, ...] = ()
         """What of the text was not said, or otherwise than it may have been meant."""
-        self._sent: set[str] = set()
-        """Ids of the fragments with a task that has begun, and so has sent its request."""
+        self._sent: dict[str, Pending] = {}
+        """Fragments that were sent, by id."""
+        self._line = asyncio.Lock()
+        """Held by a fragment from when it is sent until it is accepted: of a turn that is refused no more is sent."""
+        self._is_over = False
+        """True once one was not accepted, or ended badly: no more are sent."""
         self._is_finished = False
         self._closed: TurnClosed | None = None
         """Set when the turn was aborted while no piece came."""
@@ -194,19 +203,43 @@ class _Speaking:
     @asynccontextmanager
     async def watched(self) -> AsyncIterator[None]:
         """Read no more as soon as the turn is over, though no fragment is: somebody spoke while no piece came."""
-        with self._robot.turns() as turns:
-            watching = asyncio.create_task(self._watch(turns), name=f"turn {self.id}")
+        kinds = (TurnClosed, PeerAlive, PeerGone)
+        with self._robot._feed(kinds, keys.TURN_CLOSED, keys.ANY_ALIVE) as news:
+            watching = asyncio.create_task(self._watch(news), name=f"turn {self.id}")
             try:
                 yield
             finally:
                 watching.cancel()
                 await asyncio.gather(watching, return_exceptions=True)
 
-    async def _watch(self, turns: Feed[TurnClosed]) -> None:
-        async for closed in turns:
-            if closed.turn == f"{self.id}-1" and closed.status == "aborted" and not self._reading.done():
-                self._closed = closed
-                self._reading.cancel()
+    async def _watch(self, news: Feed[TurnClosed | PeerAlive | PeerGone]) -> None:
+        gone_until: Seconds | None = None
+        while True:
+            patience = None if gone_until is None else max(0.0, gone_until - self._robot.now())
+            match await news.next(patience):
+                case TurnClosed(status="aborted") as closed if closed.turn == f"{self.id}-1":
+                    if not self._reading.done():
+                        self._closed = closed
+                        self._reading.cancel()
+                case PeerGone(participant="generation"):
+                    gone_until = self._robot.now() + Patience().grace
+                case PeerAlive(participant="generation"):
+                    gone_until = None
+                case None:
+                    if gone_until is None:
+                        return  # the client has ended
+                    gone_until = None
+                    self._lose()
+
+    def _lose(self) -> None:
+        """Send no more of a turn that has begun: another life of generation knows nothing of it."""
+        accepted = {id for id, pending in self._sent.items() if pending.accepted.done()}
+        if accepted:
+            self._is_over = True
+            self._reading.cancel()
+            for task in self._performing:
+                if task.get_name() not in accepted:
+                    task.cancel()
 
     def begin(self, tasks: asyncio.TaskGroup, reading: "asyncio.Task[None]") -> None:
         self._tasks = tasks
@@ -214,14 +247,20 @@ class _Speaking:
 
     @property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
-        outcomes = [task.result() for task in self._performing]
-        if (closed := self._closed) is not None and {each.status for each in outcomes} == {"done"}:
-            id, fault = self._fragment((), "end").id, Fault(reason=closed.reason, where=self.id)
-            outcomes.append(
-                FragmentOutcome(
-                    id=id, fragment=id, status="interrupted", events=closed.events, heard=closed.heard, fault=fault
-                )
-            )
+        lost = OutcomeUnknown(Fault(reason="generation is gone", where=self.id))
+        outcomes = [
+            _outcome_of(lost, task.get_name()) if task.cancelled() else task.result() for task in self._performing
+        ]
+        if outcomes and self._reading.cancelled():
+            rest = self._fragment((), "end").id
+            if {each.status for each in outcomes} == {"done"}:
+                outcomes.append(_outcome_of(lost, rest))
+                if (closed := self._closed) is not None:
+                    fault = Fault(reason=closed.reason, where=self.id)
+                    outcomes[-1] = replace(
+                        outcomes[-1], status="interrupted", events=closed.events, heard=closed.heard, fault=fault
+                    )
+            outcomes[-1] = replace(outcomes[-1], unsaid=(*outcomes[-1].unsaid, rest))
         if outcomes and self.left_out:
             told = tuple(dict.fromkeys((*outcomes[-1].warnings, *self.left_out)))
             outcomes[-1] = replace(outcomes[-1], warnings=told)
@@ -237,8 +276,8 @@ class _Speaking:
 
     async def leave_no_turn_open(self) -> None:
         """End a turn of which a fragment was refused: that may have been the one to end it, or the last one read."""
-        statuses = [task.result().status for task in self._performing]
-        if "refused" in statuses[1:] and statuses[0] != "refused":
+        statuses = [each.status for each in self.outcomes]
+        if "refused" in statuses[1:] and statuses[0] != "refused" and not {"interrupted", "unknown"} & {*statuses}:
             with suppress(EngageError):  # there was none
                 await self._robot.perform(self._fragment((), "end"))
 
@@ -253,7 +292,7 @@ class _Speaking:
     def _send(self, chunk: Chunk, status: TurnStatus) -> None:
         self._is_finished = status in ("end", "full")
         fragment = self._fragment(chunk, status)
-        # Requests keep the order of these tasks: each is sent in its task's first step.
+        # Requests keep the order of these tasks: each stands in line in its task's first step.
         self._performing.append(self._tasks.create_task(self._perform(fragment), name=fragment.id))
 
     def _fragment(self, chunk: Chunk, status: TurnStatus) -> TurnFragment:
@@ -261,11 +300,23 @@ class _Speaking:
         return fragment_of(chunk, replace(self._turn, turn_status=status), id)
 
     async def _perform(self, fragment: TurnFragment) -> FragmentOutcome:
-        self._sent.add(fragment.id)
+        await self._line.acquire()
+        if self._is_over:
+            self._line.release()
+            return FragmentOutcome(id=fragment.id, fragment=fragment.id, status="refused", unsaid=fragment.worded)
         try:
-            outcome = await self._robot.perform(fragment, await_answer=self._await_answer)
+            pending = self._sent[fragment.id] = self._robot._send(fragment)
+            pending.accepted.add_done_callback(self._decided)
+            outcome = await self._robot._end_of(pending, await_answer=self._await_answer)
         except EngageError as error:
-            outcome = _outcome_of(error, fragment.id)
+            outcome = _outcome_of(error, fragment.id, fragment.worded)
         if outcome.status != "done":
+            self._is_over = True
             self._reading.cancel()
+        if fragment.id not in self._sent:
+            self._line.release()
         return outcome
+
+    def _decided(self, accepted: "asyncio.Future[Accepted | None]") -> None:
+        self._is_over |= accepted.exception() is not None
+        self._line.release()

@@ -102,10 +102,21 @@ class Robot(Hearing):
             RunFailed: generation is gone, or has not come within `timeout`.
         """
         parsed = fragment_in(fragment, self._unnamed())
-        request = self._fragment_request(parsed)
-        awaits_answer = await_answer and parsed.turn_status in ("end", "full")
-        outcome = await (self._answered(request, timeout) if awaits_answer else self._performed(request, timeout))
-        return successful(self._with_new_words(outcome), parsed.id)
+        return await self._end_of(self._send(parsed), await_answer=await_answer, timeout=timeout)
+
+    def _send(self, fragment: TurnFragment) -> Pending:
+        request = PerformFragment(id=self._request_id(fragment.id), fragment=fragment)
+        return self._requests.send(keys.FRAGMENT, checked(request))
+
+    async def _end_of(
+        self, pending: Pending, *, await_answer: bool, timeout: Seconds | None = None
+    ) -> FragmentOutcome:
+        """Return the outcome of a fragment that was sent in this very step, as `perform` does."""
+        assert isinstance(pending.request, PerformFragment)
+        fragment = pending.request.fragment
+        awaits_answer = await_answer and fragment.turn_status in ("end", "full")
+        outcome = await (self._answered if awaits_answer else self._performed)(pending, timeout)
+        return successful(self._with_new_words(outcome), fragment.id)
 
     def _unnamed(self) -> str:
         """Make the id of a fragment or block that has none."""
@@ -119,27 +130,25 @@ class Robot(Hearing):
         Raises:
             InputRefused: a value in it is of the wrong type. Nothing was sent.
         """
-        self._requests.send(keys.FRAGMENT, checked(self._fragment_request(fragment)))
+        self._send(fragment)
 
-    def _fragment_request(self, fragment: TurnFragment) -> PerformFragment:
-        return PerformFragment(id=self._request_id(fragment.id), fragment=fragment)
-
-    async def _performed(self, request: PerformFragment, timeout: Seconds | None) -> FragmentOutcome:
-        outcome = await self._ask(keys.FRAGMENT, request, timeout)
+    async def _performed(self, pending: Pending, timeout: Seconds | None) -> FragmentOutcome:
+        outcome = await self._finished(pending, timeout)
         assert isinstance(outcome, FragmentOutcome)
         return outcome
 
-    async def _answered(self, request: PerformFragment, timeout: Seconds | None) -> FragmentOutcome:
+    async def _answered(self, pending: Pending, timeout: Seconds | None) -> FragmentOutcome:
+        fragment = pending.request.fragment  # type: ignore[attr-defined]
         with self._feed((TurnClosed, PeerGone), keys.TURN_CLOSED, keys.ANY_ALIVE) as news:
-            outcome = await self._performed(request, timeout)
+            outcome = await self._performed(pending, timeout)
             events = {event.id for event in outcome.events}
-            deadline = self.now() + ANSWER_PATIENCE + (request.fragment.within or 0.0)
+            deadline = self.now() + ANSWER_PATIENCE + (fragment.within or 0.0)
             while (told := await news.next(max(0.0, deadline - self.now()))) is not None:
                 if isinstance(told, PeerGone):
                     if told.participant == "generation":
                         return _without_an_answer(outcome)
                 # An earlier turn of the same name, told again, has other events.
-                elif request.fragment.id in told.fragments and events <= {event.id for event in told.events}:
+                elif fragment.id in told.fragments and events <= {event.id for event in told.events}:
                     return replace(outcome, events=told.events, heard=told.heard)
         return outcome
 
@@ -216,13 +225,15 @@ class Robot(Hearing):
         await asyncio.wait([pending.outcome], timeout=ttl)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
-        pending = self._requests.send(key, checked(request))
+        return await self._finished(self._requests.send(key, checked(request)), timeout)
+
+    async def _finished(self, pending: Pending, timeout: Seconds | None) -> Outcome:
         try:
             if timeout is not None:
                 await self._answer_of(pending, pending.accepted, timeout)
             return await self._answer_of(pending, pending.outcome, None)  # type: ignore[no-any-return]
         except (asyncio.CancelledError, RunFailed):
-            self._requests.cancel(request.id, "requester gave up")
+            self._requests.cancel(pending.request.id, "requester gave up")
             raise
 
     async def _answer_of(self, pending: Pending, answer: Awaitable[Any], timeout: Seconds | None) -> Any:

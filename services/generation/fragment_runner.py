@@ -106,7 +106,7 @@ class FragmentRunner:
         """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
         fragment, lost = bearable(request.fragment, world, self._bus.robot)
         fragment = checked(fragment, world, self._bus.robot)
-        turn = self._turns.accept(fragment, fragment.addressee)
+        turn = self._turns.accept(fragment, fragment.addressee, request.requester)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
         performance.warn((*lost, *left_unsaid(fragment)))
         performance.known = named_objects(fragment, world)

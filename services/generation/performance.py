@@ -302,7 +302,7 @@ class FragmentPerformance:
             fragment=self.fragment.id,
             status=self._ended.status,
             spoken=tuple(each for act in self.acts for each in act.words),
-            unsaid=unsaid(self.acts),
+            unsaid=unsaid(self.acts) if self.acts else self.fragment.worded,
             references=made,
             eye_contact=eye_contact(self.acts, mine),
             replaced_by=self._ended.replaced_by,

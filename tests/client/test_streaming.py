@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack
 
 import pytest
 
@@ -186,6 +187,7 @@ async def test_a_refused_fragment_ends_the_turn_and_is_told(hub: MemoryHub) -> N
     assert generation.heard[-1][1].behaviors == ()
     told = summary(*outcomes)
     assert (told.status, told.said, told.problems) == ("failed", "One.", ("$: no 'cop'",))
+    assert told.cut_short
 
 
 async def test_nothing_is_ended_where_the_first_fragment_was_refused(hub: MemoryHub) -> None:
@@ -194,6 +196,43 @@ async def test_nothing_is_ended_where_the_first_fragment_was_refused(hub: Memory
 
     assert [each.status for each in outcomes] == ["refused"]
     assert generation.statuses == ["beginning"]
+
+
+@pytest.mark.parametrize("bad", ["t-1", "t-2"])
+async def test_of_sentences_that_come_at_once_none_is_sent_after_one_that_is_refused(
+    hub: MemoryHub, bad: str
+) -> None:
+    generation = Generation(
+        lambda fragment: Fault(reason="another turn is open") if fragment.id == bad else "done"
+    )  # fmt: skip
+    outcomes = await spoken(hub, generation, writing("One is said. Two is said. Three is said. Four."))
+
+    before = ["t-1"] if bad == "t-2" else []
+    assert [each.id for _, each in generation.heard if each.behaviors] == [*before, bad]
+    assert [each.status for each in outcomes] == [*["done"] * len(before), *["refused"] * (4 - len(before))]
+    assert summary(*outcomes).cut_short == bool(before)  # else nothing was begun
+
+
+@pytest.mark.parametrize("dies", [0.5, 3.0])
+@pytest.mark.parametrize("wait", [0.1, 2.0, 10.0])
+async def test_a_stream_ends_unknown_if_generation_dies_and_stays_away(
+    hub: MemoryHub, dies: float, wait: float
+) -> None:
+    lives = AsyncExitStack()
+    await lives.enter_async_context(running(hub, {"generation": Generation().serve}))
+
+    async def pieces() -> AsyncIterator[str]:
+        yield "One is said. "
+        await asyncio.sleep(dies)
+        await lives.aclose()
+        await asyncio.sleep(wait)
+        yield "Two is said. Three is said. "
+
+    async with connect(hub=hub) as robot, asyncio.timeout(dies + 5.0):
+        told = summary(*await stream(robot, pieces(), id="t"))
+
+    assert told.status == "unknown"
+    assert told.said == ("One is said." if dies > LASTS else "")
 
 
 async def test_cancelling_the_stream_cancels_what_is_being_said(hub: MemoryHub) -> None:

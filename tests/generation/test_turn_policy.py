@@ -97,6 +97,16 @@ def test_an_illegal_sequence_is_refused_and_changes_nothing(
     assert turns.open_turn == was_open
 
 
+@pytest.mark.parametrize("status", ["middle", "end"])
+def test_nobody_goes_on_with_a_turn_of_another_client(status: TurnStatus) -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "alice", "v")
+
+    with pytest.raises(InputRefused, match="turn a is spoken by v, not by w"):
+        turns.accept(fragment("b", status), "alice", "w")
+    assert turns.accept(fragment("c", "end"), "alice", "v").turn == "a"
+
+
 def test_a_turn_cannot_change_whom_it_speaks_to() -> None:
     turns = policy()
     turns.accept(fragment("a", "beginning"), "alice")

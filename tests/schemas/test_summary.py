@@ -167,6 +167,15 @@ def test_a_turn_is_as_its_worst_fragment_and_refused_only_if_nothing_was_done(
     assert summary(*(outcome(f"f-{n}", status) for n, status in enumerate(statuses))).status == worst
 
 
+@pytest.mark.parametrize("status", ["done", "failed", "interrupted"])
+@pytest.mark.parametrize("unsaid", [(), ("s2",)])
+def test_words_left_unsaid_cut_a_turn_short_whatever_its_status(status: str, unsaid: tuple[str, ...]) -> None:
+    told = summary(outcome(status=status, spoken=said("All of it."), unsaid=unsaid))
+
+    assert told.cut_short == bool(unsaid)
+    assert ("Only said" in told.text) == bool(unsaid)
+
+
 def test_what_nobody_knows_is_not_told_as_refused() -> None:
     told = summary(outcome(status="unknown", fault=Fault(reason="generation is gone")))
 

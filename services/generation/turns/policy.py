@@ -91,6 +91,8 @@ class TurnPolicy:
         self._config = config
         self._open: TurnPlan | None = None
         """The turn that the next fragment would continue."""
+        self._speaker = ""
+        """The client that has begun the open turn: nobody else goes on with it, or ends it."""
         self._live: dict[str, TurnPlan] = {}
         """Fragments accepted and not ended, in order."""
         self._begun: dict[str, bool] = {}
@@ -126,10 +128,10 @@ class TurnPolicy:
         plans = self._turns_under_way
         return next((plan for plan in plans if not plan.backchannel and not self._begun.get(plan.turn)), None)
 
-    def accept(self, fragment: TurnFragment, addressee: str) -> TurnPlan:
+    def accept(self, fragment: TurnFragment, addressee: str, requester: str = "") -> TurnPlan:
         """Take a fragment into the conversation. Raises InputRefused, and changes nothing, where it is illegal.
 
-        addressee: may be empty for the rest of a turn.
+        addressee: may be empty for the rest of a turn. requester: the client that sends it.
         """
         status = fragment.turn_status
         if fragment.id in {*self._live, *(plan.turn for plan in self._live.values()), self.open_turn}:
@@ -140,6 +142,9 @@ class TurnPolicy:
                 advice = "begin a turn with 'beginning' or 'full'"
                 raise _illegal(fragment, "turn_status", f"{status!r} with no turn open", advice)
             turn = self._open.turn
+            if requester != self._speaker:
+                reason = f"turn {turn} is spoken by {self._speaker}, not by {requester}"
+                raise _illegal(fragment, "turn_status", reason, "begin a turn of your own once that one is over")
             addressee = addressee or self._open.addressee
             if addressee != self._open.addressee:
                 reason = f"turn {turn} speaks to {self._open.addressee}, not to {addressee}"
@@ -156,7 +161,7 @@ class TurnPolicy:
         self._live[fragment.id] = plan
         self._delay_target = fragment.delay_target if fragment.delay else ""
         if status == "beginning":
-            self._open = plan
+            self._open, self._speaker = plan, requester
         elif status == "end":
             self._open = None
         self._silent_since = None

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.body import BehaviorOutcome
+from engage_hri.schemas.speakable import has_words
 from engage_hri.services.realizer.points import Point
 
 
@@ -32,15 +33,19 @@ class Spoken:
         if (speech := self._speeches.get(outcome.behavior)) is not None:
             is_done = outcome.status == "done"
             text = speech.text if is_done else outcome.spoken or speech.text[: self._position.get(speech.id, 0)]
-            self._texts[speech.id] = SpokenText(behavior=speech.id, text=text, complete=is_done)
+            self._texts[speech.id] = _told(speech, text)
 
     def of(self, id: str) -> SpokenText | None:
         """Words of a speech that have been said; None if it has not begun."""
         if id in self._texts or id not in self._position:
             return self._texts.get(id)
-        return SpokenText(behavior=id, text=self._speeches[id].text[: self._position[id]], complete=False)
+        return _told(self._speeches[id], self._speeches[id].text[: self._position[id]])
 
     @property
     def texts(self) -> tuple[SpokenText, ...]:
         """Words that have been said of each speech that has begun, in document order."""
         return tuple(text for id in self._speeches if (text := self.of(id)) is not None)
+
+
+def _told(speech: Speech, text: str) -> SpokenText:
+    return SpokenText(behavior=speech.id, text=text, complete=not has_words(speech.text.removeprefix(text)))
