@@ -16,10 +16,21 @@ from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.tool_call import in_call
 from engage_hri.schemas.world import World
+from engage_hri.services.generation.lost import bearable, left_unsaid
 from engage_hri.services.generation.names import known, names, spelled
 
 EMPTY = "the world is empty"
 """Advice where there is nothing that could be named."""
+
+
+def performable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFragment, tuple[str, ...]]:
+    """The checked fragment, as it will be performed, and warnings of what of it will not.
+
+    Raises InputRefused, as `checked`.
+    """
+    fragment, lost = bearable(fragment, world, robot)
+    fragment = checked(fragment, world, robot)
+    return fragment, (*lost, *left_unsaid(fragment))
 
 
 def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:

@@ -368,7 +368,7 @@ class Emission:
             if len(ends) > 1 or (ends and looks):
                 operators += [after(end, f"{gaze}:start") for end in ends]
             elif ends:
-                operators.append(same(*ends, f"{gaze}:start"))
+                operators.append(same(ends[0], f"{gaze}:start"))
             else:
                 operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
