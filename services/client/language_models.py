@@ -203,11 +203,11 @@ class _Speaking:
         outcomes = [task.result() for task in self._performing]
         if (closed := self._closed) is not None and {each.status for each in outcomes} == {"done"}:
             id, fault = self._fragment((), "end").id, Fault(reason=closed.reason, where=self.id)
-            outcomes.append(
-                FragmentOutcome(
-                    id=id, fragment=id, status="interrupted", events=closed.events, heard=closed.heard, fault=fault
-                )
+            heard = closed.heard
+            cut = FragmentOutcome(
+                id=id, fragment=id, status="interrupted", events=closed.events, heard=heard, fault=fault
             )
+            outcomes.append(self._robot._with_new_words(cut))
         if outcomes and self.left_out:
             told = tuple(dict.fromkeys((*outcomes[-1].warnings, *self.left_out)))
             outcomes[-1] = replace(outcomes[-1], warnings=told)

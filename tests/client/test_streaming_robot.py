@@ -9,6 +9,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import Say, ToolInput
 from engage_hri.schemas.units import Seconds
@@ -99,6 +100,22 @@ async def test_a_writer_who_is_silent_for_too_long_has_lost_the_turn() -> None:
     assert result.problems == ("t: silence for 10 s",)
 
 
+async def test_words_that_ended_a_turn_while_no_text_came_are_told_once() -> None:
+    async def think() -> AsyncIterator[str]:
+        yield "Let me think. "
+        await asyncio.sleep(3.0)
+        at = here.person.stamp()
+        here.person.publish(keys.UTTERANCE, Utterance(actor="human", id="1", text="Wait", began=at, at=at))
+        await asyncio.sleep(3.0)
+
+    async with stage() as here:
+        streams = {"a": think(), "b": writing("Yes. "), "c": writing("And now. ")}
+        results = [summary(*await stream(here.robot, each, id=id)) for id, each in streams.items()]
+
+    assert [result.said for result in results] == ["Let me think.", "Yes.", "And now."]
+    assert [[each.text for each in result.heard] for result in results] == [["Wait"], [], []]
+
+
 async def test_the_robot_looks_away_while_the_writer_thinks() -> None:
     thinking = ToolInput(turn_status="full", parts=(), thinking=True)
     owners = []
@@ -123,7 +140,7 @@ async def test_a_call_that_the_world_does_not_bear_out_is_a_result() -> None:
     assert [each.status for each in (nobody, at_once, person)] == ["refused"] * 3
     assert "does not know the person 'ann' (people: human)" in nobody.problems[0]
     assert "begin a turn with 'beginning' or 'full'" in at_once.problems[0]
-    assert "does not know the object 'human'" in person.problems[0]
+    assert "'human' is a person, and no object (`refer` takes objects)" in person.problems[0]
 
 
 SENTENCES = (
