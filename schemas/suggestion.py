@@ -10,7 +10,7 @@ MOST = 12
 def meant(name: str, known: Iterable[str]) -> str:
     """Write ` (did you mean 'start'?)`; empty if no name is like this one."""
     near = _nearest(name, sorted(known), 0.75)
-    return f" (did you mean {near!r}?)" if near else ""
+    return f" (did you mean {near}?)" if near else ""
 
 
 def suggestion(name: str, known: Iterable[str], none: str = "known: none") -> str:
@@ -22,7 +22,7 @@ def suggestion(name: str, known: Iterable[str], none: str = "known: none") -> st
     if not names:
         return none
     if near := _nearest(name, names, 0.6):
-        return f"did you mean {near!r}?"
+        return f"did you mean {near}?"
     return f"known: {', '.join(names[:MOST])}{', ...' if len(names) > MOST else ''}"
 
 
@@ -33,7 +33,6 @@ def in_other_letters(name: str, known: Iterable[str]) -> str:
 
 
 def _nearest(name: str, names: list[str], cutoff: float) -> str:
-    """The name that is most like this one, whatever its case; empty if none is."""
-    folded = {each.casefold(): each for each in reversed(names)}
-    near = get_close_matches(name.casefold(), folded, n=1, cutoff=cutoff)
-    return folded[near[0]] if near else ""
+    """The name that is most like this one, or all that differ from it only in case, in quotes; empty if none is."""
+    near = get_close_matches(name.casefold(), [each.casefold() for each in names], n=1, cutoff=cutoff)
+    return " or ".join(repr(each) for each in names if each.casefold() in near)

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.speakable import joined
@@ -62,7 +63,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     eye_contact: the person returned the look at the end of the turn; absent: the turn goes on, or the robot
     did not look.
     answer: the action that answered the turn, `none` if none came in time, `pending` while there is time;
-    absent: the turn expects none, or has been broken off before its end, or recognition has gone.
+    absent: the turn expects none, or was broken off by other things than words, or recognition has gone.
     answered_by: id of the person who answered.
     heard: what people have said during and after the turn, and before it since the last, in order.
     problems: what went wrong, in words.
@@ -96,7 +97,14 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
     """Sum up one fragment, or the fragments of one turn.
 
     outcomes: in the order of the turn.
+
+    Raises:
+        InputRefused: one of them is no outcome of a fragment.
     """
+    for each in outcomes:
+        if not isinstance(each, FragmentOutcome):
+            reason, advice = f"{each!r:.60} is no outcome of a fragment", "what `perform` or `stream` returns"
+            raise InputRefused(Fault(reason=reason, where="summary", advice=advice))
     spoken = [each for outcome in outcomes for each in outcome.spoken]
     statuses = {outcome.status for outcome in outcomes}
     events = {event.id: event for outcome in outcomes for event in outcome.events}

@@ -97,12 +97,16 @@ async def stream(
     await_answer: return only when the turn has been answered, or it is too late.
 
     Raises:
-        InputRefused: `pieces` cannot be followed, and nothing was said; or one of them is neither text nor a part,
-            and the turn is broken off there.
+        InputRefused: `pieces` cannot be followed, or `turn` is no `ToolInput`, and nothing was said; or a piece is
+            neither text nor a part, and the turn is broken off there.
         Exception: what `pieces` raised.
     """
     if not isinstance(pieces, AsyncIterable):
         raise InputRefused(_unreadable(f"{type(pieces).__name__!r} is no asynchronous iterable of pieces", id))
+    if not isinstance(turn, ToolInput):
+        raise InputRefused(
+            Fault(reason=f"{turn!r:.60} is no ToolInput", where=f"{id}: turn", advice=f"for example {PLAIN_TURN!r}")
+        )
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
         async with speaking.watched(), asyncio.TaskGroup() as tasks:
@@ -257,9 +261,10 @@ class _Speaking:
                 outcomes.append(_outcome_of(lost, rest))
                 if (closed := self._closed) is not None:
                     fault = Fault(reason=closed.reason, where=self.id)
-                    outcomes[-1] = replace(
+                    cut = replace(
                         outcomes[-1], status="interrupted", events=closed.events, heard=closed.heard, fault=fault
                     )
+                    outcomes[-1] = self._robot._with_new_words(cut)
             outcomes[-1] = replace(outcomes[-1], unsaid=(*outcomes[-1].unsaid, rest))
         if outcomes and self.left_out:
             told = tuple(dict.fromkeys((*outcomes[-1].warnings, *self.left_out)))

@@ -225,6 +225,7 @@ class Robot(Hearing):
         await asyncio.wait([pending.outcome], timeout=ttl)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
+        taken(timeout, Seconds | None, "timeout")
         return await self._finished(self._requests.send(key, checked(request)), timeout)
 
     async def _finished(self, pending: Pending, timeout: Seconds | None) -> Outcome:
@@ -306,8 +307,10 @@ class Robot(Hearing):
         timeout: seconds to wait; None: for ever.
 
         Raises:
+            InputRefused: `timeout` is no number.
             NoReply: no world within `timeout`.
         """
+        taken(timeout, Seconds | None, "timeout")
         with self.worlds() as worlds:
             return in_time(await worlds.next(timeout), "world", timeout)
 
@@ -317,8 +320,10 @@ class Robot(Hearing):
         timeout: seconds to wait; None: for ever.
 
         Raises:
+            InputRefused: `timeout` is no number.
             NoReply: nobody within `timeout`.
         """
+        taken(timeout, Seconds | None, "timeout")
         deadline = None if timeout is None else self.now() + timeout
         with self.worlds() as worlds:
             while True:
@@ -345,10 +350,11 @@ class Robot(Hearing):
         timeout: seconds to wait; None: for ever.
 
         Raises:
-            InputRefused: `actor` is no text.
+            InputRefused: `actor` is no text, or `timeout` no number.
             NoReply: none within `timeout`.
             ValueError: a name that can be no person.
         """
+        taken(timeout, Seconds | None, "timeout")
         with self.statistics_updates(actor) as feed:
             return in_time(await feed.next(timeout), f"statistics of {actor}", timeout)
 

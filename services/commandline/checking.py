@@ -28,8 +28,8 @@ def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
 
 
 def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs: Outputs) -> None:
-    """Check blocks for contradictions, and fragments for unknown ids, if the world is known. Raises InputRefused."""
-    from engage_hri.services.generation.fragment_check import checked
+    """Check blocks for contradictions, and fragments against a world, if it is known. Raises InputRefused."""
+    from engage_hri.services.generation.fragment_check import performable
     from engage_hri.services.realizer.plan.known import Known
     from engage_hri.services.realizer.plan.planner import plan_block
     from engage_hri.services.realizer.plan.relations import BlockRefused
@@ -42,7 +42,7 @@ def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs
                         # The realizer will check that the other blocks are alive when this one comes.
                         plan_block(thing, known=Known(blocks=dict.fromkeys(_others(thing))))
                     elif world is not None:
-                        checked(thing, world, robot)
+                        performable(thing, world, robot)
             except InputRefused as error:
                 refusal = error.__cause__
                 kind = refusal.kind if isinstance(refusal, BlockRefused) else "PARSING_FAILURE"

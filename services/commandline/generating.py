@@ -35,7 +35,7 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
     from engage_hri.services.control.calibration import calibrated
     from engage_hri.services.control.drivers import made
-    from engage_hri.services.generation.fragment_check import checked
+    from engage_hri.services.generation.fragment_check import performable
     from engage_hri.services.generation.head.inhibitions import Leases
     from engage_hri.services.generation.pipeline import glance, planned, planning, targets
     from engage_hri.services.generation.references.discourse import NO_DISCOURSE
@@ -57,7 +57,7 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
         if isinstance(each, Block):
             plans.append(FragmentPlan(block=each))
             continue
-        fragment = checked(each, world, config.robot)
+        fragment, lost = performable(each, world, config.robot)
         turn = turns.accept(fragment, fragment.addressee)
         sequence = distinct(targets(fragment))
         glanced = glance(fragment, turn, config.generation)
@@ -80,7 +80,7 @@ async def _generated(things: Sequence[Thing], world: World, config: Config, sour
                 estimated,
             )
             discourse = discourse.naming(fragment.id, [mention.object for mention in emitted.mentions])
-            plans.append(emitted)
+            plans.append(replace(emitted, warnings=(*lost, *emitted.warnings)))
         except Unreferable as error:
             where = f"{source}: {fragment.id}: {error.fault.where}"
             fault = replace(error.fault, where=where, line=_line(fragment, error.fault.where))

@@ -51,6 +51,9 @@ def main(options: Options) -> int:
         for plan in generated(source.things, around, config, str(source.path)):
             planned = run_virtual(rehearsed(plan.block, around, config))
             texts.append(writers[options.format](planned))
+            for warning in plan.warnings:
+                warnings += 1
+                print(f"warning: {warning}", file=sys.stderr)
             for problem in planned.problems:
                 warnings += 1
                 block = plan.block.id if len(source.things) > 1 or not problem.behavior else ""

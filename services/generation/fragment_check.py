@@ -16,10 +16,21 @@ from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.tool_call import in_call
 from engage_hri.schemas.world import World
-from engage_hri.services.generation.names import known, names, spelled
+from engage_hri.services.generation.lost import bearable, left_unsaid
+from engage_hri.services.generation.names import known, names, spelled, unknown
 
 EMPTY = "the world is empty"
 """Advice where there is nothing that could be named."""
+
+
+def performable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFragment, tuple[str, ...]]:
+    """The checked fragment, as it will be performed, and warnings of what of it will not.
+
+    Raises InputRefused, as `checked`.
+    """
+    fragment, lost = bearable(fragment, world, robot)
+    fragment = checked(fragment, world, robot)
+    return fragment, (*lost, *left_unsaid(fragment))
 
 
 def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
@@ -62,8 +73,8 @@ def _check_names(fragment: TurnFragment, world: World, robot: str) -> None:
     ids = known(world, robot)
     for name in names(fragment):
         if name.kind != "person" and name.id not in ids[name.kind]:
-            reason = f"the world does not know {'the object ' if name.kind == 'object' else ''}{name.id!r}"
-            advice = suggestion(name.id, ids[name.kind] - {robot}, EMPTY)
+            reason = unknown(name.id, name.kind, ids)
+            advice = suggestion(name.id, ids[name.kind].keys() - {robot}, EMPTY)
             raise _refused(fragment, name.path, reason, name.line, advice)
 
 

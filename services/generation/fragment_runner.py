@@ -35,10 +35,10 @@ from engage_hri.services.generation.choosing_again import (
     without,
 )
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.fragment_check import check_world, checked
+from engage_hri.services.generation.fragment_check import check_world, performable
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.lost import bearable, left_unsaid
+from engage_hri.services.generation.lost import bearable
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
 from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.pipeline import glance, planning, targets
@@ -104,11 +104,10 @@ class FragmentRunner:
 
     def admit(self, request: PerformFragment, world: World) -> None:
         """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
-        fragment, lost = bearable(request.fragment, world, self._bus.robot)
-        fragment = checked(fragment, world, self._bus.robot)
+        fragment, lost = performable(request.fragment, world, self._bus.robot)
         turn = self._turns.accept(fragment, fragment.addressee, request.requester)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
-        performance.warn((*lost, *left_unsaid(fragment)))
+        performance.warn(lost)
         performance.known = named_objects(fragment, world)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
             self._bus.publish(keys.TURN_CLOSED, displaced)
@@ -342,7 +341,7 @@ class FragmentRunner:
         pending = self._requests.send(keys.BLOCK, request)
         await pending.accepted
         self._accept(performance)
-        for message in performance.plan.warnings:
+        for message in performance.new_warnings():
             warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
             self._bus.publish(keys.FRAGMENT_FEEDBACK, warning)
         return pending

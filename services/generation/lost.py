@@ -15,7 +15,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import rewritten
 from engage_hri.schemas.suggestion import meant
 from engage_hri.schemas.world import World
-from engage_hri.services.generation.names import Aimed, Ids, known, spelled
+from engage_hri.services.generation.names import Aimed, Ids, Kind, known, spelled, unknown
 from engage_hri.services.generation.references.phrases import noun_in
 from engage_hri.services.text.ear import heard, is_spoken
 
@@ -39,7 +39,7 @@ def bearable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFrag
         return fragment, told  # what it names is refused, if that is wrong
     delay = fragment.delay_target
     if delay and delay not in ids["entity"]:
-        warnings.append(f"{_unknown(delay, ids['entity'])}; the robot looks elsewhere while it is silent")
+        warnings.append(f"{_unknown(delay, 'entity', ids)}; the robot looks elsewhere while it is silent")
         delay = ""
     left_out = {each.id for each in set(behaviors) - set(fragment.behaviors) if isinstance(each, Wait)}
     changed = replace(fragment, behaviors=tuple(behaviors), delay_target=delay)
@@ -59,34 +59,34 @@ def _is_performed(behavior: FragmentBehavior) -> bool:
 def _bearable(behavior: FragmentBehavior, ids: Ids, warnings: list[str]) -> FragmentBehavior:
     """The behavior, or what is done in its place; a wait takes no time, but others may be tied to it."""
     if isinstance(behavior, Reference):
-        behavior = _with_words(behavior, ids["object"], warnings)
-        return behavior if behavior.target in ids["object"] else _as_speech(behavior, ids["object"], warnings)
+        behavior = _with_words(behavior, ids, warnings)
+        return behavior if behavior.target in ids["object"] else _as_speech(behavior, ids, warnings)
     if isinstance(behavior, Aimed) and behavior.target not in ids["entity"]:
-        warnings.append(f"{behavior.id}: {_unknown(behavior.target, ids['entity'])}; left out")
+        warnings.append(f"{behavior.id}: {_unknown(behavior.target, 'entity', ids)}; left out")
         begins = tuple(each for each in behavior.timing if each.sync == "start")
         return Wait(id=behavior.id, duration=0.0, timing=begins, line=behavior.line)
     return behavior
 
 
-def _with_words(reference: Reference, objects: Set[str], warnings: list[str]) -> Reference:
+def _with_words(reference: Reference, ids: Ids, warnings: list[str]) -> Reference:
     """The reference with phrases that have words, to be told apart from objects that there are."""
     kept = []
     for each in reference.options or ():
         if each.text.strip() and not is_spoken(each.text):
             warnings.append(f"{reference.id}: no words in {each.text!r}")
             continue
-        if unknown := [id for id in each.distractors if id not in objects]:
-            told = "; ".join(_unknown(id, objects) for id in unknown)
+        if gone := [id for id in each.distractors if id not in ids["object"]]:
+            told = "; ".join(_unknown(id, "object", ids) for id in gone)
             warnings.append(f"{reference.id}: {told}; not taken for another one")
-            each = replace(each, distractors=tuple(id for id in each.distractors if id in objects))
+            each = replace(each, distractors=tuple(id for id in each.distractors if id in ids["object"]))
         kept.append(each)
     return reference if tuple(kept) == (reference.options or ()) else replace(reference, options=tuple(kept) or None)
 
 
-def _as_speech(reference: Reference, objects: Set[str], warnings: list[str]) -> Speech:
+def _as_speech(reference: Reference, ids: Ids, warnings: list[str]) -> Speech:
     text = next((each.text for each in reference.options or () if is_spoken(each.text)), noun_in(reference.target))
     how = f"only said: {text!r}" if text else "left out"
-    warnings.append(f"{reference.id}: {_unknown(reference.target, objects, 'the object ')}; {how}")
+    warnings.append(f"{reference.id}: {_unknown(reference.target, 'object', ids)}; {how}")
     return Speech(id=reference.id, text=text, timing=reference.timing, line=reference.line)
 
 
@@ -100,5 +100,5 @@ def _retied(fragment: TurnFragment, gone: Set[str]) -> TurnFragment:
     return rewritten(fragment, to_start)
 
 
-def _unknown(id: str, known: Set[str], kind: str = "") -> str:
-    return f"the world does not know {kind}{id!r}{meant(id, known)}"
+def _unknown(id: str, kind: Kind, ids: Ids) -> str:
+    return f"{unknown(id, kind, ids)}{'' if id in ids['entity'] else meant(id, ids[kind])}"

@@ -21,7 +21,8 @@ from engage_hri.services.text.pieces import Piece, problems
 
 Kind = Literal["entity", "object", "person"]
 """What may be named somewhere: whatever there is, the robot included; an object; a person."""
-Ids = Mapping[Kind, frozenset[str]]
+Ids = Mapping[Kind, Mapping[str, str]]
+"""Ids, each with what it is, by where they may stand."""
 Aimed = Gaze | GazeShift | HeadDirectionShift | Pointing
 
 
@@ -37,10 +38,17 @@ class Name(NamedTuple):
 def known(world: World, robot: str) -> Ids:
     """The ids that there are. robot: its actor id, which may be looked at, too."""
     return {
-        "entity": frozenset((robot, *(each.id for each in world.entities))),
-        "object": frozenset(each.id for each in world.objects),
-        "person": frozenset(each.id for each in world.people),
+        "entity": {robot: "robot"} | {each.id: each.kind for each in world.entities},
+        "object": {each.id: each.kind for each in world.objects},
+        "person": {each.id: each.kind for each in world.people},
     }
+
+
+def unknown(id: str, kind: Kind, ids: Ids) -> str:
+    """Say in words that there is nothing of this id where `kind` is needed."""
+    if (found := ids["entity"].get(id)) is not None:
+        return f"{id!r} is a {found}, and no {kind} (`refer` takes objects)"
+    return f"the world does not know {'the object ' if kind == 'object' else ''}{id!r}"
 
 
 def renamed(fragment: TurnFragment, name: Callable[[Name], str]) -> TurnFragment:

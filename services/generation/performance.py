@@ -95,6 +95,7 @@ class FragmentPerformance:
         self._considered: tuple[ReferenceChoice, ...] = ()
         self._tries = 0
         self._warnings: list[str] = []
+        self._unpublished: list[str] = []
         self._behaviors: dict[str, Behavior] = {}
         self._running: dict[str, Behavior] = {}
         self._gaze = ""
@@ -124,7 +125,14 @@ class FragmentPerformance:
 
     def warn(self, warnings: Iterable[str]) -> None:
         """Take warnings for the outcome, each once."""
-        self._warnings += [each for each in dict.fromkeys(warnings) if each not in self._warnings]
+        new = [each for each in dict.fromkeys(warnings) if each not in self._warnings]
+        self._warnings += new
+        self._unpublished += new
+
+    def new_warnings(self) -> list[str]:
+        """Return what `warn` has taken since this was last called."""
+        new, self._unpublished = self._unpublished, []
+        return new
 
     def feed(self, progress: SyncPointProgress) -> None:
         """Take a sync point of this fragment's block."""

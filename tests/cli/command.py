@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import re
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable
@@ -27,6 +28,10 @@ FRAGMENT = """\
   </ebml:reference>
 </ebml:ebml>
 """
+
+
+ALONE = re.sub(r"  <speech.*", "", FRAGMENT)
+"""The fragment without words but those of its reference: nothing of it is left if the object is unknown."""
 
 
 class Result(NamedTuple):

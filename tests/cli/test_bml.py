@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import read
-from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+from tests.cli.command import ALONE, FRAGMENT, GOOD_BLOCK, Engage
 from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.grammar import violations
 
@@ -85,7 +85,7 @@ def test_what_others_may_refuse_or_nobody_reads_is_warned_of(engage: Engage, tmp
 
 
 def test_what_is_refused_when_played_is_refused_here(engage: Engage, tmp_path: Path) -> None:
-    path = written(tmp_path, FRAGMENT.replace("blue-square", "blue-circle"))
+    path = written(tmp_path, ALONE.replace("blue-square", "blue-circle"))
 
     result = engage("bml", path)
 

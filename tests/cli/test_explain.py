@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+from tests.cli.command import ALONE, GOOD_BLOCK, Engage
 
 KEYS = {
     "reference", "gesture", "phrase", "distractors", "channel", "reliability", "minimum", "cost", "feasible",
@@ -187,7 +187,7 @@ def test_what_cannot_be_explained_says_what_to_do(engage: Engage, tmp_path: Path
     orphan.write_text(json.dumps(fragment("f", "end")))
     unable.write_text(json.dumps(fragment("f", "full", option("this", deictic=True))))
     unknown = tmp_path / "unknown.xml"
-    unknown.write_text(FRAGMENT.replace("blue-square", "blue-squere"))
+    unknown.write_text(ALONE.replace("blue-square", "blue-squere"))
     zone = "control.no_point_zones=[{center=[0.5, 0.0, 0.7], radius=2.0}]"
 
     results = [engage("explain", path, "--set", zone) for path in (block, orphan, unknown, unable)]

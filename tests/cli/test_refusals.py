@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage
+from tests.cli.command import ALONE, FRAGMENT, GOOD_BLOCK, Engage
 
 BAD = {
     "cut.xml": ('<bml id="b">\n  <gaze id="g" target="rectangle"', "2", "malformed XML"),
@@ -55,7 +55,7 @@ def test_a_bad_file_is_refused_with_place_and_reason(
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        (FRAGMENT.replace("blue-square", "blue-squere"), "the world does not know the object 'blue-squere'"),
+        (ALONE.replace("blue-square", "blue-squere"), "the world does not know the object 'blue-squere'"),
         (FRAGMENT.replace('id="ask"', 'id="ask" addressee="nobody"'), "the world does not know the person 'nobody'"),
     ],
 )
@@ -68,6 +68,27 @@ def test_a_fragment_about_unknown_things_is_refused(engage: Engage, tmp_path: Pa
     assert result.code == 2
     assert result.err.startswith(f"{path}:")
     assert reason in result.err
+
+
+@pytest.mark.parametrize("command", [("plan",), ("explain",), ("bml",), ("play", "--embedded", "--virtual-time")])
+@pytest.mark.parametrize("is_call", [True, False])
+def test_an_unknown_object_costs_only_itself_in_every_command(
+    engage: Engage, tmp_path: Path, command: tuple[str, ...], is_call: bool
+) -> None:
+    call = {"turn_status": "full", "parts": [{"say": "Please move"}, {"refer": "blue-squere"}]}
+    path = tmp_path / "ask"
+    path.write_text(json.dumps(call) if is_call else FRAGMENT.replace("blue-square", "blue-squere"))
+
+    result = engage(*command, path)
+
+    told = " ".join((result.out + result.err).split())
+    assert result.code == 0
+    said = "blue squere" if is_call else "the blue piece"
+    assert (
+        f"the world does not know the object 'blue-squere' (did you mean 'blue-square'?); only said: '{said}'" in told
+    )
+    if command[0] in ("plan", "play"):
+        assert engage(*command, "--strict", path).code == 2
 
 
 def test_contradictory_constraints_are_refused_by_line(engage: Engage, tmp_path: Path) -> None:

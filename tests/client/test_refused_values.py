@@ -1,15 +1,17 @@
 """Values that are no names, times or words: the client says so, with the place, and takes none of them."""
 
 import math
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 import pytest
 
 from engage_hri import perceive
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.language_models import stream
 from engage_hri.services.client.robot import connect
 from tests.cancelling import whole_robot
 
@@ -42,3 +44,32 @@ async def test_a_robot_refuses_it(hub: MemoryHub, name: str) -> None:
     async with connect(hub=hub) as robot:
         with pytest.raises(InputRefused, match="actor"):
             getattr(robot, name)(5)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda robot: robot.person("bob"),
+        lambda robot: robot.world("bob"),
+        lambda robot: robot.statistics("all", "soon"),
+        lambda robot: robot.perform({"turn_status": "full", "parts": [{"say": "Hello"}]}, timeout="soon"),
+    ],
+)
+async def test_a_time_that_is_no_number_is_refused(hub: MemoryHub, ask: Callable[[Any], Awaitable[object]]) -> None:
+    async with connect(hub=hub) as robot:
+        with pytest.raises(InputRefused, match="timeout"):
+            await ask(robot)
+
+
+async def test_a_turn_that_is_no_tool_input_is_refused(hub: MemoryHub) -> None:
+    async def pieces() -> AsyncIterator[str]:
+        yield "Hello."
+
+    async with connect(hub=hub) as robot:
+        with pytest.raises(InputRefused, match=r"t: turn.*no ToolInput"):
+            await stream(robot, pieces(), id="t", turn={"turn_index": 2})  # type: ignore[arg-type]
+
+
+def test_what_is_no_outcome_is_not_summed_up() -> None:
+    with pytest.raises(InputRefused, match=r"summary.*None is no outcome"):
+        summary(None)  # type: ignore[arg-type]

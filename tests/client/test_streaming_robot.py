@@ -9,6 +9,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import Say, ToolInput
 from engage_hri.schemas.units import Seconds
@@ -110,8 +111,12 @@ async def test_a_finished_sentence_is_said_though_nothing_follows_and_silence_en
 
 
 async def test_a_writer_may_take_its_time_before_it_has_begun_a_sentence() -> None:
+    async def slowly() -> AsyncIterator[str]:
+        await asyncio.sleep(40.0)
+        yield "Let me think."
+
     async with stage() as here:
-        result = await told(here.robot, writing("Let me", " think.", pause=40.0))
+        result = await told(here.robot, slowly())
 
     assert (result.status, result.said) == ("done", "Let me think.")
 
@@ -121,6 +126,22 @@ async def test_what_was_said_is_joined_as_it_was_written() -> None:
         result = await told(here.robot, writing("Take ([blue-square](https://example.org)), please."))
 
     assert result.said == "Take (the blue square), please."
+
+
+async def test_words_that_ended_a_turn_while_no_text_came_are_told_once() -> None:
+    async def think() -> AsyncIterator[str]:
+        yield "Let me think. "
+        await asyncio.sleep(3.0)
+        at = here.person.stamp()
+        here.person.publish(keys.UTTERANCE, Utterance(actor="human", id="1", text="Wait", began=at, at=at))
+        await asyncio.sleep(3.0)
+
+    async with stage() as here:
+        streams = {"a": think(), "b": writing("Yes. "), "c": writing("And now. ")}
+        results = [summary(*await stream(here.robot, each, id=id)) for id, each in streams.items()]
+
+    assert [result.said for result in results] == ["Let me think.", "Yes.", "And now."]
+    assert [[each.text for each in result.heard] for result in results] == [["Wait"], [], []]
 
 
 async def test_the_robot_looks_away_while_the_writer_thinks() -> None:
@@ -147,7 +168,7 @@ async def test_a_call_that_the_world_does_not_bear_out_is_a_result() -> None:
     assert [each.status for each in (nobody, at_once, person)] == ["refused"] * 3
     assert "does not know the person 'ann' (people: human)" in nobody.problems[0]
     assert "begin a turn with 'beginning' or 'full'" in at_once.problems[0]
-    assert "does not know the object 'human'" in person.problems[0]
+    assert "'human' is a person, and no object (`refer` takes objects)" in person.problems[0]
 
 
 SENTENCES = (

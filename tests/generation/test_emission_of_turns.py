@@ -99,17 +99,31 @@ def test_a_turn_without_speech_ends_when_everything_in_it_has() -> None:
 
 
 @pytest.mark.parametrize(
-    ("made", "last"), [((LOOK, "it"), "r-gaze"), ((POINT, "it"), "r-gaze"), (("none", "it"), "own")]
+    ("made", "ends", "last"),
+    [((LOOK, "it"), "=", "r-gaze"), ((POINT, "it"), "=", "r-gaze"), (("none", "it"), "after", "own")],
 )
-def test_the_last_gaze_gives_way_to_the_end_of_turn_gaze(made: Made, last: str) -> None:
+def test_the_last_gaze_gives_way_to_the_end_of_turn_gaze(made: Made, ends: str, last: str) -> None:
+    """A reference's gaze with the last words; a look of the author, which may begin late, once it is made, too."""
     fragment = TurnFragment(
         id="f", behaviors=(Gaze(id="own", target="human"), speech("s"), reference("r"), speech("t"))
     )
 
     assert lines(block(fragment, [made]), "turn-timing") == [
-        "turn-gaze:start = t:end",
+        f"turn-gaze:start {ends} t:end",
         f"turn-gaze:start = {last}:relax",
     ]
+
+
+@pytest.mark.parametrize("words", [(), ("r",)])
+def test_a_look_after_the_last_words_is_made_before_the_turn_ends(words: tuple[str, ...]) -> None:
+    own = Gaze(id="own", target="piece", timing=(Timing("start", "r:end" if words else "s:end"),))
+    made = block(
+        TurnFragment(id="f", behaviors=(speech("s"), *map(reference, words), own)), [(LOOK, "it")] * len(words)
+    )
+
+    assert f"turn-gaze:start after {'r-phrase' if words else 's'}:end" in lines(made, "turn-timing")
+    assert "turn-gaze:start = own:relax" in lines(made, "turn-timing")
+    assert start_of(by_id(made)["turn-ended"]) == "turn-gaze:start"
 
 
 def test_a_gaze_whose_end_the_author_has_timed_keeps_it() -> None:

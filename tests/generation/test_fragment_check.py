@@ -47,8 +47,8 @@ def test_a_sound_fragment_passes_and_knows_its_addressee() -> None:
     [
         (Gaze(id="g", target="nothing", line=3), "behaviors[0].target", "does not know 'nothing'"),
         (Pointing(id="p", target="midle"), "behaviors[0].target", "did you mean 'middle'"),
-        (reference(target="table"), "behaviors[0].target", "the object 'table'"),
-        (reference(target="human"), "behaviors[0].target", "the object 'human'"),
+        (reference(target="table"), "behaviors[0].target", "'table' is a surface, and no object"),
+        (reference(target="human"), "behaviors[0].target", "'human' is a person, and no object"),
         (
             reference(options=(SpeechOption(text="it", cost=1, distractors=("left", "ghost")),)),
             "options[0].distractors[1]",

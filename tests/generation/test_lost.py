@@ -71,7 +71,7 @@ def test_a_phrase_may_name_objects_that_have_gone_as_those_that_it_could_mean() 
     (kept,) = found.behaviors[0].options  # type: ignore[union-attr, misc]
 
     assert kept.distractors == tuple(each for each in option.distractors if each in known)
-    assert warnings[0].startswith("r: the world does not know 'gone'")
+    assert warnings[0].startswith("r: the world does not know the object 'gone'")
 
 
 def test_where_the_robot_was_to_look_while_it_thinks_is_no_reason_to_refuse() -> None:

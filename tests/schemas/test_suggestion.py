@@ -34,3 +34,8 @@ def test_a_name_in_other_letters_is_found(name: str) -> None:
 
 def test_the_name_is_told_as_it_is_spelled() -> None:
     assert meant("bluesquare", ["Blue-Square"]) == " (did you mean 'Blue-Square'?)"
+
+
+def test_names_that_differ_in_case_alone_are_all_told() -> None:
+    assert suggestion("CUP", ["cup", "Cup", "can"]) == "did you mean 'Cup' or 'cup'?"
+    assert meant("CUP", ["cup", "Cup", "can"]) == " (did you mean 'Cup' or 'cup'?)"

@@ -357,22 +357,24 @@ class Emission:
         signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee, needs=self.hinge)
         operators: list[Operator] = []
         closing: list[BlockBehavior] = []
-        wordless = self._wordless_at_the_end() if self.speeches else ()
+        # A look of the author may go on when the words are over, or begin only then: the turn ends after it.
+        looks = any(isinstance(each, Gaze) and each.id == self.last_gaze for each in self.order)
+        ends = [f"{self.speeches[-1]}:end", *self._wordless_at_the_end()] if self.speeches else []
         if self._ends_with_gaze:
             gaze = self.names.fresh("turn-gaze")
             closing.append(Gaze(id=gaze, target=turn.addressee, needs=self.hinge))
             start = f"{gaze}:start"
             closing.append(self._event("turn-gaze-event", "mutual_facial_gaze", start, optional=True, needs=(gaze,)))
-            if wordless:
-                operators += [after(end, f"{gaze}:start") for end in (f"{self.speeches[-1]}:end", *wordless)]
-            elif self.speeches:
-                operators.append(same(f"{self.speeches[-1]}:end", f"{gaze}:start"))
+            if len(ends) > 1 or (ends and looks):
+                operators += [after(end, f"{gaze}:start") for end in ends]
+            elif ends:
+                operators.append(same(ends[0], f"{gaze}:start"))
             else:
                 operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
                 operators.append(same(f"{self.last_gaze}:relax", f"{gaze}:start"))
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
-        if self.speeches and not wordless:
+        if len(ends) == 1 and not (looks and self._ends_with_gaze):
             signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
         elif not self._ends_with_gaze:
             operators += self._once_all_is_done(f"{ended}:start")
