@@ -38,7 +38,7 @@ from engage_hri.schemas.behaviors import (
     Synchronize,
 )
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
-from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, PerformBehavior, SyncPointReached
+from engage_hri.schemas.body import PerformBehavior, SyncPointReached
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
@@ -48,9 +48,8 @@ from engage_hri.services.control.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.planning import planned_alone
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.realizer.plan.poses import poses_before
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.requests.ends import Requester
@@ -168,12 +167,22 @@ async def in_closed_loop(block: Block, plan: Plan, bus: Bus, requests: Requester
 
 
 async def by_the_clock(block: Block, plan: Plan, bus: Bus, requests: Requester) -> None:
-    """Every start and every leaving of a hold point at its planned instant, whatever the body says."""
+    """Every start and every leaving of a hold point at its planned instant, whatever the body says.
+
+    Only words wait for the words before them: there is one voice.
+    """
     began = bus.now()
     commands = [member for members in plan.members for member in members if member.kind != "passive"]
     commands.sort(key=lambda member: plan.predicted(member.point))
     behaviors = {behavior.id: behavior for behavior in plan.behaviors}
-    pending = []
+    pending: list[asyncio.Task[None]] = []
+    spoken: asyncio.Task[None] | None = None
+
+    async def command(perform: PerformBehavior, before: asyncio.Task[None] | None) -> None:
+        if before is not None:
+            await before
+        await requests.send(keys.BEHAVIOR, perform).outcome
+
     for member in commands:
         await asyncio.sleep(max(0.0, began + plan.predicted(member.point) - bus.now()))
         through = _until_next_hold(plan, member.point)
@@ -181,8 +190,10 @@ async def by_the_clock(block: Block, plan: Plan, bus: Bus, requests: Requester) 
         perform = PerformBehavior(
             id=behavior.id, requester=bus.name, block=block.id, behavior=behavior, through=through
         )
-        pending.append(requests.send(keys.BEHAVIOR, perform))
-    await asyncio.gather(*(each.outcome for each in pending))
+        is_speech = isinstance(behavior, Speech)
+        pending.append(asyncio.create_task(command(perform, spoken if is_speech else None)))
+        spoken = pending[-1] if is_speech else spoken
+    await asyncio.gather(*pending)
 
 
 def _until_next_hold(plan: Plan, point: Point) -> str:
@@ -204,7 +215,7 @@ EXECUTORS = {"event-driven": in_closed_loop, "fixed schedule": by_the_clock}
 
 async def run(executor: str, block: Block, deviation: Deviation) -> Run:
     async with stage(deviation) as (bus, requests):
-        plan = await planned(block, bus)
+        plan = await planned_alone(bus, block, RealizerConfig())
         times: dict[Point, Seconds] = {}
 
         async def listen() -> None:
@@ -220,18 +231,6 @@ async def run(executor: str, block: Block, deviation: Deviation) -> Run:
         listening.cancel()
         await asyncio.gather(listening, return_exceptions=True)
     return Run(tuple(skews(plan, times)), max(times.values()) - min(times.values()))
-
-
-async def planned(block: Block, bus: Bus) -> Plan:
-    """As the realizer does it: once from where the body is, once from where each behavior will find it."""
-    plan, before = None, {}
-    while plan is None or before != poses_before(plan):
-        before = poses_before(plan) if plan else {}
-        items = tuple(EstimateItem(behavior=each, pose=before.get(each.id)) for each in block.behaviors)
-        estimates = await bus.query(keys.ESTIMATE, EstimateBehaviors(items=items), timeout=1.0)
-        assert isinstance(estimates, Estimates)
-        plan = plan_block(block, estimates.items)
-    return plan
 
 
 def skews(plan: Plan, times: Mapping[Point, Seconds]) -> list[Seconds]:

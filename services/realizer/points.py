@@ -117,7 +117,7 @@ def gate(type: str, syncs: tuple[str, ...]) -> Gate:
     here = gate_point(type, syncs)
     if here not in TYPES[type].holds:
         return "passive"
-    return "prompt" if here == "stroke" else "hold"
+    return "prompt" if here in ("stroke", "stroke_start") else "hold"
 
 
 @lru_cache(maxsize=1024)

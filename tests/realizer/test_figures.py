@@ -57,7 +57,7 @@ FIGURES: dict[str, tuple[Block, Places, dict[str, float]]] = {
         {("delay", "gaze-1:stroke = speech-1:start", "point-1:stroke_start", 2.0)},
         {
             "gaze-1:stroke = speech-1:start": 0.5,
-            "point-1:start": 0.0,
+            "point-1:start": 1.375,
             "point-1:stroke_start": 2.5,
             "point-1:stroke_end = speech-2:start": 3.25,
             "speech-2:end = speech-3:start": 4.25,

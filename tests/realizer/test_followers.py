@@ -95,17 +95,17 @@ async def test_a_body_that_breaks_off_required_words_lets_none_follow() -> None:
 
 async def test_words_that_are_cancelled_are_followed_by_none() -> None:
     async with turn(FakeBody()) as (seen, asked):
-        await asyncio.sleep(1.5)
+        await asyncio.sleep(1.25)
         seen.requests.cancel("r-one", "enough")
         made = await outcomes(asked)
 
-    assert_only_the_first_moved(seen, 1.5, "interrupted")
+    assert_only_the_first_moved(seen, 1.25, "interrupted")
     assert made[2].fault is not None
     assert made[2].fault.reason == "one, which it follows, was interrupted: enough"
 
 
 async def test_who_has_set_out_for_the_words_to_come_goes_home_without_a_word() -> None:
-    async with turn(FakeBody({"s": Script(durations=(1.0, 1.0, 0.5), fail="end")})) as (seen, asked):
+    async with turn(FakeBody({"s": Script(durations=(1.0, 1.0, 0.25), fail="end")})) as (seen, asked):
         made = await outcomes(asked)
 
     begun = {behavior for _, behavior, _ in seen.body.commands}

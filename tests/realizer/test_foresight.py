@@ -30,7 +30,12 @@ async def performed(seen: Stage, *blocks: Block) -> None:
 
 @pytest.mark.parametrize(
     ("behavior", "tie", "begins"),
-    [(BEAT, "g:stroke", 2.75), (POINT, "p:stroke_start", 3.25), (POINT, "p:stroke", 2.75), (LOOK, "z:stroke", 3.5)],
+    [
+        (BEAT, "g:stroke", 2.375),
+        (POINT, "p:stroke_start", 2.875),
+        (POINT, "p:stroke", 2.375),
+        (LOOK, "z:stroke", 3.5),
+    ],
 )
 async def test_a_stroke_meets_the_first_word_as_soon_as_the_words_before_have_ended(
     behavior: Gesture | Pointing | Gaze, tie: str, begins: float
@@ -49,7 +54,7 @@ async def test_who_speaks_slowly_is_seen_to_and_waited_for() -> None:
         await performed(seen, block((WORDS,), id="one"), follower(BEAT, tie="g:stroke"))
 
     times = seen.times("two")
-    assert (times["g:start"], times["g:stroke"], times["t:start"]) == (4.75, 6.0, 6.0)
+    assert (times["g:start"], times["g:stroke"], times["t:start"]) == (4.375, 6.0, 6.0)
 
 
 async def test_a_hold_before_the_words_delays_what_prepares_for_their_end() -> None:
@@ -57,7 +62,7 @@ async def test_a_hold_before_the_words_delays_what_prepares_for_their_end() -> N
     async with stage() as seen:
         await performed(seen, held, follower(POINT, tie="p:stroke_start"))
 
-    assert seen.times("two")["p:start"] == 6.25
+    assert seen.times("two")["p:start"] == 5.875
     assert seen.times("two")["t:start"] == seen.times("one")["s:end"] == 7.0
 
 
@@ -66,7 +71,7 @@ async def test_words_never_begin_before_those_they_follow_even_if_these_last_lon
         await performed(seen, block((WORDS,), id="one"), follower(POINT, tie="p:stroke_start"))
 
     times = seen.times("two")
-    assert (times["p:start"], times["p:stroke_start"], times["t:start"]) == (3.25, 5.0, 5.0)
+    assert (times["p:start"], times["p:stroke_start"], times["t:start"]) == (2.875, 5.0, 5.0)
     assert seen.body.stops == ["p:stroke_start"]
 
 
@@ -78,7 +83,7 @@ async def test_what_is_foreseen_is_handed_on_from_block_to_block() -> None:
         await performed(seen, block((WORDS,), id="one"), second, third)
 
     assert seen.times("two")["t:start"] == 6.0
-    assert (seen.times("three")["p:start"], seen.times("three")["t:start"]) == (6.25, 7.0)
+    assert (seen.times("three")["p:start"], seen.times("three")["t:start"]) == (5.875, 7.0)
 
 
 async def test_the_prediction_of_a_block_tells_what_others_foresee() -> None:
@@ -89,7 +94,7 @@ async def test_the_prediction_of_a_block_tells_what_others_foresee() -> None:
         await asyncio.gather(*[each.outcome for each in asked])
 
     points = {f"{each.behavior}:{each.sync}": each.time for each in told[-1].points}  # type: ignore[attr-defined]
-    assert (points["g:start"], points["t:start"]) == (2.75, 4.0)
+    assert (points["g:start"], points["t:start"]) == (2.375, 4.0)
 
 
 async def test_words_that_are_dropped_are_waited_for_no_longer() -> None:
@@ -108,7 +113,7 @@ async def test_nobody_sets_out_for_words_after_those_that_are_overdue_nor_for_wh
 
     times = seen.times("two")
     assert (times["g:start"], times["g:stroke"], times["t:start"]) == (10.0, 11.25, 11.25)
-    assert (seen.times("three")["p:start"], seen.times("three")["t:start"]) == (11.5, 12.25)
+    assert (seen.times("three")["p:start"], seen.times("three")["t:start"]) == (11.125, 12.25)
 
 
 async def test_a_gesture_in_words_to_come_is_not_held_up_during_those_before() -> None:
@@ -118,8 +123,8 @@ async def test_a_gesture_in_words_to_come_is_not_held_up_during_those_before() -
         await performed(seen, block((WORDS,), id="one"), tied)
 
     times = seen.times("two")
-    assert (times["g:start"], times["g:stroke"], times["t:m"]) == (3.75, 5.0, 5.0)
-    assert seen.body.stops == []
+    assert (times["g:start"], times["g:stroke"], times["t:m"]) == (3.375, 5.0, 5.0)
+    assert seen.body.stops == ["g:stroke_start"]
 
 
 async def test_nobody_is_late_for_a_look_that_another_block_has_ended() -> None:

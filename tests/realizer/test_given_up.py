@@ -5,9 +5,12 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gesture, Speech
 from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.steps import finished
+from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.stage import block
 
@@ -104,3 +107,16 @@ def test_of_a_required_movement_it_is_said_that_without_that_it_is_dropped() -> 
         "give it more time, or leave out one of its times; it is required: without `required` it would be dropped"
     )
     assert plan(replace(example, behaviors=(replace(example.behaviors[0], required=False),))).dropped == ("g",)
+
+
+def test_a_speech_that_has_begun_late_takes_its_time_though_one_of_its_times_is_given_up() -> None:
+    """When it began is doubted at first, as its end would be too late for that; not once the end is given up."""
+    words = timed(Speech(id="s", text="one two three four"), end="0.5")
+    written = block((words, Speech(id="t", text="one")))
+    estimates = [FakeBody().estimate(each) for each in written.behaviors]
+    known = Known(points={Point("s", "start"): 0.75}, begun=frozenset({"s"}))
+    made = plan_block(written, estimates, known=known)
+
+    assert made.given_up["s"]
+    assert at(made, "s:start") == 0.75
+    assert at(made, "t:start") == at(made, "s:end") == 0.75 + estimates[0].phases[0].natural

@@ -70,11 +70,11 @@ async def test_the_arm_holds_before_its_stroke_for_a_speech_that_is_late() -> No
         await seen.perform(late)
 
     times = seen.times()
-    assert times["point-1:start"] == 0.0
+    assert times["point-1:start"] == 1.375
     assert times["point-1:stroke_start"] == times["speech-1:start"] == 2.5
     assert seen.body.stops == ["gaze-1:relax", "point-1:stroke_start"]
     held = next(each for each in seen.progress() if each.sync == "stroke_start" and each.behavior == "point-1")
-    assert (held.arrived, held.predicted) == (0.75, 2.5)
+    assert (held.arrived, held.predicted) == (2.125, 2.5)
 
 
 async def test_figure_4_9_speech_comes_after_the_stroke_begins_however_late() -> None:

@@ -270,7 +270,7 @@ async def test_nobody_sets_out_for_what_is_held_to_wait_with_a_raised_arm(held: 
     times = instants(seen)
     assert times["s:start"] == pytest.approx(12.0)
     assert times["h:stroke"] == pytest.approx(12.0)
-    assert times["h:start"] == pytest.approx(12.0 - 1.25)
+    assert times["h:start"] == pytest.approx(12.0 - 1.25 - 0.375)
     assert seen.warnings() == []
 
 
@@ -289,5 +289,5 @@ async def test_who_sets_out_for_a_word_before_the_voice_stands_is_in_time_for_it
         await asyncio.gather(*(each.outcome for each in asked))
 
     times = instants(seen)
-    assert times["h:start"] == pytest.approx(2.6 - 1.25)
+    assert times["h:start"] == pytest.approx(2.6 - 1.25 - 0.375)
     assert times["h:stroke"] == pytest.approx(times["s:l"] + 0.6, abs=0.02)

@@ -61,7 +61,7 @@ async def test_words_go_on_past_a_gap_while_what_is_held_need_not_set_out_yet() 
         id="s", text="Good morning to all of you here and then to more.", marks=(Mark("m", 27), Mark("k", 36))
     )
     first = timed(Pointing(id="p", target="a", mode="LEFT_HAND"), stroke="s:m")
-    held = timed(Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND"), stroke="s:k+1")
+    held = timed(Gesture(id="g", lexeme="BEAT", mode="RIGHT_HAND"), stroke="s:k+2")
     async with robot(Variability()) as seen:
         asked = seen.ask(block((words, first, held)))
         await asyncio.sleep(1.0)

@@ -90,3 +90,17 @@ def test_pairs_of_one_type_are_on_time_or_told_not_to_be() -> None:
     some = Random(0).sample(cases, share_of(len(cases), one_of=65))
 
     assert [xml for xml in some if any(each.is_silent for each in missed(perform(xml)))] == []
+
+
+def test_no_arm_stands_in_the_air_long_before_its_word_and_no_words_wait_for_arms() -> None:
+    """25 sentences with a beat on a word each, by what the body reports."""
+    said = "".join(
+        f'<speech id="s{n}"><text>This is the <sync id="m"/>one.</text></speech>'
+        f'<gesture id="g{n}" lexeme="BEAT" stroke="s{n}:m"/>'
+        for n in range(25)
+    )
+    at = perform(f'<bml xmlns="{BML}" id="k">{said}</bml>').times
+
+    assert max(at[f"g{n}:strokeStart"] - at[f"g{n}:ready"] for n in range(25)) < 0.3
+    assert max(abs(at[f"g{n}:stroke"] - at[f"s{n}:m"]) for n in range(25)) < 0.012
+    assert max(at[f"s{n + 1}:start"] - at[f"s{n}:end"] for n in range(24)) < 0.001

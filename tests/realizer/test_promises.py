@@ -207,8 +207,20 @@ async def test_who_waited_longer_than_planned_is_told_with_who_had_the_part_as_t
     )
 
 
-async def test_what_was_past_by_less_than_people_notice_is_not_told() -> None:
+@pytest.mark.parametrize(("sent", "lateness"), [(0.05, ["0.05"]), (0.009, ["0.01"]), (0.007, [])])
+async def test_what_is_past_is_told_at_planning_from_eight_milliseconds_on(sent: float, lateness: list[str]) -> None:
     tied = block((timed(FaceLexeme(id="f", lexeme="SMILE"), start="one:bml:start"),), id="two")
-    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.05, tied))
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (sent, tied))
 
-    assert seen.warnings() == []
+    assert [re.search("planned (.*) s later", each.message)[1] for each in seen.warnings()] == lateness  # type: ignore[index]
+
+
+async def test_of_all_that_is_said_of_one_point_the_lateness_is_told_at_planning() -> None:
+    smile = timed(FaceLexeme(id="f", lexeme="SMILE"), start="one:bml:start")
+    tied = block((smile,), before("one:bml:start+0.2", "f:start"), id="two")
+    seen, _ = await told((0.0, block((WORDS,), id="one")), (0.5, tied))
+
+    found = [re.search("planned (.*) s later than it should be: (.*)", each.message) for each in seen.warnings()]
+    assert [each and each.groups() for each in found] == [
+        ("0.50", "f:start = one:bml:start"), ("0.30", "f:start <= one:bml:start+0.2"),
+    ]  # fmt: skip

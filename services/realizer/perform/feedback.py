@@ -66,8 +66,8 @@ class Reporter:
         self._block = block
         self._tolerance = tolerance
         self.spelling = spelling
-        self._late: dict[Point, Seconds] = {}
-        """Instants of behaviors that were reported as late, and the seconds planned; inf: none were."""
+        self._late: dict[tuple[Point, str], Seconds] = {}
+        """Instants that were reported as late, and what the block says of them: seconds planned; inf: it came."""
         self._character = ""
         self._latest: Seconds = -inf
         """Time of the latest message; none after it has an earlier one."""
@@ -162,31 +162,30 @@ class Reporter:
             self._broken(broken, "is planned", plan, plan.times)
 
     def _broken(self, broken: Broken, verb: str, plan: Plan, times: Mapping[Point, Seconds]) -> None:
-        """Warn of what is broken by more than is tolerated. times: of points that have come, or are planned."""
+        """Warn of what is broken by more than is tolerated.
+
+        At planning of each thing that is said of an instant; as it comes once, if that is later than was planned.
+        times: of points that have come, or are planned.
+        """
         is_past = verb == "came"
-        is_of_plan = not is_past and not is_foreign(broken.early.behavior + broken.late.behavior)
-        if broken.seconds > (UNNOTICED if is_of_plan else self._tolerance):
+        if broken.seconds > (self._tolerance if is_past else UNNOTICED):
             point = broken.point
             late = point.behavior if broken.direction == "later" else ""
             why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""
             sync = self.spelling(point) if is_foreign(point.behavior) else self.spelling.sync(point)
             members = plan.members[plan.at[point]] if point in plan.at else ()
             instant = next((each.point for each in members if each.behavior == point.behavior), point)
-            if broken.seconds > self._late.get(instant, inf) + self._tolerance:
-                del self._late[instant]  # It comes later than it was planned to be late.
-            self.late(instant, broken.told(sync, verb, why), planned=inf if is_past else broken.seconds)
+            planned = max([seconds for (at, _), seconds in self._late.items() if at == instant], default=-inf)
+            if broken.seconds > planned + self._tolerance if is_past else (instant, broken.said) not in self._late:
+                self._late[instant, broken.said] = inf if is_past else broken.seconds
+                # What is said only of other blocks is no behavior of this one.
+                late = "" if is_foreign(instant.behavior) else instant.behavior
+                self.warn("LATE", broken.told(sync, verb, why), late)
 
     def overdue(self, decisions: Decisions, late: Late) -> None:
         """Warn that a behavior takes too long. How much too late it comes in the end is told when it comes."""
         line, sync = decisions.plan.chains[late.behavior].behavior.line, self.spelling.sync(late.point)
         self.warn("LATE", at_line(line, f"{sync} is {late.overdue:.1f} s overdue"), late.behavior)
-
-    def late(self, instant: Point, message: str, *, planned: Seconds = inf) -> None:
-        """Warn that a behavior is late for an instant: once for each."""
-        if instant not in self._late:
-            self._late[instant] = planned
-            # What is said only of other blocks is no behavior of this one.
-            self.warn("LATE", message, "" if is_foreign(instant.behavior) else instant.behavior)
 
     def warn(self, kind: WarningKind, message: str, behavior: str = "") -> None:
         warning = WarningFeedback(

@@ -1,12 +1,9 @@
 """Relations between points, assembled into a Petri net: the middle part of planning."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import reduce
 from itertools import pairwise
-from operator import or_
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import SERIES, TYPES
 from engage_hri.schemas.units import Seconds
@@ -15,13 +12,14 @@ from engage_hri.services.realizer.plan.cycles import components
 from engage_hri.services.realizer.plan.handover import Arrangement, is_tied
 from engage_hri.services.realizer.plan.instants import Classes, Instant, instants
 from engage_hri.services.realizer.plan.numbering import numbered
-from engage_hri.services.realizer.plan.phases import Chain
+from engage_hri.services.realizer.plan.phases import RESERVE, Chain
 from engage_hri.services.realizer.plan.relations import Order, Relations
 from engage_hri.services.realizer.plan.stops import prolonged
 from engage_hri.services.realizer.points import (
     EPSILON,
     ORIGIN,
     WITH_STROKE,
+    Gate,
     Member,
     Point,
     gate,
@@ -80,6 +78,7 @@ class Assembler:
         chains, relations = self.chains, self.relations
         foreign = sorted(point for point in relations.named if ":" in point.behavior)
         own = [point for id in sorted(chains) for point in chains[id].points]
+        self.placed = relations.placed
         found = yield from instants(self.classes, [ORIGIN, *foreign, *own])
         # The start of the block first; the others keep their canonical order.
         found.sort(key=lambda instant: ORIGIN not in instant.points)
@@ -106,8 +105,6 @@ class Assembler:
                 self._order(relation)
             yield len(orders)
         self._foreign = frozenset(self.at[point] for point in foreign)
-        if foreign:
-            yield from self._set_out_late([instant.class_id for instant in found])
         self._fixed = (self.places, self.bounds)
 
     def assemble(self, arrangement: Arrangement) -> Steps[Assembly]:
@@ -130,7 +127,7 @@ class Assembler:
 
     def _members(self, points: tuple[Point, ...]) -> tuple[Member, ...]:
         if len(points) == 1 and (alone := self.chains.get(points[0].behavior)):
-            return (Member(alone.behavior.id, gate(alone.type, (points[0].sync,)), points[0]),)
+            return (Member(alone.behavior.id, self._gate(alone, (points[0].sync,)), points[0]),)
         groups: dict[str, list[str]] = {}
         for behavior, sync in points:
             groups.setdefault(behavior, []).append(sync)
@@ -138,10 +135,17 @@ class Assembler:
         for id, syncs in groups.items():
             if chain := self.chains.get(id):
                 ordered = tuple(syncs)
-                members.append(Member(id, gate(chain.type, ordered), Point(id, gate_point(chain.type, ordered))))
+                members.append(Member(id, self._gate(chain, ordered), Point(id, gate_point(chain.type, ordered))))
             elif id:
                 members.append(Member(id, "passive", Point(id, syncs[0])))
         return tuple(members)
+
+    def _gate(self, chain: Chain, syncs: tuple[str, ...]) -> Gate:
+        """Kind of a point, by `gate`; but a movement of which nobody says when it comes begins with the block, and
+        waits."""
+        kind = gate(chain.type, syncs)
+        is_anytime = kind == "prompt" and chain.type in WITH_STROKE and chain.behavior.id not in self.placed
+        return "hold" if is_anytime else kind
 
     def _class_delays(self, found: list[Instant]) -> None:
         by_class: dict[int, list[tuple[Seconds, int]]] = {}
@@ -156,38 +160,6 @@ class Assembler:
                 self.places.append(Place("delay", source, target, seconds, seconds))
                 self.bounds.append(Bound("delay", target, source, -seconds))
 
-    def _set_out_late(self, class_ids: Sequence[int]) -> Steps[None]:
-        """Let movements set out just in time if their stroke, not their start, comes after a point of another block.
-
-        Our block begins when it is sent, which may be long before that point: no arm is to be held up all the while.
-        class_ids: of each instant.
-        """
-        bits = {class_ids[here]: 1 << number for number, here in enumerate(sorted(self._foreign))}
-        after = [bits.get(each, 0) for each in class_ids]
-        """Points of other blocks that each instant comes after, or is tied to: a bit for each."""
-        out: dict[int, list[int]] = {}
-        for place in self.places:
-            out.setdefault(place.source, []).append(place.target)
-        for chain in self.chains.values():
-            for since, to in pairwise(chain.points):
-                out.setdefault(self.at[since], []).append(self.at[to])
-        yield self.size // 8
-        for circle in (yield from components(self.size, out)):  # predecessors first
-            known = reduce(or_, (after[each] for each in circle))
-            yield len(circle)
-            for here in circle:
-                after[here] = known
-                for each in out.get(here, ()):
-                    after[each] |= known
-        for id, chain in self.chains.items():
-            if chain.type in WITH_STROKE:
-                here, stroke = (self.at[Point(id, sync)] for sync in ("stroke_start", "stroke"))
-                if after[stroke] & ~after[self.at[chain.points[0]]] and self.kinds[id, here] == "hold":
-                    self.kinds[id, here] = "prompt"
-                    self.members[here] = tuple(
-                        [replace(each, kind="prompt") if each.behavior == id else each for each in self.members[here]]
-                    )
-
     def _clock(self, number: int, at: Seconds) -> None:
         """Tie an instant to the block's start by `at` seconds, whatever else is late."""
         if at >= 0.0:
@@ -200,12 +172,13 @@ class Assembler:
         cut = self.arrangement.cuts.get(id)
         if (start := at[chain.points[0]]) != 0:
             self.places.append(Place("order", 0, start, behavior=id, lines=lines))
-        lag, shortest, longest = 0.0, 0.0, 0.0
+        way, lag, shortest, longest = 0.0, 0.0, 0.0, 0.0
         unlimited = False
         for number, segment in enumerate(chain.segments):
             source, target = at[chain.points[number]], at[chain.points[number + 1]]
             gone = cut is not None and number >= cut
             limit = chain.longest[number]
+            way += segment.natural
             if not gone:
                 lag += segment.natural
                 shortest += segment.shortest
@@ -217,7 +190,8 @@ class Assembler:
             kind = self.kinds[id, target]
             if not gone and source != target and kind != "hold":
                 stretch = None if unlimited or kind == "prompt" else max(0.0, longest - lag)
-                self.bounds.append(Bound("phase", target, source, -lag, stretch, id, lines))
+                reserve = RESERVE * way if kind == "prompt" and chain.type in WITH_STROKE else 0.0
+                self.bounds.append(Bound("phase", target, source, -lag - reserve, stretch, id, lines))
             lag, shortest, longest, unlimited = 0.0, 0.0, 0.0, False
 
     def _order(self, relation: Order) -> None:

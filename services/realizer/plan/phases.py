@@ -33,6 +33,10 @@ class Chain(Struct, frozen=True):
     parts: tuple[str, ...] = ()
 
 
+RESERVE = 0.5
+"""Share of its way to the stroke by which a movement sets out before it must: it may be slow, and words fast."""
+
+
 def with_planned_hand(chain: Chain) -> BlockBehavior:
     """The behavior of a chain, with the hand that it is planned for: the body would choose anew as it begins."""
     behavior = chain.behavior

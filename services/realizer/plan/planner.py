@@ -217,6 +217,7 @@ class _Planner:
                 self._let_fall()
                 self.order.begin_anew(self.chains)
                 self.parts.begin_anew()
+                self.doubted.clear()  # What they were too late for may be gone.
 
     def _lose(self, loss: Loss) -> None:
         id = loss.behavior
@@ -389,6 +390,7 @@ class _Planner:
             elif idle := foresight.idle(impossible, assembly, self.places):
                 assembler.waive(idle)
             else:
+                yield 2 * len(self.chains)  # All that was asked of these circles.
                 present, turns = assembler.relations, turns | self.order.turns
                 raise (
                     yield from judge(

@@ -10,7 +10,7 @@ from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import UNNOTICED, slack
-from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, family
+from engage_hri.services.realizer.points import EPSILON, SHIFTS, WITH_STROKE, Point, family
 
 NOTICEABLE: Seconds = 0.0005
 """Seconds by which a phase may differ before it makes another plan."""
@@ -115,7 +115,10 @@ def _is_met_there(plan: Plan, hold: Point, known: Known, before: Seconds, at: Ca
     """
     here, net = plan.at[hold], plan.net
     others = (
-        each for each in plan.members[here] if each.behavior != hold.behavior and each.kind in ("passive", "prompt")
+        each
+        for each in plan.members[here]
+        if each.behavior != hold.behavior
+        and (each.kind == "passive" or (each.kind == "prompt" and plan.chains[each.behavior].type not in WITH_STROKE))
     )
     if any(known.points.get(each.point, inf) > before for each in others):
         return True
