@@ -249,8 +249,9 @@ class _Speaking:
         self._tasks = tasks
         self._reading = reading
 
-    @property
+    @cached_property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
+        """Of all that was sent, and of what was never: asked for once all tasks are done. New words are told once."""
         lost = OutcomeUnknown(Fault(reason="generation is gone", where=self.id))
         outcomes = [
             _outcome_of(lost, task.get_name()) if task.cancelled() else task.result() for task in self._performing

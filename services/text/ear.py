@@ -49,7 +49,7 @@ def heard(text: str) -> Heard:
         elif each.kind == "say":
             said += each.text
             places += range(each.place, each.end)
-        elif each.kind in ("symbol", "silent"):
+        elif each.kind in ("symbol", "silent") and each.text:
             said.append(each.text if each.kind == "symbol" else " ")
             places.append(each.place)
         if each.kind in ("say", "symbol") and (text_of := each.text.rstrip()):

@@ -16,6 +16,7 @@ No mark is longer than `LOOK`, so that reading takes time in proportion to the t
 from collections.abc import Callable, Iterator
 from html import unescape
 from string import digits
+from unicodedata import category
 
 import regex
 from msgspec import Struct
@@ -25,7 +26,7 @@ from engage_hri.services.text import patterns as mark
 from engage_hri.services.text.acts import LISTS
 from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason
 
-LOOK = 1000
+LOOK = 4000
 """Characters that a mark may have from its start to its end."""
 _WORDS = 80
 """Characters of the words in a bracket that are told."""
@@ -64,7 +65,7 @@ class Reader:
         )
         """What the line is. has_stars: within a list with the bullet `*`. is_item: right behind a bullet."""
         self._element = ""
-        """The element of which the content is not said, and that has not been closed."""
+        """The element with thoughts that has not been closed."""
         self._fence = ""
         """The fence that began a block of code."""
         self._open: list[_Bracket] = []
@@ -84,11 +85,7 @@ class Reader:
         """Take the end of the text; returns all that is left of it."""
         end = self._offset + len(self._text)
         self._text += _END
-        found = [each for each in self._read(ids, is_over=True) if each.kind == "left" or each.place < end]
-        if self._element in mark.THOUGHTS:
-            self._leave("thought", f"<{self._element}>")
-            found.append(self._found.pop())
-        return found
+        return [each for each in self._read(ids, is_over=True) if each.kind == "left" or each.place < end]
 
     @property
     def undecided(self) -> str:
@@ -107,14 +104,20 @@ class Reader:
         return self._found
 
     def _step(self, *, is_over: bool) -> int | None:
-        """Take the next mark or word; returns its length, or None if more text must tell."""
+        """Take the next mark or word; returns its length, or None if more text must tell.
+
+        A mark that has letters is told if nothing comes of it.
+        """
         until = min(len(self._text), self._at + LOOK)
         for pattern, take in self._rules():
             found = pattern.match(self._text, self._at, until, partial=not is_over)
             if found is None:
                 continue
             if not found.partial:
+                before, has_letters = len(self._found), not self._element and any(map(str.isalnum, found[0]))
                 if take(self, found) is not False:
+                    if has_letters and all(each.kind == "break" for each in self._found[before:]):
+                        self._leave("address" if take is Reader._link else "tag", found[0].lstrip("]"))
                     return found.end() - self._at
             elif until - self._at < LOOK:
                 return None
@@ -155,7 +158,7 @@ class Reader:
     def _character(self, character: str, at: int, size: int = 1, *, is_literal: bool = False) -> None:
         """Say one character, or a space in place of an emoji. is_literal: it is no mark, whatever it looks like."""
         if mark.is_silent(character) and not character.isspace():
-            self._piece("silent", character, at, size)
+            self._piece("silent", "" if category(character) == "Cf" else character, at, size)
         elif is_literal and _PUNCTUATION.match(character):
             self._piece("symbol", character, at, size)
             self._last = character
@@ -354,14 +357,12 @@ class Reader:
 
     def _tag(self, found: Found) -> None:
         name = found["name"].rpartition(":")[2].lower()
-        opens = not found[0].startswith("</")
         if name in mark.BLOCKS:
             self._spaces(found)
             self._break(found)
-        if name in mark.THOUGHTS or (opens and name in mark.UNSAID):
-            self._element = name if opens and not found[0].endswith("/>") else ""
-        else:
-            self._leave("tag", found[0])
+        is_thought = name in mark.THOUGHTS and not found[0].startswith("</") and not found[0].endswith("/>")
+        self._element = name if is_thought else ""
+        self._leave("thought" if is_thought else "tag", f"<{name}>" if is_thought else found[0])
 
     def _of_element(self, first: str) -> "Iterator[Rule]":
         if first == "<":
@@ -369,8 +370,6 @@ class Reader:
         yield _CONTENT, Reader._skips
 
     def _ends_element(self, found: Found) -> None:
-        if self._element in mark.THOUGHTS:
-            self._leave("thought", f"<{self._element}>")
         self._element = ""
 
 
@@ -414,15 +413,16 @@ _INLINE = _table(
     ("_", "_+(?=[^_])", Reader._skips),
     ("~", "~~+(?=[^~])", Reader._skips),
     ("#", mark.HEADING_ENDS, lambda reader, found: reader._is_heading),
-    ("|", r"\|(?:[ \t]*:?-+:?[ \t]*\|)+", Reader._break),  # XML makes one line of a table
+    ("|", mark.ROWS, Reader._break),
     ("|", r"\|", Reader._bar),
     ("!", mark.IMAGE, Reader._skips),
     ("(", mark.IN_ROUND, Reader._directed),
     ("【", mark.SOURCE, Reader._cited),
     ("<", mark.COMMENT, Reader._skips),
     ("<", mark.TOKEN, Reader._skips),
-    ("<", mark.AUTOLINK, Reader._address),
+    ("<", mark.HIDDEN, Reader._skips),
     ("<", mark.TAG, Reader._tag),
+    ("<", mark.AUTOLINK, Reader._address),
     ("[", mark.TASK, lambda reader, found: reader._is_item),
     ("[", mark.DEFINITION, Reader._defined),
     ("[", mark.FOOTNOTE, Reader._cited),

@@ -10,7 +10,6 @@ from engage_hri.services.text.acts import IN_ASTERISKS, IN_BRACKETS, IN_PARENTHE
 
 THOUGHTS = frozenset({"think", "thinking", "thought", "thoughts", "reasoning", "reflection", "scratchpad"})
 """Elements in which models think, so that what is in them is not meant for the person."""
-UNSAID = THOUGHTS | {"script", "style", "template", "svg", "math", "tool_call", "function_call"}
 _BLOCKS = """
 address article aside blockquote body br dd details div dl dt figure figcaption footer form h1 h2 h3 h4 h5 h6 head
 header hr html li main nav ol p pre section summary table tbody td tfoot th thead tr ul speak break paragraph
@@ -21,7 +20,11 @@ BLOCKS = frozenset(_BLOCKS.split())
 
 _LETTER = r"[^\W_]"
 _ATTRIBUTE = r"\s+[A-Za-z_:][\w:-]*(?:\s*=\s*(?:\"[^\"]*\"|'[^']*'|[^\s\"'=<>`]+))?"
-TAG = rf"</?(?P<name>[A-Za-z][\w:-]*)(?:{_ATTRIBUTE})*\s*/?>"
+TAG = rf"</?(?P<name>[A-Za-z][\w-]*(?::[A-Za-z_][\w-]*)?)(?:{_ATTRIBUTE})*\s*/?>"
+"""With a prefix as XML has it: `<tel:112>` and `<https://x.org>` are addresses."""
+_HIDES = rf"(?i)<(?:[\w-]+:)?(?P<hidden>script|style|template|svg|math|tool_call|function_call)(?:{_ATTRIBUTE})*\s*>"
+HIDDEN = rf"{_HIDES}(?:[^<]++|<(?!/(?:[\w-]+:)?(?P=hidden)\s*>))*+</[^>]*>"
+"""An element of which the content is not said. Without its end it is a tag, and the words behind it are said."""
 TOKEN = r"<\|[\w-]{1,40}\|>"
 """Tokens that steer a model, and that it has let slip: `<|im_end|>`."""
 COMMENT = r"<(?:!--[\s\S]*?--|!\[CDATA\[[\s\S]*?\]\]|\?[\s\S]*?\?|![A-Za-z][^>]*)>"
@@ -72,6 +75,8 @@ SIGN = (
 )
 """Asterisks and underscores that are signs: between operands, and within names."""
 CODE = r"(?P<run>`+)(?!`)(?P<code>(?:[^`\n]+|\n(?![ \t]*\n)|(?!(?P=run)(?!`))`+)*+)(?P=run)(?=[^`])"
+ROWS = r"\|(?:[ \t]*+:?-++:?[ \t]*+\|)++(?=[ \t]*+:?+(?:[^-]|-++:?+[ \t]*+[^|]))"
+"""A line between rows within a line, for XML makes one line of a table. No cell follows."""
 FENCE = r"(?P<fence>`{3,}(?=[^`\n]*\n)|~{3,})[^\n]*\n"
 RULE = r"[-_*=:|][-_*=:| \t]*(?=\n)"
 """A line without words: under a heading, between paragraphs, or between rows of a table."""
@@ -85,8 +90,8 @@ PUNCTUATION = r"[!-/:-@\[-`{-~【]"
 
 _SILENT = frozenset(("So", "Sk", "Cf", "Cs", "Co", "Cn", "Cc"))
 """Categories of characters that are not given to an engine: emoji, which it would read out by name, and controls."""
-_SAID = frozenset("°℃℉\u200c\u200d№℠™®©")
-"""Of these categories, and said: units, and joiners that belong to the spelling of Persian and of Indian scripts."""
+_SAID = frozenset("♭♮°℃℉\u200c\u200d№℠™®©")
+"""Of these, and said: flats, units, and joiners that belong to the spelling of Persian and of Indian scripts."""
 _SILENT_TOO = frozenset("ℹ\ufe0f\u20e3")
 """What makes an emoji of the character before it, and a letter that is mostly one."""
 

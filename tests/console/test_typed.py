@@ -40,6 +40,7 @@ async def typed(hub: MemoryHub, line: str) -> tuple[list[str], str]:
         (
             "See [this](https://example.org) and [sic]",
             ["See this and sic"],
+            "addresses were not said in full: (https://example.org); "
             "brackets that are no reference were said as words: [sic]",
         ),
         ("[laughs]", [], "nothing to say (stage directions were not said: [laughs])"),

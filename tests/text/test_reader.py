@@ -87,6 +87,13 @@ def test_the_words_that_a_voice_says_are_those_of_a_parser_of_commonmark(seed: i
         ("As said [1], [2, 3] and [^4] 【5†source】 show", "As said, and show"),
         ("<think>no\n\nno</think>Yes", "Yes"),
         ("Yes <thinking>never closed", "Yes"),
+        ("I like <math> class. It is fun.", "I like class. It is fun."),
+        ("A <template> of <x:Script src='a'>it</style>", "A of it"),
+        ("So <math><mi>x</mi> 1</math> it <svg/> is", "So it is"),
+        (f"<script>{'no ' * 900}</script>Yes", "Yes"),
+        ("Hi <mstts:silence/>, <ssml:break/> <bml:mark>x</bml:mark>", "Hi , x"),
+        ("<tel:112> <urn:isbn:04> <mailto:a@b.org> <made:up/>", "112 isbn a@b.org"),
+        ("B♭, Wörter\u00adbuch, so\u200blid, da&shy;bei", "B♭, Wörterbuch, solid, dabei"),
         ("Go to https://www.example.com/a?b=c. Now", "Go to example.com. Now"),
         ("Write to ann@example.org", "Write to ann@example.org"),
         ('<speed ratio="1.05"/>Hello', "Hello"),
@@ -154,6 +161,22 @@ def test_what_was_left_out_is_told_in_one_line_a_reason() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("A <!-- b --> c", "tags were not said: <!-- b -->"),
+        ("<![CDATA[a]]> <?b ?> <!X>", "tags were not said: <![CDATA[a]]>, <?b ?>, <!X>"),
+        ("A <math>b</math> c", "tags were not said: <math>b</math>"),
+        ("A <tool_call> c", "tags were not said: <tool_call>"),
+        ("A</think> <|im_end|>", "tags were not said: </think>, <|im_end|>"),
+        ("```python\nx\n```", "tags were not said: ```python"),
+        ("[a](b.html 'c') ![d](e.png)", "addresses were not said in full: (b.html 'c'), (e.png)"),
+    ],
+)
+def test_whatever_had_letters_and_was_left_out_is_told(text: str, told: str) -> None:
+    assert problems(read([text], Ids(()))) == problems(read(text, Ids(()))) == (told,)
+
+
 def test_the_world_is_asked_anew_at_each_piece() -> None:
     reader = Reader()
     first = reader.feed("Take [cup] or ", Ids(("cup",)))
@@ -180,6 +203,7 @@ ODD = [
     *"ab1A *_[]()<>`~#!&|\\\n.-+=:/^@\"'{}", "https://", "http:", "www.", "mailto:", "x.y", "@x.y", "https://x.y/z ",
     "<think>", "</think>", "<b>", "<!--", "-->", "<|x|>", "<x@y.z>", "&amp;", "😊", "é", "方", "【1†", "】",
     "(sighs)", "[laughs]", "*waves*", "[a]", "[A!]", "](", "![", "[^1]", "[1]", "[x]", "[r]: ", "```", "~~~\n",
+    "<math>", "</math>", "<a:b/>", "<!X>", "|---|", "---|", "\u00ad",
     "`(sighs)`", "`https://x.y/z`", "`www.x.y`", "\n\n", "- ", "1. ", "# ",
 ]  # fmt: skip
 """Beginnings, ends and wholes of marks."""
