@@ -12,6 +12,7 @@ the other.
 import asyncio
 from collections.abc import AsyncIterable, AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
+from functools import cached_property
 from typing import Any, Literal
 
 from msgspec.structs import replace
@@ -251,7 +252,7 @@ class _Speaking:
 
     @cached_property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
-        """Of all that was sent, and of what was never: asked for once all tasks are done. New words are told once."""
+        """Of all that was sent, and of what never was; to be asked for when all tasks are done."""
         lost = OutcomeUnknown(Fault(reason="generation is gone", where=self.id))
         outcomes = [
             _outcome_of(lost, task.get_name()) if task.cancelled() else task.result() for task in self._performing
