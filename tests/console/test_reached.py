@@ -191,7 +191,7 @@ async def test_a_turn_is_one_bubble_with_what_was_stopped_apart_and_each_word_is
         assert read == ["robot:", *shown]
         mark = shown.index("stopped,")
         assert shown[mark : mark + 3] == ["stopped,", "not", "said:"]
-        assert [*shown[:mark], *shown[mark + 3 :]] == [*words.split(), "the", "square"]
+        assert [*shown[:mark], *shown[mark + 3 :]] == [*words.split(), "the", "blue", "square"]
         assert await page.value("document.querySelectorAll('.words .left').length") == 1
 
 
