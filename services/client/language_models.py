@@ -252,7 +252,7 @@ class _Speaking:
 
     @cached_property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
-        """Of all that was sent, and of what never was; to be asked for when all tasks are done."""
+        """Outcomes of all that was sent, and of what never was; to be asked for when all tasks are done."""
         lost = OutcomeUnknown(Fault(reason="generation is gone", where=self.id))
         outcomes = [
             _outcome_of(lost, task.get_name()) if task.cancelled() else task.result() for task in self._performing

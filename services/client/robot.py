@@ -101,6 +101,7 @@ class Robot(Hearing):
             PerformFailed: it began, and failed.
             RunFailed: generation is gone, or has not come within `timeout`.
         """
+        taken(timeout, Seconds | None, "timeout")
         parsed = fragment_in(fragment, self._unnamed())
         return await self._end_of(self._send(parsed), await_answer=await_answer, timeout=timeout)
 
@@ -115,7 +116,7 @@ class Robot(Hearing):
         assert isinstance(pending.request, PerformFragment)
         fragment = pending.request.fragment
         awaits_answer = await_answer and fragment.turn_status in ("end", "full")
-        outcome = await (self._answered if awaits_answer else self._performed)(pending, timeout)
+        outcome = await (self._answered(pending, timeout) if awaits_answer else self._performed(pending, timeout))
         return successful(self._with_new_words(outcome), fragment.id)
 
     def _unnamed(self) -> str:

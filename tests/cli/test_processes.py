@@ -213,7 +213,7 @@ async def test_each_service_runs_alone_with_only_zenohs_threads_and_stops_on_a_s
 
 async def test_up_performs_what_is_played_and_ctrl_c_ends_all_of_it(endpoint: str, tmp_path: Path) -> None:
     (tmp_path / "block.xml").write_text(GOOD_BLOCK)
-    (tmp_path / "bad.xml").write_text(FRAGMENT.replace("blue-square", "moon"))
+    (tmp_path / "bad.xml").write_text(FRAGMENT.replace('turnStatus="full"', 'turnStatus="end"'))
     up = await start("up", "--robot", "upright", "--listen", endpoint)
     try:
         await line(up, "all services are up", log=False)

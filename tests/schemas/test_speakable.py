@@ -53,6 +53,6 @@ def test_two_characters_count_as_a_word() -> None:
 
 
 def test_texts_are_joined_as_their_scripts_are_written() -> None:
-    assert joined(["Take ", " that\n one", "", "."]) == "Take that one ."
+    assert joined(["Take ", " that\n one", "", "."]) == "Take that one."
     assert joined(["把", "红色的方块", "给我。", "谢谢"]) == "把红色的方块给我。谢谢"
     assert joined(["把", "the square", "给我"]) == "把 the square 给我"
