@@ -175,12 +175,15 @@ class Reporter:
             sync = self.spelling(point) if is_foreign(point.behavior) else self.spelling.sync(point)
             members = plan.members[plan.at[point]] if point in plan.at else ()
             instant = next((each.point for each in members if each.behavior == point.behavior), point)
-            planned = max([seconds for (at, _), seconds in self._late.items() if at == instant], default=-inf)
-            if broken.seconds > planned + self._tolerance if is_past else (instant, broken.said) not in self._late:
+            is_news = (instant, broken.said) not in self._late
+            if is_past:
+                planned = max([seconds for (at, _), seconds in self._late.items() if at == instant], default=-inf)
+                is_news = broken.seconds > planned + self._tolerance
+            if is_news:
                 self._late[instant, broken.said] = inf if is_past else broken.seconds
                 # What is said only of other blocks is no behavior of this one.
-                late = "" if is_foreign(instant.behavior) else instant.behavior
-                self.warn("LATE", broken.told(sync, verb, why), late)
+                behavior = "" if is_foreign(instant.behavior) else instant.behavior
+                self.warn("LATE", broken.told(sync, verb, why), behavior)
 
     def overdue(self, decisions: Decisions, late: Late) -> None:
         """Warn that a behavior takes too long. How much too late it comes in the end is told when it comes."""
