@@ -62,9 +62,8 @@ class Rounds:
     def _begin(self, question: EstimateBehaviors, first: tuple[Estimate, ...]) -> None:
         self.estimates = first
         self.turns: frozenset[Turn] = frozenset()
-        self._answers = [(question, first)]
-        self._rounds = [(first, first)]
-        """For each answer: with what the plan was made, and what the body said."""
+        self._rounds = [(question, first, first)]
+        """For each answer: the question, with what the plan was made, and what the body said."""
         self._begun = len(self._tried)
         """Number of plans that were tried in other manners."""
         self._has_jumped = False
@@ -72,7 +71,7 @@ class Rounds:
 
     def answer(self, question: EstimateBehaviors) -> tuple[Estimate, ...] | None:
         """Answer of the body to the same question before; None if it was not asked that."""
-        return next((answer for asked, answer in self._answers if asked == question), None)
+        return next((told for asked, _, told in self._rounds if asked == question), None)
 
     def let_go(self) -> None:
         """Insist on no order of behaviors any more: it leaves no time."""
@@ -95,20 +94,19 @@ class Rounds:
         is_agreed = max(off) <= NOTICEABLE
         outcome = plan if is_agreed else as_told(plan, told)
         self._tried.append((outcome.lateness + max(off), outcome))
-        if is_agreed or len(self._answers) > MOST:
+        if is_agreed or len(self._rounds) > MOST:
             best = outcome if is_agreed else min(self._tried[self._begun :], key=_badness)[1]
             return best if self._is_resigned or best.lateness <= UNNOTICED else self.give_way()
         self._refuted.update(_refuted(plan, self.estimates, told))
         # The same question again: its answer is tried once as it is.
-        is_settled = self._answers[-1][0] == question and not self._has_jumped
-        is_early = len(self._answers) < STRAIGHT + 1
+        is_settled = self._rounds[-1][0] == question and not self._has_jumped
+        is_early = len(self._rounds) < STRAIGHT + 1
         self._has_jumped = self._has_jumped or (is_settled and not is_early)
-        self._answers.append((question, told))
         if not self._is_free and not is_early:
             self.turns |= plan.turns
-        weight, earlier = 1.0 if is_settled or is_early else 0.5, self._rounds[1 - SURE :]
-        self._rounds.append((self.estimates, told))
-        self.estimates = between(self.estimates, told, weight, earlier)
+        earlier = [(made_with, said) for _, made_with, said in self._rounds[1 - SURE :]]
+        self._rounds.append((question, self.estimates, told))
+        self.estimates = between(self.estimates, told, 1.0 if is_settled or is_early else 0.5, earlier)
         return None
 
     @property

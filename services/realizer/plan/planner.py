@@ -96,7 +96,7 @@ class _Planner:
         self.manner = manner
         self.late: Late = {}
         self.known = known
-        self.doubted: set[Point] = set()  # points of others, not planned for when they are expected
+        self.doubted: set[Point] = set()  # known points, not planned for when they came or are expected
         self.untied: set[Point] = set(known.untied)  # see `Plan`
         self.early: frozenset[tuple[str, Point]] = frozenset()  # see `Arrangement`
         self.waived: set[tuple[Point, Point]] = set()  # own and other, that wait for each other whatever is planned
