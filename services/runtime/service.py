@@ -33,7 +33,7 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
         reason = f"the keys are those of {called.removesuffix(f'-{name}')!r}, not of {name!r}"
         raise InputRefused(Fault(reason=reason, where=name, advice="give it the folder of its own keys"))
     await hub.wait_until_free(name)
-    bus = hub.join(name, role=name if name in keys.ROLES else "manager")
+    bus = hub.join(name)
     joined = bus.stamp()
     since: Stamp | None = None
 
@@ -63,7 +63,7 @@ async def _while_alone(bus: Bus, work: Coroutine[Any, Any, None]) -> None:
     One that starts while another is there is refused before it begins. So two of one name have started at once, or
     without seeing one another, as behind a cut. Neither knows who was first; the one of the lesser run stays.
     """
-    with bus.subscribe(keys.ANY_ALIVE) as presence:
+    with bus.subscribe(keys.alive(bus.name, bus.part)) as presence:
         serving = asyncio.ensure_future(work)
         watching = asyncio.create_task(_rival(bus, presence), name=f"rivals of {bus.name}")
         try:

@@ -155,7 +155,7 @@ class ZenohHub(Hub):
     def called(self, name: str) -> str:
         return name if self.rights is None else self.rights.called(name)
 
-    def join(self, name: str, role: str = "manager") -> "ZenohBus":
+    def join(self, name: str, role: str = "") -> "ZenohBus":
         name, role = self.called(name), role if self.rights is None else self.rights.holder.role
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
@@ -164,9 +164,11 @@ class ZenohHub(Hub):
         return bus
 
     async def wait_until_free(self, *names: str) -> None:
+        for name in names:
+            self.peers.see(keys.alive(name, keys.part_of(access.PARTICIPANTS.get(name, ""))))
         await self.peers.wait_for_quiet(QUIET)
         deadline = self._loop.time() + VACANCY
-        while taken := sorted(set(names) & set(self.peers.names)):
+        while taken := sorted(set(names) & self.peers.names.keys()):
             if not await self.peers.change(deadline):
                 reason = f"robot {self.robot!r} has {'this' if len(taken) == 1 else 'these'} on the bus already"
                 advice = "stop what runs there, or give this one another --robot or another endpoint"
@@ -214,8 +216,7 @@ class ZenohHub(Hub):
         payload, encoding = published(message)
         stamp = self.session.new_timestamp()
         if ordered:
-            if not self._sent.number:
-                self._history.begin()
+            self._history.begin(keys.flow_of(key))
             written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now, stamp)
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
@@ -242,7 +243,9 @@ class ZenohHub(Hub):
         recent = self._sent.recent(self._loop.time())
         self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent else None
         if recent:
-            self._publishers.of(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
+            for flow, counts in recent.items():
+                pulse = self._publishers.of(keys.own(self.run, f"pulse/{flow}"), True)
+                pulse.put(pack(counts), encoding="application/msgpack")
 
 
 class ZenohBus(Bus):
@@ -252,7 +255,7 @@ class ZenohBus(Bus):
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
         self._subscriptions: list[Subscription | Tap] = []
-        self._answers = Answers(self, hub.session, hub.bridge, hub.run)
+        self._answers = Answers(self, hub.session, hub.bridge)
         self._overflowed = 0
         self._token: Any = None
 
@@ -307,16 +310,17 @@ class ZenohBus(Bus):
             self._hub.rights.check(self.name, "asks", key)
         deadline = self._loop.time() + timeout
         payload, encoding = encode(message), encoding_of(message)
-        while self._loop.time() < deadline:
-            known = self._hub.peers.changes
-            reply = await self._ask(key, payload, encoding, deadline)
-            if reply is not None and reply.ok is not None:
-                return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
-            if reply is not None and reply.err is not None:
-                raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
-            # There is no server, or it died meanwhile: wait until a process comes or goes.
-            if not await self._hub.peers.change(deadline, since=known):
-                break
+        reply = await self._ask(key, payload, encoding, deadline)
+        if reply is None:
+            # There is no server, or it died meanwhile.
+            async with self._hub.peers.served(key) as came:
+                while reply is None and self._loop.time() < deadline:
+                    await came(deadline, ASK_AGAIN)
+                    reply = await self._ask(key, payload, encoding, deadline)
+        if reply is not None and reply.ok is not None:
+            return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+        if reply is not None and reply.err is not None:
+            raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
         raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
 
     async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
@@ -354,9 +358,9 @@ class ZenohBus(Bus):
 
     def declare_alive(self) -> None:
         if self._token is None and not self._gone:
-            token = keys.own(self._hub.run, f"alive/{self.name}")
+            token = keys.own(self._hub.run, f"alive/{self.part}/{self.name}/{self.clock}")
             self._token = self._hub.session.liveliness().declare_token(token)
-            self._hub.peers.note(self.name, self._hub.run, True)
+            self._hub.peers.note(self.part, self.name, self._hub.run, True)
 
     async def leave(self) -> None:
         if self._gone:
@@ -367,7 +371,7 @@ class ZenohBus(Bus):
         self._answers.close()
         if self._token is not None:
             self._token.undeclare()
-            self._hub.peers.note(self.name, self._hub.run, False)
+            self._hub.peers.note(self.part, self.name, self._hub.run, False)
         self._hub.forget(self.name)
 
 

@@ -174,9 +174,13 @@ class SentLog:
         # Who has seen more than there was took a forged state for the last one.
         return one.envelope.nth > seen or (is_state and seen > self.counts[one.key])
 
-    def recent(self, now: Seconds) -> Counts:
-        """Counts of the keys written in the last `PULSE_FOR`."""
-        return {key: self.counts[key] for key, at in self._written_at.items() if now - at <= PULSE_FOR}
+    def recent(self, now: Seconds) -> dict[keys.Flow, Counts]:
+        """Counts of the keys written in the last `PULSE_FOR`, by flow."""
+        found: dict[keys.Flow, Counts] = {}
+        for key, at in self._written_at.items():
+            if now - at <= PULSE_FOR:
+                found.setdefault(keys.flow_of(key), {})[key] = self.counts[key]
+        return found
 
 
 class Follower:
