@@ -128,6 +128,12 @@ def settled(pids: list[int]) -> float:
     return now
 
 
+def crowded(*arguments: str) -> subprocess.Popen[str]:
+    """Start a process of clients."""
+    command = [sys.executable, __file__, *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
 async def told(children: list[subprocess.Popen[str]], order: str, answer: str) -> None:
     for child in children:
         assert child.stdin is not None
@@ -170,15 +176,7 @@ async def measure(numbers: list[int], *, plain: bool, with_keys: bool) -> list[d
             for number in numbers:
                 options = [*(["--plain"] if plain else []), "--crowd", endpoint, "".join(ring[1:])]
                 parts = [(first, min(TOGETHER, number - first)) for first in range(0, number, TOGETHER)]
-                children = [
-                    subprocess.Popen(
-                        [sys.executable, __file__, *options, str(first), str(count)],
-                        stdin=subprocess.PIPE,
-                        stdout=subprocess.PIPE,
-                        text=True,
-                    )  # fmt: skip
-                    for first, count in parts
-                ]
+                children = [crowded(*options, str(first), str(count)) for first, count in parts]
                 await asyncio.to_thread(_answers, children, "ready")
                 before = await asyncio.to_thread(settled, pids)
                 took.clear()
@@ -227,9 +225,7 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    print(
-        "clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  per doubling: coming, leaving"
-    )
+    print("clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  doubled: coming, leaving")
     for before, row in zip([None, *rows], rows, strict=False):
         growth = [f"{grown(before, row, what):.2f}" for what in ("router", "router_leaving")] if before else ["", ""]
         print(

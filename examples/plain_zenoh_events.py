@@ -124,7 +124,8 @@ def follow(session: zenoh.Session, robot: str, actor: str, kind: str) -> None:
     # Subscribe first and ask then: what happens in between comes twice, and never not at all.
     session.declare_subscriber(events, samples.put)
     session.declare_subscriber(f"{recognition.format('state')}/statistics/{actor}", samples.put)
-    session.liveliness().declare_subscriber(f"{robot}/engage/v1/@bus/*/alive/robot/recognition/*", samples.put, history=True)
+    token = f"{robot}/engage/v1/@bus/*/alive/robot/recognition/*"
+    session.liveliness().declare_subscriber(token, samples.put, history=True)
 
     changes = Changes(tell_event, kind)
     standing: dict[str, News] = {}  # the newest statistics of each person

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from secrets import token_hex
 from select import PIPE_BUF, select
 from typing import Annotated
 
@@ -54,7 +55,7 @@ class Options:
             " Whoever fills this one takes no place of theirs. May be repeated.",
         ),
     ] = None  # fmt: skip
-    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
+    attended: Annotated[str, typer.Option("--attended", hidden=True)] = ""
 
 
 def main(options: Options) -> int:
@@ -68,6 +69,8 @@ def main(options: Options) -> int:
 
 async def _watch(options: Options) -> int:
     """Watch over the router, or the robot's and that of all others. Returns the exit code of one that refuses."""
+    from engage_hri.services.bus.zenoh.denials import Denials
+
     connect = options.connect or []
     commands = {"the router": _command(options, options.listen, connect)}
     if options.robot_listen:
@@ -76,8 +79,13 @@ async def _watch(options: Options) -> int:
             "the robot's router": _command(options, options.robot_listen, connect),
             "the router of all others": _command(options, options.listen, near),
         }
-    tell = _teller()
-    watching = [asyncio.create_task(watched(each, name, tell, LOG.warning)) for name, each in commands.items()]
+    tell, mark = _teller(), token_hex()
+    watching = [
+        asyncio.create_task(
+            watched([*each, "--attended", mark], name, tell, LOG.warning, mark.encode(), Denials(tell).feed)
+        )
+        for name, each in commands.items()
+    ]
     try:
         done, _ = await asyncio.wait(watching, return_when=asyncio.FIRST_COMPLETED)
         return done.pop().result()
@@ -110,25 +118,25 @@ def _from_here(endpoint: str) -> str:
 def _command(options: Options, listen: list[str], connect: list[str]) -> list[str]:
     """Make the command line of a router's process."""
     return [
-        *(sys.executable, "-P", "-m", "engage_hri", "router", "--attended"),
+        *(sys.executable, "-P", "-m", "engage_hri", "router"),
         *(part for endpoint in listen for part in ("--listen", endpoint)),
         *(part for endpoint in connect for part in ("--connect", endpoint)),
         *(("--keys", str(options.keys)) if options.keys else ()),
     ]
 
 
-def _teller() -> Callable[[str], None]:
+def _teller(mark: str = "") -> Callable[[str], None]:
+    """mark: for whoever watches over this process. Others write to its output, too, and what they like."""
     out = Patient("standard output", _without_waiting, LOG.warning)
 
     def tell(line: str) -> None:
-        out.write(f"{line}\n")
+        out.write(f"{mark}{line}\n")
 
     return tell
 
 
 def _without_waiting(data: bytes) -> int | None:
     """Write to standard output if its reader takes it: one who stops reading must not stop the router."""
-    # That of Python at this moment: with keys Zenoh's log goes where it went at first.
     output = beneath(sys.stdout)
     return output.write(data[:PIPE_BUF]) if select([], [output.fileno()], [], 0)[1] else None
 
@@ -137,10 +145,15 @@ async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
     from engage_hri.services.bus.zenoh.session import MOST_SESSIONS
 
-    tell = _teller()
+    tell = _teller(options.attended)
+
+    def sign() -> None:
+        """Show a sign of life, in whatever thread: past what the loop has to write."""
+        _without_waiting(f"{options.attended}{SIGN}\n".encode())
+
     _let_in_many()
     async with (
-        routing(options.listen, options.connect or (), tell, keys, _sign) as router,
+        routing(options.listen, options.connect or (), tell, keys, sign) as router,
         asyncio.TaskGroup() as group,
     ):
         complain(f"router is ready at {', '.join(options.listen)} (at most {MOST_SESSIONS} links)")
@@ -156,11 +169,6 @@ def _let_in_many() -> None:
 
         soft, hard = getrlimit(RLIMIT_NOFILE)
         setrlimit(RLIMIT_NOFILE, (max(soft, min(FILES, hard) if hard >= 0 else FILES), hard))
-
-
-def _sign() -> None:
-    """Show a sign of life, in whatever thread: past what the loop has to write."""
-    _without_waiting(f"{SIGN}\n".encode())
 
 
 async def _show(works: Callable[[], Awaitable[None]], sign: Callable[[], None]) -> None:

@@ -1,18 +1,13 @@
 """Refusals of a router in plain lines: links without a good certificate, and messages that no rule allows.
 
 Zenoh tells both only in its log, which it writes to the standard output of the process, each message that is allowed
-among them. So the log goes through a pipe here, and the loop picks out what was refused.
+among them. Who watches over the router reads that, and picks out what was refused. The router itself must not: while
+its loop waits for Zenoh, Zenoh may wait for whoever reads the log.
 """
 
-import asyncio
-import os
 import re
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-
-import zenoh
+from collections.abc import Callable
 
 from engage_hri.schemas.utf8 import printable
 
@@ -25,8 +20,6 @@ MOST = 200
 WILD = 4
 """Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
 Keys of ours have one."""
-PIPE = 2**20
-"""Bytes of the log that may wait for the loop; beyond, the router waits."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
 _THREAD = re.compile(r"ThreadId\((\d+)\)")
 _CHECKED = re.compile(
@@ -60,18 +53,22 @@ class Denials:
         self._kinds: Counter[str] = Counter()
         """Number of different refusals, by what they are about."""
 
-    def feed(self, line: bytes) -> None:
-        """Take a line of the log."""
+    def feed(self, line: bytes) -> bool:
+        """Take a line of the log. Returns whether it shows that the router takes in something new.
+
+        It does not while its tables are held; what others send one another may pass all the same.
+        """
         if b"Using cached result" in line and b"unauthorized" not in line:
-            return  # by far the most
+            return False  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
         if (level := _LEVEL.match(text)) is None:
-            return  # the rest of a line: a key may have line ends
+            return False  # the rest of a line: a key may have line ends
+        caching = _CACHING.search(text)
         found = _THREAD.search(text)
         thread = found[1] if found else ""
         if (checked := _CHECKED.search(text)) is not None:
             self._check(thread, checked)
-        elif (caching := _CACHING.search(text)) is not None:
+        elif caching is not None:
             self._caching[thread] = (caching["flow"], caching["key"])
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
@@ -82,6 +79,7 @@ class Denials:
         elif level["level"] in ("WARN", "ERROR"):
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
+        return caching is not None
 
     def _check(self, thread: str, checked: re.Match[str]) -> None:
         if checked["name"]:
@@ -120,50 +118,3 @@ class Denials:
             self._tell(news)
         elif str(times).rstrip("0") == "1":
             self._tell(f"{news} ({times} times)")
-
-
-@contextmanager
-def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
-    """Tell what is refused while the body of `with` runs; Zenoh sessions are opened in it. Once in a process.
-
-    Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. tell: waits for no reader.
-    """
-    loop, rest = asyncio.get_running_loop(), b""
-    coming, going = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-    os.set_blocking(going, True)
-    with suppress(ImportError, OSError):
-        from fcntl import F_SETPIPE_SZ, fcntl
-
-        fcntl(going, F_SETPIPE_SZ, PIPE)
-
-    def read() -> None:
-        nonlocal rest
-        with suppress(BlockingIOError):
-            *lines, rest = (rest + os.read(coming, PIPE)).split(b"\n")
-            for line in lines:
-                denials.feed(line)
-
-    before, kept = sys.stdout, os.dup(1)
-    before.flush()
-    denials = Denials(tell)
-    levels = os.environ.get("RUST_LOG")
-    os.environ["RUST_LOG"] = LEVELS
-    zenoh.init_log_from_env_or(LEVELS)
-    if levels is None:
-        del os.environ["RUST_LOG"]
-    else:
-        os.environ["RUST_LOG"] = levels
-    os.dup2(going, 1)
-    sys.stdout = open(kept, "w", closefd=False)  # noqa: SIM115 - closed below
-    loop.add_reader(coming, read)
-    try:
-        yield
-    finally:
-        loop.remove_reader(coming)
-        os.dup2(kept, 1)
-        read()
-        with suppress(OSError):
-            sys.stdout.close()
-        sys.stdout = before
-        for each in (kept, coming, going):
-            os.close(each)

@@ -139,13 +139,15 @@ class Readers:
         for written in self._sent.past(subscription.wants, Missing(), oldest).written:
             self._deliver(reader, written, self._sent.run, past=True)
         for pattern in subscription.patterns:
+            if presence := keys.presence(pattern):
+                self._peers.see(presence)
+            if keys.is_presence(pattern):  # on these keys nothing is published
+                continue
             if pattern not in self._carriers:
                 handler = self._bridge.samples(partial(self._sample_came, pattern))
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-            if presence := keys.presence(pattern):
-                self._peers.see(presence)
         for run, flows in self._peers.publishers.items():
             if not flows.isdisjoint(reader.flows):
                 self._ask(reader, run, self._follower(reader, run))

@@ -18,7 +18,7 @@ from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.crowd import Crowd, Link
-from engage_hri.services.bus.zenoh.denials import telling_denials
+from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
@@ -62,7 +62,7 @@ async def routing(
     """Route while the body of `async with` runs. Gives what tells whether it does.
 
     listen: endpoints at which others connect. connect: other routers. tell: called with a line for each participant
-    that comes or goes, and for what is refused; it waits for no reader. served: called, in any thread, at most once
+    that comes or goes; it waits for no reader. served: called, in any thread, at most once
     in `SHOWN` seconds, while tokens are served: in a rush of clients the router's own question waits behind theirs,
     and yet it does not hang. keys_of_router: the router lets in only those that its keys name, and passes on only
     what the table of access allows them. Raises InputRefused when an endpoint is misspelled, RunFailed when one is
@@ -74,7 +74,8 @@ async def routing(
         if keys_of_router is not None:
             holders = keys_of_router.holders()
             more = {**encrypted(keys_of_router), "access_control": access_control(holders)}
-            stack.enter_context(telling_denials(tell))
+            os.environ["RUST_LOG"] = LEVELS
+            zenoh.init_log_from_env_or(LEVELS)
             own = keys_of_router.holder
             stack.enter_context(closing(Expiry(own.common_name, own.until, LOG.warning)))
         session = open_router(connect, listen, more)
