@@ -3,6 +3,9 @@
 from msgspec import Struct
 from msgspec.structs import force_setattr, replace
 
+LONGEST_TEXT = 2500
+"""Characters of each text in a fault. The rest is cut off: a fault has to fit into a message, in any form."""
+
 
 class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     """A refusal or failure, as it crosses the bus and as people read it.
@@ -19,13 +22,15 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     service: str = ""
 
     def __post_init__(self) -> None:
-        """Write half characters with backslashes, so that a fault can always be encoded.
+        """Make sure that a fault can always be sent: shorten texts, and write half characters with backslashes.
 
-        Python itself makes such text, for example of file names that are not UTF-8.
+        Python itself makes such text, for example of file names that are not UTF-8. What is refused may be quoted in
+        the reason, whatever its length.
         """
         for name in ("reason", "where", "advice", "service"):
             text = getattr(self, name)
-            if isinstance(text, str) and not text.isascii():
+            if isinstance(text, str) and not (text.isascii() and len(text) <= LONGEST_TEXT):
+                text = text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 3]}..."
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
 
     def within(self, *names: str) -> str:
