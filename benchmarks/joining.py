@@ -225,7 +225,7 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    print("clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  doubled: coming, leaving")
+    print("clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  doubled: come, go")
     for before, row in zip([None, *rows], rows, strict=False):
         growth = [f"{grown(before, row, what):.2f}" for what in ("router", "router_leaving")] if before else ["", ""]
         print(

@@ -6,7 +6,6 @@ import socket
 import time
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import ExitStack, asynccontextmanager, closing, suppress
-from stat import S_ISSOCK
 from typing import Any
 
 import zenoh
@@ -22,6 +21,8 @@ from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
+from engage_hri.services.bus.zenoh.sizes import paced
+from engage_hri.services.bus.zenoh.volume import Listening, place, sockets
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""
@@ -74,6 +75,7 @@ async def routing(
         if keys_of_router is not None:
             holders = keys_of_router.holders()
             more = {**encrypted(keys_of_router), "access_control": access_control(holders)}
+            more["downsampling"] = paced(holders)
             os.environ["RUST_LOG"] = LEVELS
             zenoh.init_log_from_env_or(LEVELS)
             own = keys_of_router.holder
@@ -81,9 +83,11 @@ async def routing(
         session = open_router(connect, listen, more)
         bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
         door = Door(session, bridge, Crowd(holders), tell, served)
+        listening = Listening(session, tell)
         try:
             yield Routing(session, bridge)
         finally:
+            listening.close()
             bridge.close()
             door.close()
             session.close()  # type: ignore[no-untyped-call]
@@ -153,20 +157,9 @@ class Door:
 
     def _end(self) -> None:
         """End links: Zenoh cannot, so their sockets are shut down, which it takes for the other side's doing."""
-        addresses = {link.address.partition("/")[2] for link in self._ending}
+        ending = {place(link.address) for link in self._ending}
         self._ending.clear()
-        for number in map(int, os.listdir("/dev/fd")):
-            with suppress(OSError):  # the file that was this list, a socket that listens, one that is gone
-                if S_ISSOCK(os.fstat(number).st_mode):
-                    with socket.socket(fileno=os.dup(number)) as each:
-                        if each.family in _IP and _written(each.getpeername()) in addresses:
-                            each.shutdown(socket.SHUT_RDWR)
-
-
-_IP = (socket.AF_INET, socket.AF_INET6)
-
-
-def _written(address: tuple[Any, ...]) -> str:
-    """Write an address as Zenoh does."""
-    host, port, *_ = address
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        for where, each in sockets():
+            if where in ending:
+                with suppress(OSError):  # it has ended by itself
+                    each.shutdown(socket.SHUT_RDWR)
