@@ -5,7 +5,7 @@
 A router and the four services, each a process. For each number so many clients of `connect()` come at once, in
 processes of a hundred, wait until they see all services, and go at once. Beside them one more client has short blocks
 performed, one after the other. Processor time is that of the router's processes until they compute no more. The last
-columns say by how much the share of a client has grown for each doubling of their number since the line before.
+column says by how much the share of a client, who comes and who goes, has grown for each doubling of their number.
 
 `--plain`: clients are plain Zenoh sessions that declare what an idle client of ours does, for numbers for which this
 machine is too small. `--keys`: all have certificates, and a hundred clients share one. Linux only.
@@ -225,13 +225,14 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    print("clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  doubled: come, go")
+    print("clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  doubled")
     for before, row in zip([None, *rows], rows, strict=False):
-        growth = [f"{grown(before, row, what):.2f}" for what in ("router", "router_leaving")] if before else ["", ""]
+        costs = ("router", "router_leaving") if before else ()
+        growth = ", ".join(f"{grown(before, row, cost):.2f}" for cost in costs)
         print(
-            f"{row['clients']:7} {row['seconds']:8.1f} s {row['router']:8.2f} {row['MB']:4.0f} {row['leaving']:7.1f} s"
-            f" {row['router_leaving']:8.2f} {row['blocks']:7} {row['slowest']:6.2f} s {row['lost']:5} "
-            f" {growth[0]:>6}, {growth[1]}{'  the router was restarted' if row['restarted'] else ''}"
+            f"{row['clients']:7} {row['seconds']:8.1f} s {row['router']:8.2f} {row['MB']:4.0f}"
+            f" {row['leaving']:7.1f} s {row['router_leaving']:8.2f} {row['blocks']:7} {row['slowest']:6.2f} s"
+            f" {row['lost']:5}  {growth}{'  restarted' if row['restarted'] else ''}"
         )
 
 
