@@ -82,10 +82,13 @@ R = TypeVar("R", bound=Request)
 V = TypeVar("V")
 
 
-def checked(request: R) -> R:
-    """Check that the server can read the request: a struct takes values of any type. Raises InputRefused."""
+def checked(key: str, request: R) -> R:
+    """Check that the server can read the request: a struct takes values of any type. Raises InputRefused.
+
+    key: where it is sent.
+    """
     try:
-        decode(*published(request))  # type: ignore[arg-type]
+        decode(*published(key, request))  # type: ignore[arg-type]
     except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
         raise InputRefused(Fault(reason=str(error), where=str(request.id))) from error
     return request

@@ -116,7 +116,7 @@ class Robot(Hearing):
 
     def _send(self, fragment: TurnFragment) -> Pending:
         request = PerformFragment(id=self._request_id(fragment.id), fragment=fragment)
-        return self._requests.send(keys.FRAGMENT, checked(request))
+        return self._requests.send(keys.FRAGMENT, checked(keys.FRAGMENT, request))
 
     async def _end_of(
         self, pending: Pending, *, await_answer: bool, timeout: Seconds | None = None
@@ -222,7 +222,7 @@ class Robot(Hearing):
             RunFailed: generation is gone, or has not come within `timeout`.
         """
         request = Inhibit(id=self._request_id("inhibit"), part=part, mode=mode, target=target, ttl=ttl)
-        pending = self._requests.send(keys.INHIBIT, checked(request))
+        pending = self._requests.send(keys.INHIBIT, checked(keys.INHIBIT, request))
         try:
             await self._answer_of(pending, pending.accepted, timeout)
         except (asyncio.CancelledError, RunFailed):
@@ -237,7 +237,7 @@ class Robot(Hearing):
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
         taken(timeout, Seconds | None, "timeout")
-        return await self._finished(self._requests.send(key, checked(request)), timeout)
+        return await self._finished(self._requests.send(key, checked(key, request)), timeout)
 
     async def _finished(self, pending: Pending, timeout: Seconds | None) -> Outcome:
         try:

@@ -18,7 +18,7 @@ FACTS = {"format": "1", "robot": "robot", "clock": "loop", "began": "0.0", "wall
 def sample(
     key: str, message: Message, at: float, *, source: str = "there", life: str = "1", number: int = 1
 ) -> Sample:
-    payload, encoding = (encode(message), encoding_of(message)) if keys.is_presence(key) else published(message)
+    payload, encoding = (encode(message), encoding_of(message)) if keys.is_presence(key) else published(key, message)
     return Sample(key, payload, encoding, source, at, life=life, number=number, clock="loop", sent=at)
 
 
