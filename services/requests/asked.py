@@ -7,7 +7,7 @@ from engage_hri.services.requests.asking_table import State
 
 
 class Asked:
-    """One request. run: the life of the server that accepted it. sent_at: when the server may have got it last; None: never."""
+    """One request. run: the life of the server that accepted it. sent_at: when it was sent last; None: never."""
 
     def __init__(self, expression: str, request: Request) -> None:
         self.expression = expression

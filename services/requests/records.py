@@ -26,7 +26,8 @@ class Record:
     """
 
     __slots__ = (
-        "_answer", "_request", "ended_at", "is_held", "key", "kind", "lease", "name", "run", "sender", "size", "state",
+        "_answer", "_request", "ended_at", "is_held", "key", "kind", "lease", "name", "renewed_at", "run", "sender",
+        "size", "state",
     )  # fmt: skip
 
     def __init__(self, name: str, request: Request, sender: str, run: str) -> None:
@@ -41,6 +42,7 @@ class Record:
         """Name of its lease among the deadlines."""
         self.state = State.UNKNOWN
         self.is_held = False
+        self.renewed_at: Seconds = -inf
         self.ended_at: Seconds = inf
         self.size = 0
         """Bytes of request and answer, once they are packed."""

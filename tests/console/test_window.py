@@ -249,7 +249,8 @@ async def test_no_page_from_elsewhere_shows_the_window_in_a_frame(place: Place) 
     home = place.url.partition("?")[0]
     shows = f"""(() => {{ const frame = document.body.appendChild(document.createElement('iframe'));
       frame.src = '{home}'; return new Promise((done) => frame.onload = () => setTimeout(() => {{
-        try {{ done(!!frame.contentDocument?.querySelector('.window')); }} catch {{ done(false); }} }}, 1500)); }})()"""
+        let is; try {{ is = !!frame.contentDocument?.querySelector('.window'); }} catch {{ is = false; }}
+        done(is); }}, 1500)); }})()"""
     async with browser.at_port(place.port) as running, running.page() as page:
         await page.go(f"{home}pages/")  # of the window's own: it may
         await page.until("document.body")

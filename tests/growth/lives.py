@@ -1,8 +1,8 @@
 """Everything that runs long, at once: a whole robot, a manager, a window, a recorder, and those who come and go.
 
 `step(k)` is one minute of such a life: somebody who was never there before passes, speaks and leaves; a block is
-performed, another is refused, a third is cancelled; a manager that was never there before joins and leaves. No name in
-it comes again.
+performed, another is refused, a third is cancelled; a manager that was never there before joins and leaves. No name
+in it comes again.
 """
 
 import asyncio
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import Raw, json
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -55,10 +56,8 @@ class Eyes:
         seen = list(THINGS)
         for place, person in enumerate(people):
             seen.append(Entity(id=person, kind="person", position=(1.2, 0.4 * place, 1.2)))
-            hand = Entity(
-                id=f"{person}-hand", kind="hand", owner=person, position=(0.7, 0.4 * place, 0.8), velocity=(speed, 0, 0)
-            )
-            seen.append(hand)
+            hand = Entity(id=f"{person}-hand", kind="hand", owner=person, position=(0.7, 0.4 * place, 0.8))
+            seen.append(replace(hand, velocity=(speed, 0.0, 0.0)))
         self._bus.publish(keys.WORLD, World(entities=tuple(seen), at=self._bus.stamp()))
 
     def tell(self, event: type, actor: str, *of: Any) -> None:
@@ -67,7 +66,10 @@ class Eyes:
         self._bus.publish(keys.PERCEIVED_ACTION, event(actor=actor, at=self._bus.stamp(), **what))
 
     async def passes(self, person: str, robot: str, meanwhile: Awaitable[None]) -> None:
-        """Somebody comes, looks at the robot, speaks, waves, takes a thing, and leaves. meanwhile: what the robot does."""
+        """Somebody comes, looks at the robot, speaks, waves, takes a thing, and leaves.
+
+        meanwhile: what the robot does before.
+        """
         self.tell(ActorFound, person)
         self.see(person)
         await asyncio.sleep(0.5)
@@ -139,11 +141,13 @@ async def robot_alive() -> AsyncIterator[tuple[MemoryHub, Robot, Eyes]]:
 async def life(folder: Path, *, windows: bool = True) -> AsyncIterator[Step]:
     """A robot, a manager with all that it can listen to, and a recorder. folder: for the recording.
 
-    windows: two as well. Nobody looks at the one; at the other people sit down, steer and leave, and somebody looks on.
+    windows: two as well. Nobody looks at the one; at the other people sit down, steer and leave, and one looks on.
     """
-    async with robot_alive() as (hub, manager, eyes), recording_to(folder / "life.mcap", hub), AsyncExitStack() as more:
-        feeds = (manager.connection_events(), manager.actions(), manager.worlds(), manager.feedback(), manager.turns())
-        for place, feed in enumerate(feeds):
+    async with AsyncExitStack() as more:
+        hub, manager, eyes = await more.enter_async_context(robot_alive())
+        await more.enter_async_context(recording_to(folder / "life.mcap", hub))
+        heard = (manager.actions(), manager.worlds(), manager.feedback(), manager.turns())
+        for place, feed in enumerate((manager.connection_events(), *heard)):
             await more.enter_async_context(_during(_read(feed), f"feed {place}"))
         if windows:
             await more.enter_async_context(window(hub, hub.join("unseen", "wizard"), Script()))

@@ -4,7 +4,7 @@
     ...
     for growth in grown(before, sizes({"robot": robot}, limits)): print(growth)
 
-Containers that are reached in the same way count as one: `robot._nets[*].places` is the length of all of them together.
+Containers that are reached in the same way count as one: `robot._nets[*].places` is the length of all together.
 A container that has a limit of its own, and keeps it, is no growth while it fills up; what is in it counts as if it
 held one thing, the average of all.
 Python's own tool (`gc.get_referents`) shows what an object of C holds; there the name of its type stands for an
@@ -12,6 +12,7 @@ attribute.
 """
 
 import asyncio
+import contextlib
 import functools
 import gc
 import inspect
@@ -61,7 +62,9 @@ def sizes(roots: Mapping[str, object], limits: Mapping[str, int] = MappingProxyT
     """
     gc.collect()
     found = defaultdict[str, float](float)
-    seen = {id(sys.modules), id(found), id(roots), id(limits), id(asyncio.current_task())}
+    seen = {id(sys.modules), id(found), id(roots), id(limits)}
+    with contextlib.suppress(RuntimeError):  # there is no loop
+        seen.add(id(asyncio.current_task()))
     waiting = deque((name, one, 1.0) for name, one in roots.items())
     kept = list[object]()
     """Attributes are made anew when they are asked for: an address must not be used twice meanwhile."""
@@ -110,7 +113,8 @@ def _is_closed(one: object) -> bool:
 
 
 def _is_plain(one: object) -> bool:
-    return one is None or isinstance(one, int | float | complex) or (isinstance(one, str | bytes) and len(one) < LARGE)
+    is_short = isinstance(one, str | bytes) and len(one) < LARGE
+    return one is None or is_short or isinstance(one, int | float | complex)
 
 
 def _size(one: Any) -> int | None:
@@ -129,7 +133,8 @@ def _within(one: Any) -> Iterator[tuple[str, object]]:
     """What an object holds, each with the step that leads to it."""
     if isinstance(one, types.ModuleType):
         if _is_ours(one.__name__):
-            yield from ((f".{name}", each) for name, each in vars(one).items() if not isinstance(each, types.ModuleType))
+            named = vars(one).items()
+            yield from ((f".{name}", each) for name, each in named if not isinstance(each, types.ModuleType))
     elif isinstance(one, type):
         yield from ((f".{name}", each) for name, each in vars(one).items() if isinstance(each, CONTAINERS))
     elif isinstance(one, dict):
@@ -140,10 +145,8 @@ def _within(one: Any) -> Iterator[tuple[str, object]]:
     elif isinstance(one, types.FunctionType):
         names = one.__code__.co_freevars
         for name, cell in zip(names, one.__closure__ or (), strict=True):
-            try:
+            with contextlib.suppress(ValueError):  # it is empty
                 yield f".<{name}>", cell.cell_contents
-            except ValueError:
-                pass
         yield from ((".<default>", each) for each in one.__defaults__ or ())
         if (wrapped := one.__dict__.get("__wrapped__")) is not None:
             yield ".__wrapped__", wrapped

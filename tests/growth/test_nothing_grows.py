@@ -1,13 +1,11 @@
 """Nothing grows: N passers-by, blocks, clients and visitors leave no more behind than the N before them.
 
-The law knows no class: it measures whatever can be reached from what runs (`reach.py`), and names what has grown by the
-attributes that lead there. The long run, by hand: `python -m tests.growth.long crowd 10000`.
+The law knows no class: it measures whatever can be reached from what runs (`reach.py`), and names what has grown by
+the attributes that lead there.
 """
 
 import asyncio
 from pathlib import Path
-
-import pytest
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.subscription import KEYS_KEPT
@@ -28,10 +26,11 @@ from tests.growth.reach import Growth, grown, modules, running, sizes
 LIMITS = {
     "_carriers": KEYS_KEPT, "_wanting": KEYS_KEPT, "_used": NAMES_KEPT, "_told": UTTERANCES_KEPT, "_told_of": PEOPLE,
     "_said": WORDS_KEPT, "_errors": PEOPLE_KEPT + 1, "_ended_turns": TURNS_KEPT, "_aborted_turns": TURNS_KEPT,
-    "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_points": BLOCKS_KEPT, "events": EVENTS_KEPT,
-    "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20, "_heap": 4 * SLACK, "_scheduled": 400,
+    "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_points": BLOCKS_KEPT,
+    "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
+    "_heap": 4 * SLACK, "_scheduled": 400,
 }  # fmt: skip
-"""Containers that are bounded by number and not by time. The last two drop what is outdated once there is much of it."""
+"""Containers that are bounded by number, not by time. The last two drop what is outdated once there is much of it."""
 STEPS = 6
 """Steps of life between two measures; of each, whatever leaks keeps at least one thing."""
 REST: Seconds = 20.0
@@ -53,7 +52,7 @@ async def growth(folder: Path, *, windows: bool) -> list[Growth]:
 
 
 def of_recorder(one: Growth) -> bool:
-    """Whether it is the index of a recording: one line for each chunk and channel, which the file needs at its end."""
+    """Whether it is the index of a recording: a line for each chunk and channel, which the file needs at its end."""
     return any(word in one.path for word in (".writer.", "recorder._lines", "writing.Line", "mcap.records"))
 
 

@@ -15,10 +15,12 @@ Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 HEADERS = (
-    (b"x-frame-options", b"SAMEORIGIN"), (b"referrer-policy", b"same-origin"), (b"x-content-type-options", b"nosniff"),
-)  # fmt: skip
-"""Said with everything: no page from elsewhere shows one of the window's in a frame, where it could have its visitor
-click unseen; no link to elsewhere tells from where it was followed; no file is taken for what it does not say it is."""
+    (b"x-frame-options", b"SAMEORIGIN"),
+    (b"referrer-policy", b"same-origin"),
+    (b"x-content-type-options", b"nosniff"),
+)
+"""Said with everything. No page from elsewhere shows the window in a frame, where it could have its visitor click on
+what he does not see; no link tells another server from where it was followed; a file is only what it says it is."""
 REFUSED = 4403
 """Code with which a WebSocket of another page is closed."""
 

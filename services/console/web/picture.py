@@ -159,8 +159,8 @@ class Picture:
                 if actor:
                     self.people.hear(actor, self.now)
                 self._changed("measures")
-            case ActionBegan(actor=actor) | ActionEnded(actor=actor) | ActorFound(actor=actor) | ActorLost(actor=actor):
-                self.people.hear(actor, self.now)
+            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+                self.people.hear(message.actor, self.now)
             case BlockProgress() | SyncPointProgress() | PredictionFeedback():
                 self._take_block(message, at)
             case NetPlanned() | NetMarked() | NetWaiting():

@@ -58,7 +58,8 @@ PAGES = "/pages"
 MOST_PROGRAMS = 100
 POLICY = (
     "default-src 'none'; script-src 'self' 'sha256-{imports}'; style-src 'self' 'unsafe-inline'; "
-    "img-src 'self' data: blob:; connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+    "img-src 'self' data: blob:; connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'self'"
 )
 """What our own page may load and do. imports: digest of its map of modules, the only script in the page itself."""
 NO_TEXT = 1003
@@ -129,7 +130,7 @@ def _app(
     more: Iterable[BaseRoute] = (),
     enter: Callable[[Request], Response | None] = lambda request: None,
 ) -> Starlette:
-    """The page and its frames. close: is called at the end. enter: what to answer in place of the page, if anything."""
+    """The page and its frames. close: is called at the end. enter: may answer in place of the page."""
     page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{robot}", escape(robot))
 
     imports = re.search("<script type=.importmap.>(.*?)</script>", page)
