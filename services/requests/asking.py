@@ -229,7 +229,11 @@ class Asking:
     def _step(self, asked: Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
         """Let `event` happen to a request: take its row of the table and do what that says."""
         before = asked.state
-        if event in _SENDS_AGAIN and before in _UNDECIDED and now - (asked.sent_at or now) > ASLEEP:
+        if (
+            event in _SENDS_AGAIN
+            and before in _UNDECIDED
+            and now - (now if asked.sent_at is None else asked.sent_at) > ASLEEP
+        ):
             event = Event.PATIENCE_OVER
         asked.state, actions = TABLE[before][event]
         for action in actions:

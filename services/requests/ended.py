@@ -8,14 +8,14 @@ from engage_hri.services.runtime.absent import Absent
 
 MOST = 8 * 1024 * 1024
 """Bytes of the requests that are remembered, of all senders together."""
-EACH = 2048
+EACH = 1024
 """Bytes that a request takes beside its text and that of its answer: names, and its place in tables. Measured."""
 
 
 class Ended:
     """Requests that have ended, by sender, until nobody has spoken of them for `FORGOTTEN_AFTER`.
 
-    Who sends many makes room for them himself: it forgets nobody else's.
+    Who sends many makes room for them himself: it forgets nobody else's. bytes: what all of them take.
     """
 
     def __init__(self, most: int = MOST) -> None:
@@ -24,7 +24,7 @@ class Ended:
         self._of = defaultdict[str, dict[str, Record]](dict)
         """By sender and name; of each the oldest first."""
         self._bytes: dict[str, int] = {}
-        self._all = 0
+        self.bytes = 0
         self._quiet: Absent[Record] = Absent()
 
     def __len__(self) -> int:
@@ -38,10 +38,10 @@ class Ended:
         sender, size = record.sender, EACH + record.pack()
         self._of[sender][record.name] = record
         self._bytes[sender] = self._bytes.get(sender, 0) + size
-        self._all += size
+        self.bytes += size
         self._quiet.leaves(record, now)
         forgotten = []
-        while self._all > self._most:
+        while self.bytes > self._most:
             loudest = max(self._bytes, key=self._bytes.__getitem__)
             oldest = next(iter(self._of[loudest].values()))
             if oldest is record:
@@ -72,6 +72,6 @@ class Ended:
         sender, size = record.sender, EACH + record.size
         del self._of[sender][record.name]
         self._bytes[sender] -= size
-        self._all -= size
+        self.bytes -= size
         if not self._of[sender]:
             del self._of[sender], self._bytes[sender]

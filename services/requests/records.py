@@ -64,7 +64,7 @@ class Record:
         self._answer = answer
 
     def pack(self) -> int:
-        """Keep request and answer as their bytes from now on: as objects they take six times as much.
+        """Keep request and answer as their bytes from now on: as objects they take twice as much, and more.
 
         Returns the number of these bytes.
         """

@@ -97,6 +97,11 @@ class Serving:
         """Number of requests that have not ended."""
         return len(self._live)
 
+    @property
+    def remembered(self) -> int:
+        """Bytes of the requests that have ended and are remembered."""
+        return self._ended.bytes
+
     def asked(self, name: str) -> Request | None:
         """The request as it came, with its own id; None if it was never made, or is forgotten."""
         record = self._named.get(name)

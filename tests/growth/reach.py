@@ -16,6 +16,7 @@ import contextlib
 import functools
 import gc
 import inspect
+import logging
 import sys
 import types
 from collections import Counter, defaultdict, deque
@@ -27,8 +28,8 @@ CONTAINERS = (dict, list, tuple, set, frozenset, deque)
 LARGE = 1024
 """Text and bytes count from this length on: a name that differs by a letter is no growth."""
 OURS = "engage_hri"
-CLOSED = (types.BuiltinFunctionType, types.FrameType, types.TracebackType, types.CodeType)
-"""What is not opened: it holds the whole of Python."""
+CLOSED = (types.BuiltinFunctionType, types.FrameType, types.TracebackType, types.CodeType, logging.Handler)
+"""What is not opened: it holds the whole of Python, or what the test itself keeps."""
 
 
 class Growth(NamedTuple):
@@ -133,8 +134,8 @@ def _within(one: Any) -> Iterator[tuple[str, object]]:
     """What an object holds, each with the step that leads to it."""
     if isinstance(one, types.ModuleType):
         if _is_ours(one.__name__):
-            named = vars(one).items()
-            yield from ((f".{name}", each) for name, each in named if not isinstance(each, types.ModuleType))
+            variables = vars(one).items()
+            yield from ((f".{name}", each) for name, each in variables if not isinstance(each, types.ModuleType))
     elif isinstance(one, type):
         yield from ((f".{name}", each) for name, each in vars(one).items() if isinstance(each, CONTAINERS))
     elif isinstance(one, dict):
