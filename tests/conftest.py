@@ -49,7 +49,9 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
-    config.addinivalue_line("markers", "each_bus(shared=True): runs on the memory bus in virtual time, and on Zenoh each of three ways")
+    config.addinivalue_line(
+        "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
+    )
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
