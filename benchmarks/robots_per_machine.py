@@ -1,13 +1,13 @@
-"""Robots that really run on one machine and one router, each with a manager that talks: memory, processor time, delay.
+"""Robots that run on one machine and one router, each with a manager that talks: memory, processor time, delay.
 
     python benchmarks/robots_per_machine.py [--robots 10] [--seconds 20] [--way processes] [--json]
 
-All robots of a run start first, and are looked at while nobody speaks to them. Then each has a manager, which performs
-one fragment and one block of speeches that wait for one another, again and again without pause; the managers are in one
-further process. Processor time is that of all processes of a robot between two looks, as the kernel counts it. Memory
-is what is resident (Rss), and the proportional share (Pss): what several processes have in common counts once. The
-delay is from the sync point that ends a speech to the command for the next one, by the times at which the robot sent
-them, which uvloop tells in whole milliseconds. Linux only.
+All robots of a run start first, and are looked at while nobody speaks to them. Then each has a manager that performs
+one fragment and one block of speeches that wait for one another, again and again without pause; the managers are in
+one further process. Processor time is that of all processes of a robot between two looks, as the kernel counts it.
+Memory is what is resident (Rss), and the proportional share (Pss): what several processes have in common counts once.
+The delay is from the sync point that ends a speech to the command for the next one, by the times at which the robot
+sent them, which uvloop tells in whole milliseconds. What was not done is told on standard error. Linux only.
 """
 
 import argparse
@@ -42,6 +42,8 @@ WAYS = {
     "pair": ("--together", "realizer,control"),
     "in-one": ("--in-one",),
 }
+ROUND: Seconds = 4.0
+"""Time that one fragment and one block take."""
 FRAGMENT = {"turn_status": "full", "parts": [{"say": "One moment please, I am going to have a look."}]}
 CHAIN = """<bml id="{id}"><speech id="s0"><text>Well.</text></speech>
 <speech id="s1" start="s0:end"><text>Well.</text></speech>
@@ -85,8 +87,8 @@ def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
     engage, endpoint = [sys.executable, "-m", "engage_hri"], free_endpoint()
     with ExitStack() as stack:
 
-        def start(*command: str) -> "subprocess.Popen[str]":
-            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        def start(*command: str, errors: int | None = subprocess.DEVNULL) -> "subprocess.Popen[str]":
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
             stack.callback(process.wait)
             stack.callback(process.terminate)
             return process
@@ -109,9 +111,9 @@ def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
         families = [family(each.pid) for each in all_up]
         pids = [pid for each in families for pid in each]
         idle = percent(pids, min(seconds, 10.0))
-        managers = start(sys.executable, __file__, "--talk", endpoint, str(robots), str(seconds + 2.0))
+        managers = start(sys.executable, __file__, "--talk", endpoint, str(robots), str(seconds), errors=None)
         heard(managers, "talking")
-        time.sleep(1.0)
+        time.sleep(ROUND)
         before = processor_seconds(family(router.pid))
         talking = percent(pids, seconds)
         routed = 100 * (processor_seconds(family(router.pid)) - before) / seconds
@@ -143,15 +145,18 @@ async def talk(endpoint: str, robots: int, seconds: Seconds) -> None:
         watching = [asyncio.create_task(watch(bus, delays)) for bus in buses]
         print("talking", flush=True)
         async with asyncio.TaskGroup() as group:
-            for bus in buses:
-                group.create_task(manage(bus, bus.now() + seconds, ends))
+            for number, bus in enumerate(buses):
+                # Real managers do not begin in one instant: they are spread over about the time of one round.
+                wait = ROUND * number / robots
+                group.create_task(manage(bus, wait, bus.now() + wait + seconds, ends))
         for task in watching:
             task.cancel()
     known = {f"p{p}_ms": 1000 * percentile(delays, p) for p in (50, 99)}
     print(json.dumps({**ends, "delays": len(delays), **known, "worst_ms": 1000 * max(delays)}), flush=True)
 
 
-async def manage(bus: Bus, until: Seconds, ends: dict[str, int]) -> None:
+async def manage(bus: Bus, wait: Seconds, until: Seconds, ends: dict[str, int]) -> None:
+    await asyncio.sleep(wait)
     async with Robot.on(bus) as robot:
         number = 0
         while bus.now() < until:
