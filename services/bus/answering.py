@@ -34,7 +34,7 @@ class Answering:
         return task
 
     async def ask(
-        self, key: str, question: Message, deadline: Seconds, carried: Callable[[Message], Message] = lambda one: one
+        self, key: str, question: Message, deadline: Seconds, carried: Callable[[Message], Message]
     ) -> Message | None:
         """Ask this participant, from its own process. None: there is no answer by `deadline`, or it has left.
 

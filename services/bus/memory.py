@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import deque
+from functools import partial
 from itertools import count
 from typing import NamedTuple
 
@@ -9,9 +10,9 @@ import msgspec
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
-from engage_hri.schemas.faults import Fault, InputRefused, NoReply
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.messages import Message, decode, encode, encoding_of, in_form, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
@@ -96,7 +97,7 @@ class MemoryHub(Hub):
     def send(self, sender: str, key: str, message: Message) -> None:
         if isinstance(message, LOCAL):
             raise TypeError(f"{type(message).__name__} is never sent")
-        payload, encoding = published(message)
+        payload, encoding = published(key, message)
         now, life = self._loop.time(), self._buses[sender].run
         sample = Sample(key, payload, encoding, sender, now, life=life, number=self.sent + 1, clock="loop", sent=now)
         if self._decodes or isinstance(message, DOCUMENTS):
@@ -107,9 +108,9 @@ class MemoryHub(Hub):
                 return
         self._pass_on(sender, Received(key, message, sender, now, life=life, number=self.sent + 1), sample)
 
-    def carried(self, message: Message) -> Message:
+    def carried(self, key: str, message: Message) -> Message:
         """The question or answer as its receiver gets it. Raises what makes it impossible to send."""
-        payload = encode(message)
+        payload, _ = in_form(key, message, "msgpack")
         return decode(payload) if self._decodes else message
 
     def wants(self, key: str) -> bool:
@@ -320,13 +321,14 @@ class MemoryBus(Bus):
             self._overflowed += tap.overflowed
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        asked = self._hub.carried(key, message)
         await asyncio.sleep(0)
         deadline = self.now() + timeout
         while not self._gone and (server := await self._hub.answerer(key, self.name, deadline)) is not None:
-            answer = await server.answers.ask(key, self._hub.carried(message), deadline, self._hub.carried)
+            answer = await server.answers.ask(key, asked, deadline, partial(self._hub.carried, key))
             if answer is not None:
                 return answer
-        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        raise self.unanswered(key, timeout)
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         self.answers.served[key] = answer

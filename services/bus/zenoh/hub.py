@@ -9,6 +9,7 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 
 import asyncio
 from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 from itertools import count
 from typing import Any, TypeVar
@@ -17,8 +18,8 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
-from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.answering import Answering
@@ -154,6 +155,10 @@ class ZenohHub(Hub):
         self._expiry = Expiry(self._link.holder, until, LOG.warning) if until is not None else None
 
     @property
+    def unlinked_at(self) -> Seconds:
+        return self._links.unlinked_at
+
+    @property
     def health(self) -> BusHealth:
         """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
@@ -250,7 +255,7 @@ class ZenohHub(Hub):
             self.rights.check(bus.name, "publishes", key)
         ordered = keys.key_class(key) != "stream"
         now = self._loop.time()
-        payload, encoding = published(message)
+        payload, encoding = published(key, message)
         stamp = self.session.new_timestamp()
         if ordered:
             if not self._sent.number:
@@ -295,6 +300,10 @@ class ZenohBus(Bus):
         self.answers = Answers(self, hub.session, hub.bridge, hub.run)
         self._overflowed = 0
         self._token: Any = None
+
+    @property
+    def unlinked_at(self) -> Seconds:
+        return self._hub.unlinked_at
 
     @property
     def health(self) -> BusHealth:
@@ -346,11 +355,11 @@ class ZenohBus(Bus):
         if self._hub.rights is not None:
             self._hub.rights.check(self.name, "asks", key)
         deadline = self._loop.time() + timeout
-        payload, encoding = encode(message), encoding_of(message)
+        payload, encoding = in_form(key, message, "msgpack")
         while self._loop.time() < deadline:
             known = self._hub.peers.changes
             if (server := self._hub.server(key)) is not None:
-                if (told := await server.ask(key, message, deadline)) is not None:
+                if (told := await server.ask(key, message, deadline, partial(_sendable, key))) is not None:
                     return told
                 continue
             reply = await self._ask(key, payload, encoding, deadline)
@@ -361,7 +370,7 @@ class ZenohBus(Bus):
             # There is no server, or it died meanwhile: wait until a process comes or goes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
-        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        raise self.unanswered(key, timeout)
 
     async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
         """Ask until the first answer; None once every try has ended without one.
@@ -419,6 +428,12 @@ class ZenohBus(Bus):
             self._token.undeclare()
             self._hub.note(self.name, False)
         self._hub.forget(self.name)
+
+
+def _sendable(key: str, message: Message) -> Message:
+    """The message, which stays in this process. Raises InputRefused if it could not leave it."""
+    in_form(key, message, "msgpack")
+    return message
 
 
 def _is_ours(encoding: str) -> bool:
