@@ -1,4 +1,4 @@
-"""What a participant answers: to those in its process without a wire; an answer in steps is a task of its own."""
+"""Answers of a participant: to those in its process without a wire; an answer in steps is a task of its own."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
