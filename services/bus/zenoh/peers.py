@@ -7,7 +7,7 @@ selects by the key. If all got all tokens, those of N clients would cost the rou
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Any, TypeVar
 
@@ -45,10 +45,11 @@ class Peers:
         bridge: LoopBridge,
         sent: SentLog,
         clocks: Clocks,
+        own: Collection[str],
         places: Sequence[str] = (),
         rank: Callable[[str], int] | None = None,
     ) -> None:
-        """places: endpoints at which others may connect to this process.
+        """own: runs of this process, of which the hub tells. places: endpoints at which others may connect to it.
 
         rank: of the process with this run, by its keys: the lowest is believed what time its machine has.
         """
@@ -66,6 +67,7 @@ class Peers:
         self._watchers: list[asyncio.Future[None]] = []
         self._clock_of: dict[str, str] = {}
         """Clocks of the processes that are there, those that came first first."""
+        self._own = own
         self._rank = rank or (lambda run: 0)
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         self._watched: dict[str, Any] = {}
@@ -136,7 +138,7 @@ class Peers:
         chunks: list[Any] = str(sample.key_expr).split("/")[3:]
         run, subject = chunks[0], chunks[1:]
         there = sample.kind == zenoh.SampleKind.PUT
-        if run == self._sent.run:
+        if run in self._own:
             return
         match subject:
             case ["alive", part, name, clock]:
