@@ -1,4 +1,4 @@
-"""How much of a router one holder may take: its links and its tokens are counted, and who has too many is cut. Pure.
+"""Bounds of what one holder may take of a router: links and tokens are counted; who has too many is cut. Pure.
 
 Zenoh bounds neither for one holder: a thousand links leave no place for others, and with the number of tokens of one
 link the time grows that each further one costs (measured: 5000 tokens 0.5 s of processor, 20,000 tokens 20 s).
