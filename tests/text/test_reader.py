@@ -190,9 +190,15 @@ def test_an_id_is_told_only_if_it_was_written_in_other_letters(text: str, told: 
 
 
 @pytest.mark.parametrize(
-    ("text", "spoken"), [("list[2] entry", "list 2  entry"), ("list[2], entry", "list 2, entry"), ("list[2]", "list 2"),
-                         ("[is] it", "is it"), ("[is]it", "is it")],
-)  # fmt: skip
+    ("text", "spoken"),
+    [
+        ("list[2] entry", "list 2  entry"),
+        ("list[2], entry", "list 2, entry"),
+        ("list[2]", "list 2"),
+        ("[is] it", "is it"),
+        ("[is]it", "is it"),
+    ],
+)
 def test_words_in_brackets_do_not_run_into_what_follows(text: str, spoken: str) -> None:
     assert words(read([text], Ids(()))).rstrip() == words(read(text, Ids(()))).rstrip() == spoken
 
