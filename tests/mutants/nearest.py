@@ -29,7 +29,9 @@ class Nearest:
         last = source[: change.end].count(b"\n") + 1
         found = {name for line in range(change.statement, last + 1) for name in lines.get(line, ())} - {""}
         if change.alone or not found:
-            found = {name for names in lines.values() for name in names}
+            found = {name for names in lines.values() for name in names} - {""}
+        if not found:  # nothing but definitions, which are read when the tests are collected
+            found = {name for name in self.seconds if set(Path(name).parent.parts[1:]) & set(Path(file).parent.parts)}
         return sorted(found & self.seconds.keys(), key=lambda name: self._distance(name, file))
 
     def _distance(self, test: str, file: str) -> tuple[bool, bool, bool, float]:
