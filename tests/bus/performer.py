@@ -33,7 +33,7 @@ def extent(through: str, id: str = "b") -> PerformBehavior:
 
 
 class Server:
-    """Accepts every block, performs it for `seconds`, and keeps a diary. accepts: else it only tells that it begins."""
+    """Accepts every block, performs it for `seconds`, and keeps a diary. accepts: else it says only that it began."""
 
     def __init__(self, hub: MemoryHub, seconds: float = 0.5, name: str = "realizer", *, accepts: bool = True) -> None:
         self.bus = hub.join(name)
