@@ -10,10 +10,11 @@ import platform
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine, Iterator
+from math import inf
 from typing import Any, Self
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
@@ -56,6 +57,7 @@ class Bus(ABC):
         self._life_numbers = life_numbers
         self._loop = asyncio.get_running_loop()
         self._gone = False
+        self._is_told_unsent = False
 
     @property
     @abstractmethod
@@ -77,6 +79,23 @@ class Bus(ABC):
     @abstractmethod
     def error(self, clock: str) -> Seconds:
         """Greatest error of `local` for stamps of this clock; inf if nothing is known of it yet."""
+
+    @property
+    def unlinked_at(self) -> Seconds:
+        """Local time at which this process last had no router, though it had had one; -inf: never."""
+        return -inf
+
+    def unanswered(self, key: str, within: Seconds) -> NoReply:
+        """The error of a question that nobody has answered, with the reason as far as it can be known here."""
+        server = keys.server_of(key)
+        cause: Cause
+        cause, whose, why, advice = "gone", server, "it is not there", f"is {server} running?"
+        if self.unlinked_at >= self.now() - within:
+            cause, whose, why, advice = "unlinked", ROUTER, f"{self.name} has had no router", ""
+        elif server in self.health.peers:
+            cause, why, advice = "silent", "it is there, but does not answer", f"is {server} stuck?"
+        reason = f"no reply from {server} within {within:g} s: {why}"
+        return NoReply(Fault(reason=reason, where=key, advice=advice, service=self.name, cause=cause, whose=whose))
 
     def new_life(self) -> str:
         """Make the life of a requester on this bus: two requesters may use the same ids then."""
@@ -116,9 +135,20 @@ class Bus(ABC):
             self.log.exception("%s: the fault could not be told", self.name)
 
     def publish(self, key: str, message: Message) -> None:
-        """Send to all subscribers of `key`, this process' own included. It is no error if there are none."""
+        """Send to all subscribers of `key`, this process' own included. It is no error if there are none.
+
+        Raises InputRefused for a message that is larger than its key allows (schemas/limits.py). One of a stream, of
+        which any may be lost, is not sent then, and the first such of a participant is told in the log.
+        """
         journal.note(self.log, key, message)
-        self._send(key, message)
+        try:
+            self._send(key, message)
+        except InputRefused as error:
+            if keys.key_class(key) != "stream":
+                raise
+            if not self._is_told_unsent:
+                self._is_told_unsent = True
+                self.log.warning("%s: not sent: %s", self.name, error.fault)
 
     @abstractmethod
     def _send(self, key: str, message: Message) -> None:

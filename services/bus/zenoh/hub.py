@@ -14,8 +14,8 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
-from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
@@ -137,6 +137,10 @@ class ZenohHub(Hub):
         self._expiry = Expiry(self._link.holder, until, LOG.warning) if until is not None else None
 
     @property
+    def unlinked_at(self) -> Seconds:
+        return self._links.unlinked_at
+
+    @property
     def health(self) -> BusHealth:
         """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
@@ -211,7 +215,7 @@ class ZenohHub(Hub):
             self.rights.check(bus.name, "publishes", key)
         ordered = keys.key_class(key) != "stream"
         now = self._loop.time()
-        payload, encoding = published(message)
+        payload, encoding = published(key, message)
         stamp = self.session.new_timestamp()
         if ordered:
             if not self._sent.number:
@@ -255,6 +259,10 @@ class ZenohBus(Bus):
         self._answers = Answers(self, hub.session, hub.bridge, hub.run)
         self._overflowed = 0
         self._token: Any = None
+
+    @property
+    def unlinked_at(self) -> Seconds:
+        return self._hub.unlinked_at
 
     @property
     def health(self) -> BusHealth:
@@ -306,7 +314,7 @@ class ZenohBus(Bus):
         if self._hub.rights is not None:
             self._hub.rights.check(self.name, "asks", key)
         deadline = self._loop.time() + timeout
-        payload, encoding = encode(message), encoding_of(message)
+        payload, encoding = in_form(key, message, "msgpack")
         while self._loop.time() < deadline:
             known = self._hub.peers.changes
             reply = await self._ask(key, payload, encoding, deadline)
@@ -317,7 +325,7 @@ class ZenohBus(Bus):
             # There is no server, or it died meanwhile: wait until a process comes or goes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
-        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        raise self.unanswered(key, timeout)
 
     async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
         """Ask until the first answer; None once every try has ended without one.
