@@ -24,17 +24,20 @@ MOST = 200
 WILD = 4
 """Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
 Keys of ours have one."""
+MOST_LINKS = 4096
+"""Number of links of which it is known whose they are."""
 PIPE = 2**20
 """Bytes of the log that may wait for the loop; beyond, the router waits."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
 _THREAD = re.compile(r"ThreadId\((\d+)\)")
+_THREAD_OF = re.compile(rb"ThreadId\((\d+)\)")
 _CHECKED = re.compile(
     r"(?P<cached>Using cached result: )?(?P<zid>[0-9a-f]+)(?: on \S*?CertCommonName\((?P<name>.*?)\)\S*)?"
     r" is (?P<verdict>un)?authorized to (?P<what>[A-Z][A-Za-z/ ]*) \((?P<flow>ingress|egress)\) on (?P<key>\S+)"
 )
 _CACHING = re.compile(r"ACL \((?P<flow>ingress|egress)\): caching permissions for `(?P<key>.*?)`")
 _LAST_CACHED = "Declare Liveliness Subscriber"
-_ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
+_ACCEPTED = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. .*Common Name: (?P<name>.*)\.$")
 _NOBODY = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
 _TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
@@ -61,18 +64,17 @@ class Denials:
         self._count: Counter[str] = Counter()
         self._kinds: Counter[str] = Counter()
         """Number of different refusals, by what they are about."""
-        self._before: dict[bytes, bytes] = {}
-        """Last line of each thread."""
+        self._before = b""
+        """The last line."""
+        self.names: dict[str, str] = {}
+        """Common names by the address at the other end of a link; of the links that were accepted last."""
 
     def feed(self, line: bytes) -> None:
         """Take a line of the log."""
-        begin = line.find(b"ThreadId(")
-        on = line[begin : line.find(b")", begin)]
+        before, self._before = self._before, line
         if line.endswith(_DROPPED):
-            self._drop(self._before.pop(on, b""))
+            self._drop(before, line)
             return
-        if on in self._before or len(self._before) < MOST:  # a key may have line ends, and say anything
-            self._before[on] = line
         if b"Using cached result" in line and b"unauthorized" not in line:
             return  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
@@ -89,6 +91,9 @@ class Denials:
             self._say(f"dropped: {who} sends more on {many['key']} than may come in a second", f"of what {who} does")
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
+            if len(self.names) >= MOST_LINKS:
+                del self.names[next(iter(self.names))]
+            self.names[accepted["address"]] = accepted["name"]
         elif (nobody := _NOBODY.search(text)) is not None:
             name = self._accepted.get(thread, "somebody")
             self._know(nobody["zid"], name)
@@ -97,8 +102,13 @@ class Denials:
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
 
-    def _drop(self, before: bytes) -> None:
-        """Tell what was dropped though a rule allows it: it is too large. before: what was said of it."""
+    def _drop(self, before: bytes, line: bytes) -> None:
+        """Tell what was dropped though a rule allows it: it is too large. before: what was said of it on that thread.
+
+        Threads write as they come. So one of many may be missed, which is told the next time.
+        """
+        if _THREAD_OF.findall(before)[:1] != _THREAD_OF.findall(line)[:1]:
+            return
         checked = _CHECKED.search(_COLOR.sub(b"", before).decode(errors="replace"))
         if checked is not None and not checked["verdict"] and checked["flow"] == "ingress":
             who = self._names.get(checked["zid"], f"process {checked['zid']}")
@@ -145,7 +155,7 @@ class Denials:
 
 
 @contextmanager
-def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
+def telling_denials(tell: Callable[[str], None]) -> Iterator[Denials]:
     """Tell what is refused while the body of `with` runs; Zenoh sessions are opened in it. Once in a process.
 
     Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. tell: waits for no reader.
@@ -179,7 +189,7 @@ def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
     sys.stdout = open(kept, "w", closefd=False)  # noqa: SIM115 - closed below
     loop.add_reader(coming, read)
     try:
-        yield
+        yield denials
     finally:
         loop.remove_reader(coming)
         os.dup2(kept, 1)

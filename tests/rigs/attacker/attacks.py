@@ -5,6 +5,7 @@ worst once, and put it into `ATTACKS`: it is called again and again.
 """
 
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -143,6 +144,7 @@ def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> No
     """Attack until the time is over. Prints how often, and how often the link was refused or lost."""
     role, _, name = holder.partition("=")
     by = Attacker(endpoint, Path(ring) if ring else None, role, name)
+    os.nice(15)  # it stands for one on another machine, and takes no processor of the robot
     end, times, refused = time.monotonic() + float(seconds), 0, 0
     while time.monotonic() < end:
         try:
