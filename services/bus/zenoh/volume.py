@@ -25,8 +25,17 @@ TO_JOIN = 64 * 1024
 LOUD = 16 * 1024 * 1024
 """Bytes in a second from which on it is told of anybody. A process may hand out that much when it is asked for its
 past; nobody of ours does so again and again."""
-_BYTES_RECEIVED = 128
-"""Place of `tcpi_bytes_received` in the kernel's `struct tcp_info`."""
+EXCUSED = 4
+"""Bytes that a holder may send besides for each that it gets: who is asked much has to answer."""
+_COUNTS = 120
+"""Place of `tcpi_bytes_acked` and `tcpi_bytes_received` in the kernel's `struct tcp_info`."""
+
+
+class Volume(NamedTuple):
+    """Bytes that a link has brought since it opened, and that it has carried away."""
+
+    brought: int
+    taken: int = 0
 
 
 class Verdict(NamedTuple):
@@ -45,17 +54,20 @@ class Volumes:
 
     def __init__(self, now: Seconds) -> None:
         self._at = now
-        self._before: Mapping[str, int] = {}
+        self._before: Mapping[str, Volume] = {}
         self._left: dict[str, float] = {}
         """Bytes that a holder may still send; of one who is not here, as many as it can save."""
         self._loud: set[str] = set()
 
-    def look(self, received: Mapping[str, int], names: Mapping[str, str], now: Seconds) -> Verdict:
-        """Take how many bytes each link has brought so far. names: common names at the other ends, by link."""
+    def look(self, volumes: Mapping[str, Volume], names: Mapping[str, str], now: Seconds) -> Verdict:
+        """Take the volumes of all links. names: common names at the other ends, by link."""
         span, self._at = now - self._at, now
-        new = received.keys() - self._before.keys()
-        came = {link: total - self._before.get(link, 0) for link, total in received.items()}
-        self._before = received
+        new = volumes.keys() - self._before.keys()
+        came = {}
+        for link, (brought, taken) in volumes.items():
+            before = self._before.get(link, Volume(TO_JOIN))
+            came[link] = max(0, brought - before.brought - EXCUSED * (taken - before.taken))
+        self._before = volumes
         links: dict[str, list[str]] = {name: [] for name in self._left}
         verdict = Verdict([], [])
         for link, size in came.items():
@@ -67,14 +79,13 @@ class Volumes:
             if rate is None:
                 continue
             most = rate * max(len(its), 1)
-            spent = sum(came[link] - (TO_JOIN if link in new else 0) for link in its)
-            before = self._left.get(name, most * SAVED)
-            left = self._left[name] = min(before + most * span, most * SAVED) - max(0, spent)
+            had = self._left.get(name, most * SAVED)
+            left = self._left[name] = min(had + most * span, most * SAVED) - sum(came[link] for link in its)
             if left == most * SAVED and not its:
                 del self._left[name]
             if left < 0:
                 verdict.closed.extend(link for link in its if link in new or came[link] > rate * span / 8)
-                if before >= 0:
+                if had >= 0:
                     verdict.told.append(_too_much(name, rate, LOOK - left / most))
         return verdict
 
@@ -104,7 +115,7 @@ class Listening:
         self._timer.cancel()
 
     def _look(self) -> None:
-        told, closed = self._volumes.look(received(), self._names, self._loop.time())
+        told, closed = self._volumes.look(volumes(), self._names, self._loop.time())
         for line in told:
             self._tell(line)
         if closed:
@@ -115,13 +126,14 @@ class Listening:
         self._timer = self._loop.call_later(LOOK, self._look)
 
 
-def received() -> dict[str, int]:
-    """Bytes that have come in by each TCP link of this process, by its other end. Nothing where no kernel tells."""
+def volumes() -> dict[str, Volume]:
+    """Volume of each TCP link of this process, by its other end. Nothing where no kernel tells."""
     found = {}
     for where, link in _links():
         with suppress(OSError, AttributeError, struct.error):
-            told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _BYTES_RECEIVED + 8)
-            (found[where],) = struct.unpack_from("Q", told, _BYTES_RECEIVED)
+            told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _COUNTS + 16)
+            taken, brought = struct.unpack_from("QQ", told, _COUNTS)
+            found[where] = Volume(brought, taken)
     return found
 
 
