@@ -1,8 +1,8 @@
-"""How much each holder sends to a router, and what becomes of one who sends too much.
+"""Who sends a lot to a router: bytes of each link, from the kernel.
 
-Zenoh bounds the size of a message (`sizes.py`), and drops one that is too large without a word. It does not bound how
-many come in. So the router looks at what the kernel counts of each link. It tells who is loud, and closes the links
-of a holder whose role has a bound (`MOST_A_SECOND`) and has used it up.
+Zenoh drops a message that is too large before it is whole, and says nothing of it; nor does it count. The router does
+not close the link of one who is loud: while Zenoh closes a link it stalls those who answer on it
+(docs/decisions/0111-a-flood-is-told-and-not-cut.md).
 """
 
 import asyncio
@@ -13,18 +13,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
-from engage_hri.schemas.limits import MOST_A_SECOND
+from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
 
-LOOK: Seconds = 0.5
+LOOK: Seconds = 1.0
 """Time between two looks at the links."""
-SAVED: Seconds = 4.0
-"""Time for which a holder that has sent nothing may send at once what it did not."""
-TO_JOIN = 64 * 1024
-"""Bytes that a new link may have brought besides: a handshake, and what a process declares."""
-LOUD = 16 * 1024 * 1024
-"""Bytes in a second from which on it is told of anybody. A process may hand out that much when it is asked for its
-past; nobody of ours does so again and again."""
 EXCUSED = 4
 """Bytes that a holder may send besides for each that it gets: who is asked much has to answer."""
 _COUNTS = 120
@@ -38,70 +31,37 @@ class Volume(NamedTuple):
     taken: int = 0
 
 
-class Verdict(NamedTuple):
-    """What follows from a look: lines to tell, and the links to close."""
-
-    told: list[str]
-    closed: list[str]
-
-
 class Volumes:
-    """What each holder may still send. Pure: time is an argument.
-
-    What the links of a holder bring counts together, and so does what they may bring. A holder that has sent too much
-    loses the links that did it, and each new one, until the time is over in which it might have sent as much.
-    """
+    """Tells when a link begins to be loud. Pure: time is an argument."""
 
     def __init__(self, now: Seconds) -> None:
         self._at = now
         self._before: Mapping[str, Volume] = {}
-        self._left: dict[str, float] = {}
-        """Bytes that a holder may still send; of one who is not here, as many as it can save."""
-        self._loud: set[str] = set()
+        self._loud: frozenset[str] = frozenset()
 
-    def look(self, volumes: Mapping[str, Volume], names: Mapping[str, str], now: Seconds) -> Verdict:
-        """Take the volumes of all links. names: common names at the other ends, by link."""
-        span, self._at = now - self._at, now
-        new = volumes.keys() - self._before.keys()
-        came = {}
-        for link, (brought, taken) in volumes.items():
-            before = self._before.get(link, Volume(TO_JOIN))
-            came[link] = max(0, brought - before.brought - EXCUSED * (taken - before.taken))
+    def look(self, volumes: Mapping[str, Volume], names: Mapping[str, str], now: Seconds) -> list[str]:
+        """Take the volumes of all links; returns the lines to tell.
+
+        names: common names of the other ends, by link.
+        """
+        span, self._at = max(now - self._at, LOOK), now
+        speeds = {link: self._came(link, volume) / span for link, volume in volumes.items()}
         self._before = volumes
-        links: dict[str, list[str]] = {name: [] for name in self._left}
-        verdict = Verdict([], [])
-        for link, size in came.items():
-            name = names.get(link, "")
-            links.setdefault(name, []).append(link)
-            self._tell_loud(verdict, link, name or link, size / max(span, LOOK))
-        for name, its in links.items():
-            rate = MOST_A_SECOND.get(name.split("/")[1]) if name else None
-            if rate is None:
-                continue
-            most = rate * max(len(its), 1)
-            had = self._left.get(name, most * SAVED)
-            left = self._left[name] = min(had + most * span, most * SAVED) - sum(came[link] for link in its)
-            if left == most * SAVED and not its:
-                del self._left[name]
-            if left < 0:
-                verdict.closed.extend(link for link in its if link in new or came[link] > rate * span / 8)
-                if had >= 0:
-                    verdict.told.append(_too_much(name, rate, LOOK - left / most))
-        return verdict
+        loud = frozenset(link for link, speed in speeds.items() if speed > _bound(names.get(link, "")))
+        begun, self._loud = loud - self._loud, loud
+        return [f"loud: {names.get(link, link)} sends {speeds[link] / 1e6:.1f} MB a second" for link in sorted(begun)]
 
-    def _tell_loud(self, verdict: Verdict, link: str, name: str, speed: float) -> None:
-        """Tell of a link that begins to be loud. speed: bytes a second."""
-        if speed > LOUD and link not in self._loud:
-            verdict.told.append(f"loud: {name} sends {speed / 1e6:.0f} MB a second")
-        (self._loud.add if speed > LOUD else self._loud.discard)(link)
+    def _came(self, link: str, volume: Volume) -> int:
+        before = self._before.get(link, Volume(0))
+        return volume.brought - before.brought - EXCUSED * (volume.taken - before.taken)
 
 
-def _too_much(name: str, rate: int, span: Seconds) -> str:
-    return f"too much: {name} has sent more than {rate // 1024} kB a second; its links are closed for {span:.1f} s"
+def _bound(name: str) -> int:
+    return LOUD.get(name.split("/")[1], LOUD_ROBOT) if name else LOUD_ROBOT
 
 
 class Listening:
-    """Looks at the links of this process, and acts on what it sees, until it is closed."""
+    """Looks at the links of this process, and tells who is loud, until it is closed."""
 
     def __init__(self, names: Mapping[str, str], tell: Callable[[str], None]) -> None:
         """names: common names by the address at the other end of a link."""
@@ -115,14 +75,8 @@ class Listening:
         self._timer.cancel()
 
     def _look(self) -> None:
-        told, closed = self._volumes.look(volumes(), self._names, self._loop.time())
-        for line in told:
+        for line in self._volumes.look(volumes(), self._names, self._loop.time()):
             self._tell(line)
-        if closed:
-            for where, link in _links():
-                if where in closed:
-                    with suppress(OSError):
-                        link.shutdown(socket.SHUT_RDWR)
         self._timer = self._loop.call_later(LOOK, self._look)
 
 
