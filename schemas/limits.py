@@ -29,8 +29,8 @@ LARGER: dict[str, int] = {
 }  # fmt: skip
 """Bytes of a message, and of a question or an answer, on keys that take more than `SMALL`."""
 LOUD = {"observer": 256 * 1024, "operator": 256 * 1024, "manager": MEDIUM, "wizard": 2 * MEDIUM}
-"""Bytes a second from which on a router tells that a holder of a role is loud. A manager who asks for 10,000 fragments
-at once sends 0.4 MB a second."""
+"""Bytes a second from which on a router tells that a holder of this role is loud. A manager who asks for 10,000
+fragments at once sends some 0.4 MB a second."""
 LOUD_ROBOT = 16 * 1024 * 1024
 """The same for all others. A service hands out that much when it is asked for its past."""
 MOST_PULSES = 20
