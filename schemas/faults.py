@@ -1,8 +1,29 @@
 """Faults (reason, place, advice) as a message, and the small hierarchy of exceptions that carry them."""
 
+from collections.abc import Mapping
+from typing import Literal
+
 from msgspec import Struct
 from msgspec.structs import force_setattr, replace
 
+Cause = Literal[
+    "", "restarted", "gone", "unlinked", "silent", "unrenewed", "forgotten", "late", "cancelled", "replaced", "closed"
+]  # fmt: skip
+CAUSES: Mapping[Cause, str] = {
+    "restarted": "It has started again; its new process knows nothing of what was asked of the one before.",
+    "gone": "It is not seen any more: it has ended or stands still, or its machine or the network between does.",
+    "unlinked": "The service that reports this had no router, so that it could see nobody.",
+    "silent": "It is seen, and has not answered.",
+    "unrenewed": "It has not renewed in time what it had asked for.",
+    "forgotten": "It does not know what it is asked about: it has started again since, or had to forget it.",
+    "late": "It has not done in time what it was to do.",
+    "cancelled": "It has asked that this ends.",
+    "replaced": "It has asked for something else instead.",
+    "closed": "It has left the bus, and had asked for this.",
+}
+"""What can have happened, as far as the service that reports it can know. `whose`: the participant that did it."""
+ROUTER = "router"
+"""Whose fault it is where the cause is `unlinked`."""
 LONGEST_TEXT = 2500
 """Characters of each text in a fault. The rest is cut off: a fault has to fit into a message, in any form."""
 
@@ -11,6 +32,8 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     """A refusal or failure, as it crosses the bus and as people read it.
 
     reason: what is wrong. advice: what to do about it. service: the one that reports it.
+    cause: what happened, one of `CAUSES`; empty: nothing did, the service itself could not, or would not, as the
+    reason says. whose: the participant to which it happened, or that did it; `ROUTER`.
     """
 
     reason: str
@@ -20,6 +43,8 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     """Line of the XML source, from 1; 0 when there is none."""
     advice: str = ""
     service: str = ""
+    cause: Cause = ""
+    whose: str = ""
 
     def __post_init__(self) -> None:
         """Make sure that a fault can always be sent: shorten texts, and write half characters with backslashes.
@@ -27,11 +52,19 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
         Python itself makes such text, for example of file names that are not UTF-8. What is refused may be quoted in
         the reason, whatever its length.
         """
-        for name in ("reason", "where", "advice", "service"):
+        for name in ("reason", "where", "advice", "service", "whose"):
             text = getattr(self, name)
             if isinstance(text, str) and not (text.isascii() and len(text) <= LONGEST_TEXT):
                 text = text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 3]}..."
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
+
+    def at(self, where: str, line: int = 0) -> "Fault":
+        """The same fault, told of something that it has ended."""
+        return replace(self, where=where, line=line or self.line)
+
+    def following(self, reason: str, where: str) -> "Fault":
+        """Fault of something that ended as something else did: of the same cause, and that is told in the reason."""
+        return replace(self, reason=f"{reason}: {self.reason}", where=where, line=0, advice="")
 
     def within(self, *names: str) -> str:
         """Write it without the beginning of its place that is told already.

@@ -11,7 +11,7 @@ from typing import ClassVar, Self, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Cause, Fault
 from engage_hri.schemas.units import Seconds, Stamp
 
 
@@ -57,21 +57,27 @@ class Request(Struct, frozen=True, kw_only=True, omit_defaults=True):
         return self
 
 
-LAPSED = "nobody has renewed it"
-GONE = "requester is gone"
-CLOSED = "requester closed"
-ORPHANED = frozenset((LAPSED, GONE, CLOSED))
-"""Reasons of a `Cancel` that nobody wants: there is nobody any more who asked."""
+ORPHANING: frozenset[Cause] = frozenset(("restarted", "gone", "unlinked", "unrenewed", "closed"))
+"""Causes of a `Cancel` that nobody wants: there is nobody any more who asked."""
 
 
 class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=True):
     """cmd: end one's own request `id`, as interrupted. It counts only from the process that has asked.
 
     of: the kind of that request, its `type`; empty: any kind.
+    reason, cause, whose: why, as a `Fault` says it; the outcome repeats them. Without a cause it is `cancelled`, by
+    the requester.
     """
 
     of: str = ""
     reason: str = ""
+    cause: Cause = ""
+    whose: str = ""
+
+    def fault(self, where: str) -> Fault:
+        """What the outcome of the request says of its end."""
+        cause, whose = (self.cause, self.whose) if self.cause else ("cancelled", self.requester)
+        return Fault(reason=self.reason or "cancelled", where=where, cause=cause, whose=whose)
 
 
 class Kept(Struct, frozen=True, array_like=True):

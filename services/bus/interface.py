@@ -10,10 +10,11 @@ import platform
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine, Iterator
+from math import inf
 from typing import Any, Self
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
@@ -78,6 +79,23 @@ class Bus(ABC):
     @abstractmethod
     def error(self, clock: str) -> Seconds:
         """Greatest error of `local` for stamps of this clock; inf if nothing is known of it yet."""
+
+    @property
+    def unlinked_at(self) -> Seconds:
+        """Local time at which this process last had no router, though it had had one; -inf: never."""
+        return -inf
+
+    def unanswered(self, key: str, within: Seconds) -> NoReply:
+        """The error of a question that nobody has answered, with the reason as far as it can be known here."""
+        server = keys.server_of(key)
+        cause: Cause
+        cause, whose, why, advice = "gone", server, "it is not there", f"is {server} running?"
+        if self.unlinked_at >= self.now() - within:
+            cause, whose, why, advice = "unlinked", ROUTER, f"{self.name} has had no router", ""
+        elif server in self.health.peers:
+            cause, why, advice = "silent", "it is there, but does not answer", f"is {server} stuck?"
+        reason = f"no reply from {server} within {within:g} s: {why}"
+        return NoReply(Fault(reason=reason, where=key, advice=advice, service=self.name, cause=cause, whose=whose))
 
     def new_life(self) -> str:
         """Make the life of a requester on this bus: two requesters may use the same ids then."""

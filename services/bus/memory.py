@@ -10,7 +10,7 @@ import msgspec
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.faults import EngageError, InputRefused
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, in_form, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -345,7 +345,7 @@ class MemoryBus(Bus):
                 break
             if server.is_there:
                 return self._answer_of(task, server, key)
-        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        raise self.unanswered(key, timeout)
 
     def _answer_of(self, task: "asyncio.Task[Message]", server: "MemoryBus", key: str) -> Message:
         """The answer that a server has given in steps. Raises InputRefused."""

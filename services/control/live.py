@@ -41,9 +41,10 @@ class LiveBehavior:
         behavior = self.request.behavior
         return behavior.text[: self.position] if isinstance(behavior, Speech) else ""
 
-    def lapse(self, reason: str) -> None:
-        """Note that it is to end because its requester is lost."""
-        self.aborted, self.fault = "lapsed", Fault(reason=reason, where=self.label, service="control")
+    def stop(self, why: Fault, status: Status = "aborted") -> None:
+        """Note why it is to end early. status: `lapsed` without its requester."""
+        if self.fault is None:
+            self.aborted, self.fault = status, why
 
     def hold(self, is_held: bool) -> None:
         """Hold it on request, or no more."""

@@ -5,6 +5,8 @@ import logging
 from contextlib import aclosing, nullcontext
 from functools import partial
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.body import (
@@ -159,6 +161,7 @@ class _Control:
                 self.switch.serve(request)
                 self.shown.look_soon()
             case Cancel() if live is not None:
+                live.stop(request.fault(live.label))
                 self._revoke(live)
             case GoHome():
                 self.desk.accept(request.id)
@@ -167,7 +170,7 @@ class _Control:
                 way.add_done_callback(lambda _: self._homeward.pop(request.id, None))
             case Cancel(id=id) if id in self._homeward:
                 self._homeward[id].cancel()
-                self.desk.refuse(id, Fault(reason="given up on the way home", where=id, service="control"))
+                self.desk.refuse(id, request.fault(id).following("given up on the way home", id))
 
     def _begin(self, request: PerformBehavior) -> None:
         refused = self.questions.refused(request.behavior)  # before a motor sees it
@@ -192,6 +195,7 @@ class _Control:
             return
         self.desk.accept(request.id)
         for live in meant:
+            live.stop(Fault(reason="the body aborted it", where=label, cause="cancelled", whose=request.requester))
             self._revoke(live, request.how)
             live.aborts.append(request.id)
 
@@ -242,7 +246,11 @@ class _Control:
             if isinstance(error, DriverBroken) or not isinstance(error, BodyFailed):
                 self._take_home(f"after {live.label} broke")  # nobody knows where its parts are
         if live.status == "aborted":
-            live.status = "taken_over" if live.authority.revoked == "taken_over" else live.aborted
+            live.status = live.aborted
+            if live.authority.revoked == "taken_over":
+                reason, by = "another behavior took its part", request.requester
+                live.status = "taken_over"
+                live.fault = Fault(reason=reason, where=live.label, cause="replaced", whose=by)
         self._finish(live)
 
     def _give_up(self, live: LiveBehavior) -> None:
@@ -377,12 +385,12 @@ class _Control:
         live = self._live.get(cancel.id)
         if live is None:
             return
-        live.lapse(f"{cancel.requester}: {cancel.reason}")
+        live.stop(cancel.fault(live.label), "lapsed")
         self._revoke(live)
         others = (each for each in self._live.values() if each.request.requester == cancel.requester)
         if all(each.authority.revoked for each in others):
-            reason = f"{cancel.requester}: {cancel.reason}; the body goes home"
-            warn(self._bus, Fault(reason=reason, service="control"))
+            why = cancel.fault("")
+            warn(self._bus, replace(why, reason=f"{why.reason}; the body goes home", service="control"))
             self._take_home(f"after {cancel.requester}")
 
     def close(self) -> None:

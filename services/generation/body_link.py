@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, Hand
 from engage_hri.schemas.body import Capabilities, DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
-from engage_hri.schemas.faults import Fault, NoReply, RunFailed
+from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
@@ -87,11 +87,5 @@ class BodyLink:
         return answer.items
 
     async def _ask(self, key: str, question: Message) -> Message:
-        """The body's answer; the question is repeated while a body may still come up."""
-        until = self._bus.now() + self._patience
-        while True:
-            try:
-                return await self._bus.query(key, question)
-            except NoReply:
-                if self._bus.now() >= until:
-                    raise
+        """The body's answer; the question waits while a body may still come up."""
+        return await self._bus.query(key, question, self._patience)

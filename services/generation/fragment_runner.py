@@ -125,12 +125,12 @@ class FragmentRunner:
             performance.accepted = True
             self._desk.accept(performance.request.id)
 
-    def cancel(self, id: str, reason: str, now: Seconds) -> None:
+    def cancel(self, id: str, why: Fault, now: Seconds) -> None:
         """Cancel the fragment of request `id`, if it is here, and with it the rest of its turn."""
         if (performance := self._live.get(id)) is None:
             return
-        aborted = self._turns.fragment_ended(performance.fragment.id, complete=False, now=now, reason=reason)
-        self._interrupt({performance.fragment.id, *(aborted.fragments if aborted else ())}, reason, now)
+        aborted = self._turns.fragment_ended(performance.fragment.id, complete=False, now=now, why=why)
+        self._interrupt({performance.fragment.id, *(aborted.fragments if aborted else ())}, why, now)
         self._abort(aborted, now)
 
     def feed(
@@ -432,22 +432,20 @@ class FragmentRunner:
             aborted = self._turns.fragment_refused(fragment.id, now)
         else:
             complete = performance.status == "done" or performance.lost_motions_only
-            reason = f"{fragment.id} {performance.status}"
-            aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, reason=reason)
+            aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, why=performance.why)
         self._abort(aborted, now)
         if target := self._turns.averted_to:
             self._arbiter.think(target)
 
-    def _interrupt(self, fragments: Collection[str], reason: str, now: Seconds) -> None:
+    def _interrupt(self, fragments: Collection[str], why: Fault, now: Seconds) -> None:
         """End these fragments, the latest first: a block that follows another's words must not begin as those end."""
         for performance in reversed(self._live.values()):
             if performance.is_over or performance.fragment.id not in fragments:
                 continue
             if performance.plan is not None:
-                self._requests.cancel(performance.block_id, reason)
+                self._requests.cancel(performance.block_id, why)
             else:
-                fault = Fault(reason=reason, where=performance.fragment.id)
-                performance.end(Ended(now, "interrupted", fault=fault))
+                performance.end(Ended(now, "interrupted", fault=why.at(performance.fragment.id)))
 
     def _abort(self, aborted: Aborted | None, now: Seconds) -> None:
         """End the fragments of a turn that has ended early, and tell recognition of it. None: no turn has."""
@@ -455,7 +453,7 @@ class FragmentRunner:
             return
         self._arbiter.stop_thinking()
         self._outcomes.abort(aborted, now)
-        self._interrupt(aborted.fragments, aborted.reason, now)
+        self._interrupt(aborted.fragments, aborted.why, now)
         if not aborted.is_known:
             return
         self._signals += 1

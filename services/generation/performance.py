@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import (
     Behavior,
@@ -286,6 +287,13 @@ class FragmentPerformance:
     def is_over(self) -> bool:
         """True once the block has ended. The outcome may still have to wait for events to be decided."""
         return self._ended is not None
+
+    @property
+    def why(self) -> Fault:
+        """Why what belongs to the same turn ends with it."""
+        status = f"{self.fragment.id} {self.status}"
+        fault = self._ended.fault if self._ended else None
+        return Fault(reason=status) if fault is None else replace(fault, reason=status)
 
     @property
     def status(self) -> str:

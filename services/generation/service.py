@@ -2,6 +2,9 @@
 
 import asyncio
 from collections.abc import Iterable
+from typing import Literal
+
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -16,7 +19,7 @@ from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
-from engage_hri.schemas.requests import GONE, LAPSED, Cancel, Request, Unreadable
+from engage_hri.schemas.requests import ORPHANING, Cancel, Request, Unreadable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received
@@ -25,6 +28,7 @@ from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragment_runner import FragmentRunner
 from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.requests.causes import Sight
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.runtime.publisher import Publisher
@@ -226,12 +230,11 @@ class _Generation:
         """End a lease or a fragment: its requester asked for that, is gone, or has not renewed it."""
         now = self._bus.now()
         if self._leases.release(cancel.id):
-            reason = {GONE: "owner_lost", LAPSED: "lapsed"}.get(cancel.reason, "released")
-            self._desk.end(InhibitionEnded(id=cancel.id, reason=reason))  # type: ignore[arg-type]
+            self._desk.end(InhibitionEnded(id=cancel.id, reason=_how(cancel)))
         elif self._early.pop(cancel.id, None):
-            self._desk.refuse(cancel.id, Fault(reason="cancelled", where=cancel.id))
+            self._desk.refuse(cancel.id, cancel.fault(cancel.id))
         else:
-            self._runner.cancel(cancel.id, cancel.reason or "cancelled", now)
+            self._runner.cancel(cancel.id, cancel.fault(cancel.id), now)
         self._after(now)
 
     async def perform(self) -> None:
@@ -267,8 +270,10 @@ class _Generation:
                 if self._world(now) is not None:
                     self._admit(request, now, until)  # too late to wait: refuses it for the missing person
                     continue
-                fault = Fault(reason="the world is unknown", where=id, advice="is perception running?")
-                self._refuse(id, fault)
+                since, advice = now - self._config.world_patience, "is perception running?"
+                sight, name = Sight(NAME, self._bus.unlinked_at), self._perception.name or "perception"
+                fault = sight.misses(name, id, since, now).following("the world is unknown", id)
+                self._refuse(id, replace(fault, advice=advice))
         for id, fault in self._runner.settle(now):
             self._refuse(id, fault)
         self._rule(now)
@@ -298,3 +303,10 @@ class _Generation:
                 self._changed.set()
 
         pending.outcome.add_done_callback(ended)  # type: ignore[arg-type]
+
+
+def _how(cancel: Cancel) -> Literal["lapsed", "released", "owner_lost"]:
+    """How an inhibition ends that is cancelled so."""
+    if cancel.cause == "unrenewed":
+        return "lapsed"
+    return "owner_lost" if cancel.cause in ORPHANING - {"closed"} else "released"

@@ -121,8 +121,7 @@ class _Realizer:
 
     def cancel(self, cancel: Cancel) -> None:
         if live := self.live.get(cancel.id):
-            reason = cancel.reason or "cancelled"
-            live.stop(Ending("interrupted", Fault(reason=reason, where=live.id)))
+            live.stop(Ending("interrupted", cancel.fault(live.id)))
 
     async def interrupt(self, request: InterruptBehavior) -> None:
         """End one behavior of a block, and answer what came of it."""
@@ -212,7 +211,9 @@ class _Realizer:
         replaced = [each for each in performed if each is not None]
         if replaces:
             for other in earlier:
-                other.stop(Ending("interrupted", replaced_by=live.id))
+                by = live.request.requester
+                fault = Fault(reason=f"{live.id} replaced it", where=other.id, cause="replaced", whose=by)
+                other.stop(Ending("interrupted", fault, replaced_by=live.id))
         leaders = {other.block.id for other in earlier}
         waiting = WaitingBlock(
             plan, self.live_blocks, self.bus.now, leaders, lambda: self.steering.held(live) is None

@@ -16,7 +16,15 @@ from math import inf
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError, Fault, NeverEnded, OutcomeUnknown, RequestRefused, ServerRestarted
+from engage_hri.schemas.faults import (
+    Cause,
+    EngageError,
+    Fault,
+    NeverEnded,
+    OutcomeUnknown,
+    RequestRefused,
+    ServerRestarted,
+)
 from engage_hri.schemas.requests import (
     Accepted,
     Answer,
@@ -40,6 +48,7 @@ from engage_hri.services.requests.asking_effects import (
     TellEnd,
 )
 from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
+from engage_hri.services.requests.causes import NEVER, Sight
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.records import ANEW, unwieldy
@@ -67,6 +76,7 @@ class Asking:
 
     def __init__(self, requester: str, life: str, patience: Patience) -> None:
         self._requester = requester
+        self._sight = Sight(requester)
         self._life = life
         self._patience = patience
         self._asked: dict[str, Asked] = {}
@@ -129,9 +139,9 @@ class Asking:
     def _lease(self, request: Request) -> Seconds:
         return request.term if 0.0 < request.term < inf else self._patience.lease
 
-    def cancel(self, id: str, reason: str, now: Seconds) -> list[Effect]:
+    def cancel(self, id: str, why: Fault, now: Seconds) -> list[Effect]:
         """Cancel the request; without effect if it has ended or is being cancelled."""
-        self._cancel(id, reason, now)
+        self._cancel(id, why, now)
         return self._new_effects()
 
     def forget(self, id: str, now: Seconds) -> list[Effect]:
@@ -143,13 +153,13 @@ class Asking:
             self._answered(asked, now)
         return self._new_effects()
 
-    def _cancel(self, id: str, reason: str, now: Seconds) -> None:
+    def _cancel(self, id: str, why: Fault, now: Seconds) -> None:
         asked = self._asked.get(id)
         if asked is None or asked.cancel is not None:
             return
-        asked.cancel = self._cancellation(asked, reason)
+        asked.cancel = self._cancellation(asked, why)
         if not asked.is_sent:
-            fault = Fault(reason="cancelled before it was sent", where=id, service=asked.server)
+            fault = asked.cancel.fault(id).following("cancelled before it was sent", id)
             self._step(asked, Event.REFUSED, now, Refused(id=id, fault=fault))
         else:
             self._step(asked, Event.CANCELLED, now)
@@ -186,14 +196,15 @@ class Asking:
             asked.run = asked.run or run
         return self._new_effects()
 
-    def tick(self, now: Seconds) -> list[Effect]:
-        """Carry out all that is due by now."""
+    def tick(self, now: Seconds, unlinked_at: Seconds = NEVER) -> list[Effect]:
+        """Carry out all that is due by now. unlinked_at: when this process last had no router."""
+        self._sight.unlinked_at = unlinked_at
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if event is None:
                 self._renew(name, now)
             elif event is Event.CANCELLED:
-                self._cancel(name, "it has taken too long", now)
+                self._cancel(name, Fault(reason="it has taken too long", cause="late", whose=self._late(name)), now)
             elif (asked := self._asked.get(name)) is not None:
                 self._step(asked, event, now)
         return self._new_effects()
@@ -253,7 +264,7 @@ class Asking:
         self._effects.append(Publish(expression, asked.cancel or asked.request))
 
     def _withdraw(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        asked.cancel = asked.cancel or self._cancellation(asked, "given up")
+        asked.cancel = asked.cancel or self._cancellation(asked, Fault(reason="given up"))
         self._send_and_repeat(asked, now, answer, is_first=True)
 
     def _send_no_more(self, asked: Asked, now: Seconds, answer: _Said) -> None:
@@ -296,25 +307,40 @@ class Asking:
         assert isinstance(answer, Refused)
         self._effects.append(TellEnd(asked.request.id, error(answer.fault)))
 
-    def _tell_failed(self, asked: Asked, now: Seconds, answer: _Said, *, error: type[EngageError], why: str) -> None:
-        self._fail(asked, error, why)
+    def _tell_gone(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+        missed = self._sight.misses(asked.server, asked.request.id, now - self._patience.grace, now, ANEW)
+        self._fail(asked, OutcomeUnknown(missed))
+
+    def _tell_reborn(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+        self._fail(asked, ServerRestarted(self._sight.restarted(asked.server, asked.request.id, ANEW)))
 
     def _tell_silent(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        self._fail(asked, OutcomeUnknown, f"is there, but has not answered for {self._patience.silence:g} s")
+        why = f"is there, but has not answered for {self._patience.silence:g} s"
+        self._fail(asked, OutcomeUnknown(self._fault(asked, why, "silent", ANEW)))
 
     def _tell_unstoppable(self, asked: Asked, now: Seconds, answer: _Said) -> None:
         why = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
-        fault = self._fail(asked, NeverEnded, why, f"is {asked.server} stuck? It is not asked any more")
+        fault = self._fault(asked, why, "late", f"is {asked.server} stuck? It is not asked any more")
+        self._fail(asked, NeverEnded(fault))
         self._effects.append(Complain(fault))
 
-    def _fail(self, asked: Asked, error: type[EngageError], why: str, advice: str = ANEW) -> Fault:
-        fault = Fault(reason=f"{asked.server} {why}", where=asked.request.id, advice=advice, service=asked.server)
-        self._effects.append(TellEnd(asked.request.id, error(fault)))
-        return fault
+    def _fault(self, asked: Asked, why: str, cause: Cause, advice: str) -> Fault:
+        return Fault(
+            reason=f"{asked.server} {why}", where=asked.request.id, advice=advice, service=self._requester,
+            cause=cause, whose=asked.server,
+        )  # fmt: skip
 
-    def _cancellation(self, asked: Asked, reason: str) -> Cancel:
-        request = asked.request
-        return Cancel(id=request.id, requester=self._requester, life=self._life, of=kind_of(request), reason=reason)
+    def _fail(self, asked: Asked, error: EngageError) -> None:
+        self._effects.append(TellEnd(asked.request.id, error))
+
+    def _late(self, id: str) -> str:
+        return self._asked[id].server if id in self._asked else ""
+
+    def _cancellation(self, asked: Asked, why: Fault) -> Cancel:
+        return Cancel(
+            id=asked.request.id, requester=self._requester, life=self._life, of=asked.kind, reason=why.reason,
+            cause=why.cause, whose=why.whose,
+        )  # fmt: skip
 
     # -- keeping alive --------------------------------------------------------------------------------------------
 
@@ -391,8 +417,8 @@ _ACTIONS: Mapping[Do, Callable[[Asking, Asked, Seconds, _Said], None]] = {
     Do.TELL_OUTCOME: Asking._tell_outcome,
     Do.TELL_REFUSED: partial(Asking._tell_refused, error=RequestRefused),
     Do.TELL_FORGOTTEN: partial(Asking._tell_refused, error=OutcomeUnknown),
-    Do.TELL_GONE: partial(Asking._tell_failed, error=OutcomeUnknown, why="is gone"),
-    Do.TELL_REBORN: partial(Asking._tell_failed, error=ServerRestarted, why="was restarted"),
+    Do.TELL_GONE: Asking._tell_gone,
+    Do.TELL_REBORN: Asking._tell_reborn,
     Do.TELL_SILENT: Asking._tell_silent,
     Do.TELL_UNSTOPPABLE: Asking._tell_unstoppable,
 }

@@ -30,7 +30,6 @@ from engage_hri.schemas.faults import (
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import (
-    CLOSED,
     Accepted,
     Answer,
     Cancel,
@@ -103,12 +102,13 @@ class Requester:
         pending.end(error)
         return pending
 
-    def cancel(self, id: str, reason: str = "") -> None:
+    def cancel(self, id: str, why: Fault | str = "") -> None:
         """Ask the server to end request `id` as interrupted; its outcome still comes, or it fails for want of it.
 
-        A server that has never got the request refuses it.
+        A server that has never got the request refuses it. why: told in the outcome, with its cause.
         """
-        self._carry_out(self._asking.cancel(id, reason, self._bus.now()))
+        fault = why if isinstance(why, Fault) else Fault(reason=why)
+        self._carry_out(self._asking.cancel(id, fault, self._bus.now()))
 
     def state(self, id: str) -> State:
         """State of request `id`; ENDED if it is not known."""
@@ -130,7 +130,7 @@ class Requester:
         return True
 
     def _tick(self) -> None:
-        self._carry_out(self._asking.tick(self._bus.now()))
+        self._carry_out(self._asking.tick(self._bus.now(), self._bus.unlinked_at))
 
     def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
@@ -169,7 +169,7 @@ class Requester:
     def close(self) -> None:
         """Stop sending again; what has not ended is cancelled at its server."""
         for id in self._asking.ids:
-            self.cancel(id, CLOSED)
+            self.cancel(id, Fault(reason="requester closed", cause="closed", whose=self._bus.name))
         self._fail_all(self._broken or RunFailed("the client is closed"))
 
     def _fail_all(self, error: EngageError) -> None:
@@ -334,6 +334,9 @@ class RequestDesk:
         self._answer(outcome.id, outcome)
 
     def _answer(self, name: str, answer: Answer) -> None:
+        fault = getattr(answer, "fault", None)
+        if fault is not None and not fault.service:
+            answer = replace(answer, fault=replace(fault, service=self._server))
         self._carry_out(self._serving.answer(name, answer, self._bus.now()))
 
     def _tick(self) -> None:
@@ -343,7 +346,7 @@ class RequestDesk:
             self._late_for = due
             self._alarm.set(now + LATE)
         else:
-            self._carry_out(self._serving.tick(now))
+            self._carry_out(self._serving.tick(now, self._bus.unlinked_at))
 
     def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""

@@ -24,7 +24,9 @@ class Record:
     kind: of the request, or of what a cancellation ends. is_held: the service was told to hold it.
     """
 
-    __slots__ = ("answer", "ended_at", "is_held", "key", "kind", "lease", "name", "request", "run", "sender", "state")
+    __slots__ = (
+        "answer", "ended_at", "is_held", "key", "kind", "lease", "name", "renewed_at", "request", "run",
+        "sender", "state")  # fmt: skip
 
     def __init__(self, name: str, request: Request, sender: str, run: str) -> None:
         self.name = name
@@ -38,6 +40,7 @@ class Record:
         self.state = State.UNKNOWN
         self.is_held = False
         self.answer: Answer | None = None
+        self.renewed_at: Seconds = -inf
         self.ended_at: Seconds = inf
 
 

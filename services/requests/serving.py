@@ -8,16 +8,13 @@ and id, and calls each by a name that no other request of this server has or had
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
 from math import inf
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Cause, Fault
 from engage_hri.schemas.requests import (
-    GONE,
-    LAPSED,
     Accepted,
     Answer,
     Cancel,
@@ -33,6 +30,7 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.requests.causes import NEVER, Sight
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.ended import Ended
 from engage_hri.services.requests.names import Names
@@ -69,6 +67,7 @@ class Serving:
 
     def __init__(self, server: str, term: Seconds | None = None) -> None:
         self._server = server
+        self._sight = Sight(server)
         self._term = term
         self._known: dict[tuple[Key, str], Record] = {}
         """Requests by key and kind, live or ended."""
@@ -180,8 +179,9 @@ class Serving:
             record.run = run
         return self._new_effects()
 
-    def tick(self, now: Seconds) -> list[Effect]:
-        """Carry out all that is due by now."""
+    def tick(self, now: Seconds, unlinked_at: Seconds = NEVER) -> list[Effect]:
+        """Carry out all that is due by now. unlinked_at: when this process last had no router."""
+        self._sight.unlinked_at = unlinked_at
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if (record := self._named.get(name)) is not None:
@@ -274,6 +274,7 @@ class Serving:
         sent, term = (cause.sent, cause.kept.valid) if isinstance(cause, Renewal) else (now, record.request.term)
         if not 0.0 < term < inf:
             term = inf if self._term is None else self._term
+        record.renewed_at = max(record.renewed_at, sent)
         if term < inf:
             self._deadlines.set(record.lease, max(self._deadlines[record.lease] or 0.0, sent + term))
         self._heard(record, sent, now)
@@ -318,11 +319,14 @@ class Serving:
 
     def _refuse_unheard(self, record: Record, now: Seconds, cause: _Cause) -> None:
         reason = f"cancelled before {self._server} had heard of it; it is refused should it come yet"
-        fault = self._fault(record.request.id, reason, "a cancellation names requester and life, too")
+        asked, advice = record.request, "a cancellation names requester and life, too"
+        fault = self._fault(asked.id, reason, advice, "cancelled", asked.requester)
         self._answer(record, now, Refused(id=record.name, fault=fault))
 
     def _refuse_forgotten(self, record: Record, now: Seconds, cause: _Cause) -> None:
-        self._refuse(record.request, f"{self._server} does not know it any more", ANEW)
+        id = record.request.id
+        fault = self._fault(id, f"{self._server} does not know it any more", ANEW, "forgotten", self._server)
+        self._effects.append(Publish(answering(record.request, Refused(id=id, fault=fault))))
 
     def _warn_different(self, record: Record, now: Seconds, cause: _Cause) -> None:
         which = "an ended" if record.state is _ENDED else "a live"
@@ -337,14 +341,24 @@ class Serving:
         named = request if request.id == record.name else replace(request, id=record.name)
         self._effects.append(Hand(named, is_asked))
 
-    def _hand_end(self, record: Record, now: Seconds, cause: _Cause, *, reason: str) -> None:
+    def _hand_gone(self, record: Record, now: Seconds, cause: _Cause) -> None:
+        self._hand_end(record, self._sight.misses(record.request.requester, record.name, now - GRACE, now))
+
+    def _hand_reborn(self, record: Record, now: Seconds, cause: _Cause) -> None:
+        self._hand_end(record, self._sight.restarted(record.request.requester, record.name))
+
+    def _hand_lapsed(self, record: Record, now: Seconds, cause: _Cause) -> None:
+        self._hand_end(record, self._sight.unrenewed(record.request.requester, record.name, record.renewed_at, now))
+
+    def _hand_end(self, record: Record, why: Fault) -> None:
         asked = record.request
-        self._hand(record, Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=reason))
+        lost = Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=why.reason, cause=why.cause)
+        self._hand(record, replace(lost, whose=why.whose))
 
     # -- faults ---------------------------------------------------------------------------------------------------
 
-    def _fault(self, where: str, reason: str, advice: str = "") -> Fault:
-        return Fault(reason=reason, where=where, advice=advice, service=self._server)
+    def _fault(self, where: str, reason: str, advice: str = "", cause: Cause = "", whose: str = "") -> Fault:
+        return Fault(reason=reason, where=where, advice=advice, service=self._server, cause=cause, whose=whose)
 
     def _refuse(self, request: Request, reason: str, advice: str) -> None:
         refusal = Refused(id=request.id, fault=self._fault(request.id, reason, advice))
@@ -366,8 +380,9 @@ _ACTIONS: Mapping[Do, Callable[[Serving, Record, Seconds, _Cause], None]] = {
     Do.HAND: Serving._hand_asked,
     Do.HAND_EXTENDED: Serving._hand_extended,
     Do.HAND_CANCEL: Serving._hand_asked,
-    Do.HAND_GONE: partial(Serving._hand_end, reason=GONE),
-    Do.HAND_LAPSED: partial(Serving._hand_end, reason=LAPSED),
+    Do.HAND_GONE: Serving._hand_gone,
+    Do.HAND_REBORN: Serving._hand_reborn,
+    Do.HAND_LAPSED: Serving._hand_lapsed,
     Do.RENEW: Serving._renew,
     Do.HOLD: Serving._hold,
     Do.WAIT_GRACE: Serving._wait_grace,

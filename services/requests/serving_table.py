@@ -64,6 +64,8 @@ class Do(Name):
     HAND_CANCEL = auto()
     HAND_GONE = auto()
     """Tell the service to end the request: the requester is gone."""
+    HAND_REBORN = auto()
+    """Tell the service to end the request: the requester has begun another life."""
     HAND_LAPSED = auto()
     """Tell the service to end the request: its lease is over."""
     RENEW = auto()
@@ -118,7 +120,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.END: (S.ENDED, Do.ANSWER),
         E.GONE: (S.TAKEN, Do.WAIT_GRACE, Do.HOLD),
         E.BACK: (S.TAKEN, Do.STOP_GRACE),
-        E.REBORN: (S.CANCELLED, Do.HAND_GONE),
+        E.REBORN: (S.CANCELLED, Do.HAND_REBORN),
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
         E.UNHEARD: (S.TAKEN, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
@@ -135,7 +137,7 @@ TABLE: Mapping[State, Mapping[Event, Row]] = {
         E.END: (S.ENDED, Do.ANSWER),
         E.GONE: (S.ACCEPTED, Do.WAIT_GRACE, Do.HOLD),
         E.BACK: (S.ACCEPTED, Do.STOP_GRACE),
-        E.REBORN: (S.CANCELLED, Do.HAND_GONE),
+        E.REBORN: (S.CANCELLED, Do.HAND_REBORN),
         E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
         E.UNHEARD: (S.ACCEPTED, Do.HOLD),
         E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),

@@ -11,7 +11,7 @@ The lines at the end say what becomes of every event, in the order in which they
 | `1 human +act blue`, `2 human -act blue` | an action begins, ends; last comes its target or its behavior |
 | `5 human ~act blue since=1` | an action goes on that began at 1, which becomes known only now |
 | `1 asks dg blue cause=reference` | the realizer requests an event: `ap`, `dg`, `mfg` or `bc` |
-| `1 cancels 2` | the second request is cancelled; `reason=gone`: because nobody is there any more who asked |
+| `1 cancels 2` | the second request is cancelled; `cause=gone`: because nobody is there any more who asked |
 | `1 turn ended turn=turn-9` | a turn (turn-1) ended, or `aborted`, `answered`, `repaired` |
 | `1 passes gaze-1:stroke`, `1 block done` | feedback of block-1: a sync point, the end |
 | `1 owner fragment blue` | who has the robot's head, and where |
@@ -129,7 +129,7 @@ def _take(log: Log, at: float, verb: str, *words: str) -> None:
                 named["limit"] = float(named["limit"])
             log.requests_event(KINDS[plain[0]], at, *plain[1:], **named)  # type: ignore[arg-type]
         case "cancels":
-            log.cancels(f"request-{plain[0]}", at, named.get("reason", ""))
+            log.cancels(f"request-{plain[0]}", at, named.get("cause", ""))
         case "turn":
             log.signals(plain[0], at, **named)
         case "passes":

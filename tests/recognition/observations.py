@@ -5,9 +5,10 @@ from typing import Any
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, ClaimKind, HeadOwner
 from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
+from engage_hri.schemas.faults import Cause
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
-from engage_hri.schemas.requests import CLOSED, GONE, LAPSED, Cancel
+from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -125,9 +126,8 @@ class Log:
         )
         return self.feed(request, at)
 
-    def cancels(self, request: str, at: float, reason: str = "") -> list[Effect]:
-        reason = {"gone": GONE, "closed": CLOSED, "lapsed": LAPSED}.get(reason, reason)
-        return self.feed(Cancel(id=request, requester="realizer", reason=reason), at)
+    def cancels(self, request: str, at: float, cause: Cause = "") -> list[Effect]:
+        return self.feed(Cancel(id=request, requester="realizer", cause=cause), at)
 
     def passes(self, point: str, at: float, block: str = "block-1") -> list[Effect]:
         behavior, _, sync = point.partition(":")

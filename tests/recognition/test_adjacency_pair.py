@@ -66,12 +66,12 @@ a cancelled request withdraws the question
     robot's ap-1: started 1, withdrawn 1.5
 
 a question that is asked is answered though the realizer has died since
-    WHY in gone closed lapsed
-    1 asked; 2.2 cancels 1 reason=WHY; 2.4 human +nod; 3.4 human -nod
+    WHY in gone closed unrenewed unlinked restarted
+    1 asked; 2.2 cancels 1 cause=WHY; 2.4 human +nod; 3.4 human -nod
     robot's ap-1: started 1, succeeded 2.4 after 0.4 by nod, completed 3.4 lasting 1
 
 a question of which the turn was under way when the realizer died is withdrawn
-    1 asking; 1.5 cancels 1 reason=gone
+    1 asking; 1.5 cancels 1 cause=gone
     robot's ap-1: started 1, withdrawn 1.5
 
 a question that is asked can be cancelled

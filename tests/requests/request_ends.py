@@ -13,7 +13,7 @@ from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, life_of
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.requests import asking_effects, serving, serving_effects
+from engage_hri.services.requests import asking_effects, serving_effects
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
@@ -74,7 +74,7 @@ class Client:
                 case asking_effects.TellEnd(id=id, end=end):
                     self.ends[id].append(end)
                     self.unanswered.discard(id)
-                    if isinstance(end, RunFailed) and "is gone" in end.fault.reason:
+                    if isinstance(end, RunFailed) and end.fault.cause == "gone":
                         self.world.judge_gone(Asked(self.name, self.life, id))
         self.world.wake(self.machine.deadline, self.tick)
 
@@ -110,7 +110,7 @@ class Server:
                     whose = self.names[cancel.id][0]
                     assert whose not in self.stopped, "told to stop twice"
                     self.stopped.add(whose)
-                    if cancel.reason == serving.LAPSED:
+                    if cancel.cause == "unrenewed":
                         self.lapsed.append(whose)
                     self.stop(cancel.id)
                 case serving_effects.Hand(request=request):

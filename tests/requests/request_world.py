@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from msgspec import structs
 
-from engage_hri.schemas.faults import EngageError, RunFailed
+from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Kept, Outcome, Refused, Request, kind_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.requests import asking, asking_effects
@@ -213,7 +213,7 @@ class World:
 
     def cancel_one(self, client: Client, id: str) -> None:
         client.cancelled.add(Asked(client.name, client.life, id))
-        client.carry_out(client.machine.cancel(id, "changed my mind", self.now))
+        client.carry_out(client.machine.cancel(id, Fault(reason="changed my mind"), self.now))
 
     def mishap(self) -> None:
         chance, name = self.chance, self.chance.choice(("ann", "bob"))

@@ -1,7 +1,7 @@
 """What is asked of a server while it is not there: nothing of it is on the bus, where it would come late."""
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import RequestRefused
+from engage_hri.schemas.faults import Fault, RequestRefused
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_effects import Publish, TellEnd
 from engage_hri.services.requests.patience import Patience
@@ -29,7 +29,7 @@ def test_what_is_cancelled_before_its_server_is_back_never_gets_there() -> None:
     asking = asking_one_that_has_gone()
     asking.send(keys.BLOCK, block(), 2.0)
 
-    (told,) = asking.cancel("b", "it takes too long", 7.0)
+    (told,) = asking.cancel("b", Fault(reason="it takes too long"), 7.0)
     assert isinstance(told, TellEnd)
     assert isinstance(told.end, RequestRefused)
     assert "before it was sent" in str(told.end)

@@ -10,8 +10,8 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
-from engage_hri.schemas.faults import ServerRestarted
-from engage_hri.schemas.requests import LAPSED, Accepted, Cancel, Heard, KeepAlive, Kept, Request
+from engage_hri.schemas.faults import EngageError, Fault, ServerRestarted
+from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.requests.asking import Asking
@@ -51,7 +51,7 @@ def test_what_is_not_renewed_is_held_goes_on_when_it_is_and_ends_with_its_lease(
     assert holds(serving.tick(12.5)) == [16.0]
     (end,) = handed(serving.tick(16.0))
     assert isinstance(end, Cancel)
-    assert end.reason == LAPSED
+    assert end.cause == "unrenewed"
 
 
 def test_a_renewal_that_was_long_on_its_way_lets_nothing_go_on() -> None:
@@ -110,7 +110,8 @@ def test_while_the_server_is_gone_nothing_is_sent_and_what_is_given_up_is_cancel
     during = [each for tenth in range(200) for each in asking.tick(11.0 + tenth / 10)]
     (end,) = during
     assert isinstance(end, TellEnd)
-    assert "is gone" in str(end.end)
+    assert isinstance(end.end, EngageError)
+    assert end.end.fault.cause == "gone"
 
     cancels = list[float]()
     for tenth in range(100):
@@ -140,7 +141,7 @@ def test_what_is_cancelled_while_the_server_is_gone_is_cancelled_once_when_it_is
     asking = asked_to_move()
     asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
     asking.server_gone("control", 11.0)
-    during = [*asking.cancel("a", "no more", 12.0), *asking.tick(12.5), *asking.tick(14.9)]
+    during = [*asking.cancel("a", Fault(reason="no more"), 12.0), *asking.tick(12.5), *asking.tick(14.9)]
     assert during == []
     (cancel,) = asking.server_there("control", "run", 14.95)
     assert isinstance(cancel, Publish)

@@ -94,7 +94,7 @@ def test_any_sequence_of_anything_raises_nothing_at_a_requester() -> None:
                 case 0:
                     asking.send(keys.BLOCK, PerformBlock(id=id, block=Block(id=chance.choice("xy"))), now)
                 case 1:
-                    asking.cancel(id, "no", now)
+                    asking.cancel(id, Fault(reason="no"), now)
                 case 2:
                     asking.server_gone("realizer", now)
                 case 3:

@@ -121,7 +121,7 @@ async def test_a_killed_server_fails_the_request_after_the_grace(hub: MemoryHub)
         await asyncio.sleep(1.0)
         await server.die(hub)
 
-        with pytest.raises(RunFailed, match="realizer is gone"):
+        with pytest.raises(RunFailed, match="realizer has not been seen for 4"):
             await pending.outcome
 
     assert asyncio.get_running_loop().time() == 1.0 + Patience().grace

@@ -167,7 +167,7 @@ def test_a_keep_alive_renews_grants_authority_and_finds_lost_content() -> None:
     assert serving.deadline == 8.0
     (cancel,) = handed(serving.tick(8.0))
     assert isinstance(cancel, Cancel)
-    assert cancel.reason == "nobody has renewed it"
+    assert cancel.cause == "unrenewed"
 
 
 @pytest.mark.parametrize("kept", [Kept("perform_behavior", "x", 0, "", 5.0), Kept("go_home", "a", 0, "", 5.0)])

@@ -14,7 +14,7 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
@@ -137,6 +137,10 @@ class ZenohHub(Hub):
         self._expiry = Expiry(self._link.holder, until, LOG.warning) if until is not None else None
 
     @property
+    def unlinked_at(self) -> Seconds:
+        return self._links.unlinked_at
+
+    @property
     def health(self) -> BusHealth:
         """Figures of the process, without those of its participants."""
         traffic = self.bridge.traffic
@@ -257,6 +261,10 @@ class ZenohBus(Bus):
         self._token: Any = None
 
     @property
+    def unlinked_at(self) -> Seconds:
+        return self._hub.unlinked_at
+
+    @property
     def health(self) -> BusHealth:
         overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
         gaps, lost = self._hub.readers.missed(self)
@@ -317,7 +325,7 @@ class ZenohBus(Bus):
             # There is no server, or it died meanwhile: wait until a process comes or goes.
             if not await self._hub.peers.change(deadline, since=known):
                 break
-        raise NoReply(Fault(reason=f"no reply within {timeout} s", where=key, advice="is its server running?"))
+        raise self.unanswered(key, timeout)
 
     async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
         """Ask until the first answer; None once every try has ended without one.

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import Any, NamedTuple
 
 import zenoh
@@ -32,11 +33,14 @@ class RouterNews:
         """The router that was told last, or that was there first."""
         self._is_told_gone = False
         self._gone_at: Seconds = 0.0
+        self._back_at: Seconds = -inf
         self.deadline: Seconds | None = None
         """Time at which `due` has something to tell, should no router come before."""
 
     def came(self, router: Router, now: Seconds) -> str | None:
         """Take a link that is there now; returns the line to tell."""
+        if self._known is not None and not self._here:
+            self._back_at = now
         self._here[router.zid] = router
         self.deadline = None
         known, was_told = self._known, self._is_told_gone
@@ -48,6 +52,10 @@ class RouterNews:
         if known is None:
             return None
         return _replaced(known, router)
+
+    def unlinked_at(self, now: Seconds) -> Seconds:
+        """Time at which there was no router last; -inf: there has always been one, or there never was."""
+        return self._back_at if self._here or self._known is None else now
 
     def went(self, zid: str, now: Seconds) -> str | None:
         """Take a link that is no more; returns the line to tell."""
@@ -95,6 +103,11 @@ class Links:
         self._timer: asyncio.TimerHandle | None = None
         info: Any = session.info
         self._listener = info.declare_transport_events_listener(bridge.on_loop(self._changed), history=True)
+
+    @property
+    def unlinked_at(self) -> Seconds:
+        """See `Bus.unlinked_at`."""
+        return self._news.unlinked_at(self._loop.time())
 
     def close(self) -> None:
         self._listener.undeclare()

@@ -121,7 +121,7 @@ class TurnOutcomes:
     def abort(self, aborted: Aborted, now: Seconds) -> None:
         """Note that a turn was aborted. It is not closed yet: recognition has still to withdraw its open events."""
         if record := self._records.get(aborted.turn):
-            record.status, record.reason, record.ended = "aborted", aborted.reason, now
+            record.status, record.reason, record.ended = "aborted", aborted.why.reason, now
 
     @property
     def deadline(self) -> Seconds | None:

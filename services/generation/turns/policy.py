@@ -53,6 +53,9 @@ class TurnPlan(Struct, frozen=True, kw_only=True):
     backchannel: bool = False
 
 
+_COMPLETE = Fault(reason="")
+
+
 class Aborted(Struct, frozen=True):
     """A turn that ended early. fragments: its fragments that have not ended, in order.
 
@@ -62,7 +65,7 @@ class Aborted(Struct, frozen=True):
     turn: str
     addressee: str
     fragments: tuple[str, ...]
-    reason: str
+    why: Fault
     is_known: bool = False
 
 
@@ -177,13 +180,13 @@ class TurnPolicy:
             self._begun[turn] = True
             self._forget_interrupters()
 
-    def fragment_ended(self, id: str, *, complete: bool, now: Seconds, reason: str = "") -> Aborted | None:
-        """End a fragment. Its turn is aborted unless the block was performed completely."""
+    def fragment_ended(self, id: str, *, complete: bool, now: Seconds, why: Fault = _COMPLETE) -> Aborted | None:
+        """End a fragment. Its turn is aborted unless the block was performed completely. why: it was not."""
         plan = self._live.pop(id, None)
         if plan is None:
             return None
         if not complete:
-            return self._abort(plan, reason)
+            return self._abort(plan, why)
         if self._open is not None and not self._live:
             self._silent_since = now
         self._forget()
@@ -196,7 +199,7 @@ class TurnPolicy:
             return None
         other = self._open is not None and self._open.turn != plan.turn
         if plan.turn == id or other:
-            return self.fragment_ended(id, complete=False, now=now, reason=f"{id} was refused")
+            return self.fragment_ended(id, complete=False, now=now, why=Fault(reason=f"{id} was refused"))
         self._open = plan
         return self.fragment_ended(id, complete=True, now=now)
 
@@ -289,18 +292,21 @@ class TurnPolicy:
     def tick(self, now: Seconds) -> Aborted | None:
         """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
         if (left := self._left_at) is not None and now >= left[1]:
-            return self._abort(left[0], f"{left[0].addressee} has left")
+            gone = left[0].addressee
+            return self._abort(left[0], Fault(reason=f"{gone} has left", cause="closed", whose=gone))
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
-            return self._abort(self._open, f"silence for {self._config.turn_silence:g} s")
+            silence = f"silence for {self._config.turn_silence:g} s"
+            return self._abort(self._open, Fault(reason=silence, cause="late", whose=self._speaker))
         by_voice = (each for each, began in self._talked_into.items() if now >= self._takes_floor_at(each, began))
         if actor := self._taken_by or next(by_voice, ""):
             current = self._current
             self._forget_interrupters()
-            return self._abort(current, f"{actor} took the floor") if current else None
+            taken = Fault(reason=f"{actor} took the floor", cause="cancelled", whose=actor)
+            return self._abort(current, taken) if current else None
         return None
 
-    def _abort(self, plan: TurnPlan, reason: str) -> Aborted:
+    def _abort(self, plan: TurnPlan, why: Fault) -> Aborted:
         if self._open is not None and self._open.turn == plan.turn:
             self._open = None
             self._silent_since = None
@@ -309,7 +315,7 @@ class TurnPolicy:
             del self._live[id]
         is_known = self._begun.get(plan.turn) is False
         self._forget()
-        return Aborted(plan.turn, plan.addressee, ended, reason, is_known)
+        return Aborted(plan.turn, plan.addressee, ended, why, is_known)
 
     def _forget(self) -> None:
         """Drop what is known of turns that are over, and of the people who talked into them."""

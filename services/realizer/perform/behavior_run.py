@@ -139,14 +139,15 @@ class BehaviorRun:
             return
         except EngageError as error:
             self.pending = None
-            block.lose_body(Fault(reason=error.fault.reason, where=block.id))
+            block.lose_body(error.fault.at(block.id))
             return
         if not isinstance(outcome, BehaviorOutcome):
             self.lose(Fault(reason=f"control ended it with a {type(outcome).__name__}"))
             return
         block.spoken.end(outcome)
         if outcome.status == "lapsed":  # the body has gone home: nothing of this block can be as planned
-            block.lose_body(outcome.fault or Fault(reason="nobody has renewed it", where=block.plan.block.id))
+            unsaid = Fault(reason="nobody has renewed it", where=block.plan.block.id, cause="unrenewed")
+            block.lose_body(outcome.fault or unsaid)
             return
         facts, end = block.decisions.facts, Point(self.id, sync_points(behavior)[-1])
         at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())

@@ -2,11 +2,15 @@
 
 from collections.abc import Container
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.body import BehaviorOutcome
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
 from engage_hri.services.realizer.points import Point
+
+_TAKEN = Fault(reason="", cause="replaced")
 
 
 def has_lost_nothing(plan: Plan, outcome: BehaviorOutcome, reached: Container[Point]) -> bool:
@@ -25,5 +29,5 @@ def loss(outcome: BehaviorOutcome, spelling: Spelling = AS_IN_DRAFTS) -> Fault:
     """Reason why a behavior has not come to its end."""
     if outcome.status == "taken_over":
         passed = spelling.sync(Point(outcome.behavior, outcome.passed)) if outcome.passed else "nothing of it"
-        return Fault(reason=f"another behavior took its part after {passed}")
+        return replace(outcome.fault or _TAKEN, reason=f"another behavior took its part after {passed}", where="")
     return outcome.fault or Fault(reason=f"the body {outcome.status} it")

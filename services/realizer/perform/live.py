@@ -121,8 +121,8 @@ class Live:
         if ending.status == "done" or self.ending.done():
             return False
         verb = "failed" if ending.status == "failed" else "was interrupted"
-        why = f": {ending.fault.reason}" if ending.fault else ""
-        fault = Fault(reason=f"{leader}, which it follows, {verb}{why}", where=self.id)
+        reason = f"{leader}, which it follows, {verb}"
+        fault = ending.fault.following(reason, self.id) if ending.fault else Fault(reason=reason, where=self.id)
         self.ending.set_result(Ending("interrupted", fault, ending.replaced_by))
         return True
 

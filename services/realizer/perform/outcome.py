@@ -20,14 +20,15 @@ def completed(
     spoken: tuple[SpokenText, ...],
     lost: Mapping[str, str],
     interrupted: Collection[str],
+    loss: Fault,
 ) -> BlockOutcome:
     """Complete the outcome of a block. One that had behaviors, each of which was dropped, has failed.
 
     ended: how it ended. lost: behaviors that did not come to their end, each with the reason. interrupted: those of
-    them that were ended on request, which is no failure.
+    them that were ended on request, which is no failure. loss: the fault of one that was lost.
     """
     dropped = {id: why for id, why in lost.items() if id not in interrupted}
-    nothing = _nothing_performed(block, dropped, ended.block) if ended.status == "done" else None
+    nothing = _nothing_performed(block, dropped, ended.block, loss) if ended.status == "done" else None
     return replace(
         ended,
         status="failed" if nothing else ended.status,
@@ -45,13 +46,14 @@ def nothing_is_left(block: Block, dropped: Container[str]) -> bool:
     return had_any and all(behavior.id in dropped for behavior in block.behaviors)
 
 
-def _nothing_performed(block: Block, dropped: Mapping[str, str], id: str) -> Fault | None:
+def _nothing_performed(block: Block, dropped: Mapping[str, str], id: str, loss: Fault) -> Fault | None:
     """Fault of a block of whose behaviors each was dropped; None if it had none, or another is left. id: of it."""
     if not nothing_is_left(block, dropped):
         return None
     left_out = [each.message for each in block.unread if each.kind in _BEHAVIORS]
     whys = [*(f"{id}: {why.removeprefix(f'{id}: ')}" if why else id for id, why in dropped.items()), *left_out]
-    return Fault(reason=as_told(f"no behavior of it came to its end ({'; '.join(whys)})"), where=id)
+    reason = as_told(f"no behavior of it came to its end ({'; '.join(whys)})")
+    return replace(loss, reason=reason, where=id, line=0, advice="")
 
 
 def reasons(plan: Plan) -> dict[str, str]:

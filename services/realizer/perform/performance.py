@@ -8,6 +8,8 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.body import Estimate, SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -68,6 +70,8 @@ class BlockPerformance:
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
         """Behaviors that were dropped, each with the reason."""
+        self._loss = Fault(reason="")
+        """The fault of the last one that was lost."""
         self.interrupted: dict[str, str] = {}
         """Behaviors that are ended on request, each with the reason if one was given."""
         self.ties = Ties(self, shared.others, shared.live_blocks, live.elsewhere)
@@ -129,7 +133,9 @@ class BlockPerformance:
 
     @property
     def _outcome(self) -> BlockOutcome:
-        return completed(self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self.interrupted)
+        return completed(
+            self._live.outcome, self.plan.block, self.spoken.texts, self._dropped, self.interrupted, self._loss
+        )  # fmt: skip
 
     def _observers(self, plan: Plan, net: RunningNet, began: Seconds) -> tuple[Observer, ...]:
         self._net.planned(plan, net, began)
@@ -165,7 +171,7 @@ class BlockPerformance:
             self.interrupted[behavior] = behaviors[behavior]
             self._tasks[behavior].cancel()
             self.body.cancel(behavior, "interrupted")
-            self.lose(behavior, Fault(reason="interrupted"))
+            self.lose(behavior, Fault(reason="interrupted", cause="cancelled"))
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
         """Take a report of the body about a behavior of this block."""
@@ -183,7 +189,7 @@ class BlockPerformance:
         """End the block as failed, and say that it is because of this behavior."""
         self._tell()
         self.report.warn("EXECUTION_FAILURE", fault.within(self.id, behavior), behavior)
-        self._live.fail(Fault(reason=fault.reason, where=f"{self.id}: {behavior}"))
+        self._live.fail(fault.at(f"{self.id}: {behavior}"))
 
     def follow(self, points: Iterable[Point]) -> None:
         """Tell from now on when these points are expected: other blocks are tied to them."""
@@ -265,9 +271,14 @@ class BlockPerformance:
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
                 sync = self.report.spelling.sync(Point(id, sync))
-                self._runs[id].lose(Fault(reason=f"stalled before {sync}, {overdue:.1f} s overdue"))
+                self._runs[id].lose(self._stalled(f"stalled before {sync}, {overdue:.1f} s overdue"))
                 return True
         return False
+
+    def _stalled(self, reason: str) -> Fault:
+        return Fault(
+            reason=reason, cause="gone" if self._shared.peers.has_left("control") else "late", whose="control"
+        )
 
     def _tell(self) -> None:
         """Tell what was reached, in feedback and to other blocks."""
@@ -317,6 +328,7 @@ class BlockPerformance:
             return
         self._tell()
         self._dropped[id] = why = fault.within(self.id, id)
+        self._loss = fault
         if id in self.interrupted:
             # Its parts go home by themselves: the body does not need to be told, nor to forget what it looked at.
             self.report.interrupted(id, self.spoken.of(id), self.interrupted[id])
@@ -325,14 +337,14 @@ class BlockPerformance:
             if id in self.decisions.facts.begun and not at_rest:
                 self._go_home(self.plan.parts(id), id)
             if id in self.plan.required:
-                said = Fault(reason=fault.reason, where=f"{self.id}: {id}", line=fault.line, advice=fault.advice)
-                self._live.stop(Ending("failed", said))
+                self._live.stop(Ending("failed", fault.at(f"{self.id}: {id}")))
         self._let_go(id)
         for event in events_needing(id, self.plan.block):
             if self.is_going_on(event.id):  # what else needs it falls by the next plan
                 self._tasks[event.id].cancel()
                 self.body.cancel(event.id, f"{id} was dropped")
-                self.lose(event.id, Fault(reason=without(id), line=event.line), kind, at_rest=True)
+                fallen = replace(fault, reason=without(id), where="", line=event.line, advice="")
+                self.lose(event.id, fallen, kind, at_rest=True)
         self.plan_again()
 
     def plan_again(self) -> None:

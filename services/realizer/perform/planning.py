@@ -153,8 +153,8 @@ class Planning:
         try:
             answer = await self._bus.query(keys.ESTIMATE, question, timeout=self._config.estimate)
         except NoReply as error:
-            fault = Fault(reason="there is no body to perform it", where=block.id, advice="start control")
-            raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR") from error
+            unable = error.fault.following("no body performs it", block.id)
+            raise BlockRefused(unable, "CANNOT_CREATE_BEHAVIOR") from error
         except EngageError as error:
             raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
         if not isinstance(answer, Estimates):

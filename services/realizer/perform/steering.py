@@ -70,7 +70,7 @@ class Steering:
                     self._holds.let_go(block, behavior)
                 case "stop":
                     self._holds.let_go(block, behavior)
-                    await self._stop(concerned, behavior, "" if behavior else ON_REQUEST)
+                    await self._stop(concerned, behavior, "" if behavior else ON_REQUEST, request.requester)
             self._apply()
             around = self._holds.around(block, behavior) if request.to == "continue" else None
             if around is None:
@@ -152,12 +152,12 @@ class Steering:
         if self._holds.in_force != self._told:
             self.tell()
 
-    async def _stop(self, concerned: list[Live], behavior: str, reason: str) -> None:
+    async def _stop(self, concerned: list[Live], behavior: str, reason: str, by: str) -> None:
         if behavior:
             going_on = [live for live in concerned if self.is_going_on(live, behavior)]
             await asyncio.gather(*[self.interrupt(live, behavior, reason) for live in going_on])
             return
-        _interrupt(concerned, reason)
+        _interrupt(concerned, reason, by)
         if concerned:
             await asyncio.wait([live.ended for live in concerned])
 
@@ -168,13 +168,13 @@ class Steering:
             self._holds.let_go(block, behavior)
             if behavior:
                 task = asyncio.create_task(
-                    self._stop(self._concerned(block), behavior, reason), name=f"stop {behavior}"
+                    self._stop(self._concerned(block), behavior, reason, "realizer"), name=f"stop {behavior}"
                 )
                 self._stopping.add(task)
                 task.add_done_callback(self._stopping.discard)
             else:
                 self._warn(block, reason)
-                _interrupt(self._concerned(block), reason)
+                _interrupt(self._concerned(block), reason, "realizer")
         self._apply()
 
     def _warn(self, block: str, reason: str) -> None:
@@ -188,6 +188,6 @@ class Steering:
             self._bus.publish(keys.FEEDBACK, warning)
 
 
-def _interrupt(concerned: Iterable[Live], reason: str) -> None:
+def _interrupt(concerned: Iterable[Live], reason: str, by: str) -> None:
     for live in concerned:
-        live.stop(Ending("interrupted", Fault(reason=reason, where=live.id)))
+        live.stop(Ending("interrupted", Fault(reason=reason, where=live.id, cause="cancelled", whose=by)))

@@ -18,7 +18,7 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
-from engage_hri.schemas.requests import ORPHANED, Accepted, Cancel, Refused
+from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -360,7 +360,7 @@ class Session:
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
         event = self._live.pop(cancel.id, None)
         if event is not None and event.request == cancel.id:
-            is_orphan = cancel.reason in ORPHANED
+            is_orphan = cancel.cause in ORPHANING
             self._people.apply(event.responder, at, lambda person: person.withdraw(event, at, is_orphan=is_orphan))
 
     # -- turns and blocks ---------------------------------------------------------------------------------------
