@@ -36,8 +36,8 @@ _CHECKED = re.compile(
     r" is (?P<verdict>un)?authorized to (?P<what>[A-Z][A-Za-z/ ]*) \((?P<flow>ingress|egress)\) on (?P<key>\S+)"
 )
 _WHO = re.compile(rb" ([0-9a-f]+) (?:on|is) ")
-_AFTER = b"access_control"
-"""What stands in a line before what is said."""
+_AFTER = b"interceptor"
+"""What stands in a line after its time and thread, and before what is said."""
 _CACHING = re.compile(r"ACL \((?P<flow>ingress|egress)\): caching permissions for `(?P<key>.*?)`")
 _LAST_CACHED = "Declare Liveliness Subscriber"
 _ACCEPTED = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. .*Common Name: (?P<name>.*)\.$")
@@ -82,7 +82,8 @@ class Denials:
         """Take a line of the log."""
         before, self._before = self._before, line
         if line.endswith(_DROPPED):
-            self._drop(before, line)
+            if b" is authorized to " in before:
+                self._drop(before, line)
             return
         if not self._caching and b"caching permissions" not in line and self._is_known(line):
             return  # by far the most
@@ -97,7 +98,8 @@ class Denials:
             self._caching[thread] = (caching["flow"], caching["key"])
         elif (many := _TOO_MANY.search(text)) is not None:
             who = next((name for zid, name in self._names.items() if zid.startswith(many["zid"])), "somebody")
-            self._say(f"dropped: {who} sends more on {many['key']} than may come in a second", f"of what {who} does")
+            news = f"dropped: {who} sends more on {many['key']} than may come in a second"
+            self._remember(line, self._say(news, f"of what {who} does"))
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
             if len(self.names) >= MOST_LINKS:
@@ -110,6 +112,10 @@ class Denials:
         elif level["level"] in ("WARN", "ERROR"):
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
+
+    def _remember(self, line: bytes, kind: str) -> None:
+        if len(self._kind_of) < MOST:
+            self._kind_of[line[line.find(_AFTER) :]] = kind
 
     def _is_known(self, line: bytes) -> bool:
         """True for a line that says nothing new; one that was told before is counted. Quick, for there are many.
@@ -152,9 +158,7 @@ class Denials:
         # What is kept from somebody is nothing that they did; and the end of what never began is no news.
         if checked["verdict"] and checked["flow"] == "ingress" and not checked["what"].startswith("Undeclare"):
             news = f"denied: {who} may not {checked['what'].lower()} {checked['key']}"
-            kind = self._say(news, f"of what {who} does")
-            if len(self._kind_of) < MOST:
-                self._kind_of[line[line.find(_AFTER) :]] = kind
+            self._remember(line, self._say(news, f"of what {who} does"))
 
     def _know(self, zid: str, name: str) -> None:
         if zid not in self._names and len(self._names) >= MOST:

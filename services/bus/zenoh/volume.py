@@ -1,8 +1,7 @@
 """Who sends a lot to a router: bytes of each link, from the kernel.
 
 Zenoh drops a message that is too large before it is whole, and says nothing of it; nor does it count. The router does
-not close the link of one who is loud: while Zenoh closes a link it stalls those who answer on it
-(docs/decisions/0111-a-flood-is-told-and-not-cut.md).
+not close the link of one who is loud (docs/decisions/0111-a-flood-is-told-and-not-cut.md).
 """
 
 import asyncio
