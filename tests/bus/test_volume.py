@@ -1,6 +1,7 @@
 """Who sends a lot to a router is told, with the name; who answers what it is asked is not."""
 
 import asyncio
+from contextlib import suppress
 
 import pytest
 import zenoh
@@ -37,7 +38,9 @@ async def test_the_kernel_says_what_a_link_has_brought() -> None:
     async with routing([endpoint], (), lambda line: None):
         sender, _ = open_session("robot", [endpoint], (), None, "client")
         hearer, _ = open_session("robot", [endpoint], (), None, "client")
-        hearer.declare_subscriber("a", zenoh.handlers.Callback(lambda sample: None, indirect=False))
+        loop, heard = asyncio.get_running_loop(), asyncio.Event()
+        handler = zenoh.handlers.Callback(lambda sample: loop.call_soon_threadsafe(heard.set), indirect=False)
+        hearer.declare_subscriber("a", handler)
 
         def brought() -> int:
             return sum(each.brought for each in volumes().values())
@@ -47,7 +50,9 @@ async def test_the_kernel_says_what_a_link_has_brought() -> None:
             while brought() < before + 10_000_000:
                 sender.put("a", bytes(1_000_000), congestion_control=zenoh.CongestionControl.BLOCK)
                 sent += 1_000_000
-                await asyncio.sleep(0.01)
+                heard.clear()
+                with suppress(TimeoutError):  # the first ones go before anybody is known to hear
+                    await asyncio.wait_for(heard.wait(), 0.05)
         # Both ends of all links are in this process: each megabyte comes twice, to the router and to who hears it.
         assert brought() - before <= 2.1 * sent
         for session in (sender, hearer):

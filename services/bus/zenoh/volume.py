@@ -1,4 +1,4 @@
-"""Who sends a lot to a router: bytes of each link, from the kernel.
+"""Bytes that each link brings to a router, from the kernel, and who is loud.
 
 Zenoh drops a message that is too large before it is whole, and says nothing of it; nor does it count. The router does
 not close the link of one who is loud (docs/decisions/0111-a-flood-is-told-and-not-cut.md).

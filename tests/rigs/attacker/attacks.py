@@ -6,6 +6,7 @@ worst once, and put it into `ATTACKS`: it is called again and again.
 
 import json
 import os
+import select
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -88,19 +89,19 @@ def one_byte_more(by: Attacker) -> None:
         by.put(key, bytes(most(key) + BESIDE + 1))
     for key in by.questions:
         by.ask(key, bytes(most(key) + BESIDE + 1))
-    time.sleep(0.2)
+    select.select([], [], [], 0.2)
 
 
 def huge(by: Attacker) -> None:
     """Messages of 100 MB."""
     by.put(by.next_of(by.puts), bytes(HUNDRED_MB))
-    time.sleep(0.3)
+    select.select([], [], [], 0.3)
 
 
 def huge_questions(by: Attacker) -> None:
     """Questions of 100 MB."""
     by.ask(by.next_of(by.questions), bytes(HUNDRED_MB))
-    time.sleep(0.3)
+    select.select([], [], [], 0.3)
 
 
 def as_large_as_allowed(by: Attacker) -> None:
@@ -155,7 +156,7 @@ def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> No
         except zenoh.ZError:
             refused += 1
             by.session = None
-            time.sleep(0.3)
+            select.select([], [], [], 0.3)
     print(json.dumps({"times": times, "refused": refused}), flush=True)
 
 
