@@ -32,7 +32,7 @@ PURE_MACHINERY = {
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
-    "services/runtime/installation.py",
+    "services/runtime/absent.py", "services/runtime/installation.py",
     "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
     "services/runtime/action_reports.py", "services/runtime/reporters.py", "services/runtime/reports.py",
     "services/runtime/world_report.py", "services/runtime/in_force.py",
