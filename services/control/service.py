@@ -292,7 +292,7 @@ class _Control:
     async def _go_home(self, request: GoHome) -> None:
         with self.desk.serving(request):
             if (fault := await self._homed(request.parts)) is not None:
-                self.desk.refuse(request.id, fault)
+                self.desk.refuse(request.id, replace(fault, whose=request.requester) if fault.cause else fault)
                 return
             self.note_look()
             self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))

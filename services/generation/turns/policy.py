@@ -293,7 +293,7 @@ class TurnPolicy:
         """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
         if (left := self._left_at) is not None and now >= left[1]:
             gone = left[0].addressee
-            return self._abort(left[0], Fault(reason=f"{gone} has left", cause="closed", whose=gone))
+            return self._abort(left[0], Fault(reason=f"{gone} has left", cause="gone", whose=gone))
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
             silence = f"silence for {self._config.turn_silence:g} s"

@@ -295,7 +295,8 @@ class Session:
             known = ", ".join(sorted(self.persons)) or "nobody"
             return Fault(reason=f"unknown actor {event.responder!r}", where=where, advice=f"known: {known}")
         if not person.presence.here:
-            return Fault(reason=f"{event.responder!r} has gone", where=where)
+            reason = f"{event.responder!r} is not seen any more"
+            return Fault(reason=reason, where=where, cause="gone", whose=event.responder)
         if event.kind == "directed_gaze" and not event.objects:
             return Fault(reason="directed gaze without objects", where=where)
         unknown = [name for name in event.objects if not self.scene.knows(name)]
