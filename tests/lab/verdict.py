@@ -55,8 +55,8 @@ TRUE_CAUSES: Mapping[str, frozenset[str]] = {
 }
 """What can truly be said of a service, or of the router, after each kind of fault."""
 CONTENT = {
-    "the world has no ": "simulation", "the world does not know ": "simulation",
-    "$.turn_status: ": "collaboration", " of this id goes on": "collaboration",
+    "the world has no ": ("simulation",), "the world does not know ": ("simulation",),
+    "$.turn_status: ": ("collaboration", "generation"), " of this id goes on": ("collaboration",),
 }  # fmt: skip
 """Refusals of what was asked, by their words, and who must have been hit: else it would not ask for that."""
 BY_SOMEBODY = frozenset(("cancelled", "replaced", "closed"))
@@ -90,7 +90,7 @@ def _flaw(end: Event, injuries: Sequence[Injury], after: Seconds) -> str:
         return "" if blamed else f"{cause}, but not by whom"
     now = [each for each in injuries if each.began <= end["t"] <= each.over + after]
     if not cause:  # nothing has happened, it says: the service itself refused, or could not
-        hit = {CONTENT[words] for words in CONTENT if words in end["reason"]}
+        hit = {name for words, names in CONTENT.items() if words in end["reason"] for name in names}
         if not now or any(hit & each.injured for each in now):
             return ""
         return f"no cause, while {', '.join(each.kind for each in now)}: {end['reason']}"
