@@ -101,7 +101,7 @@ class InputRefused(EngageError):
 
 
 class NotReady(InputRefused):
-    """What the input names is not as it has to be yet, or any more: the same input may be good later."""
+    """Refusal of input that names what is not there yet, or not any more: the same input may be good later."""
 
 
 class RunFailed(EngageError):

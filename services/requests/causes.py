@@ -1,4 +1,4 @@
-"""Why somebody is not seen any more, as far as who misses it can know. Pure."""
+"""Causes for which somebody is not seen any more, as far as who misses it can know. Pure."""
 
 from math import inf
 
@@ -13,7 +13,7 @@ STANDSTILL: Seconds = 1.0
 
 
 class Sight:
-    """What one participant sees of the others. name: its own.
+    """View that one participant has of the others. name: its own.
 
     unlinked_at: when it last had no router. asleep_at: when it last stood still.
     """

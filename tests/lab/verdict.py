@@ -55,10 +55,12 @@ TRUE_CAUSES: Mapping[str, frozenset[str]] = {
 }
 """What can truly be said of a service, or of the router, after each kind of fault."""
 CONTENT = {
-    "the world has no ": ("simulation",), "the world does not know ": ("simulation",),
+    "the world has no ": ("simulation", "control"), "the world does not know ": ("simulation",),
     "$.turn_status: ": ("collaboration", "generation"), " of this id goes on": ("collaboration",),
 }  # fmt: skip
 """Refusals of what was asked, by their words, and who must have been hit: else it would not ask for that."""
+REMEMBERED: Seconds = 20.0
+"""Seconds after everything is whole again in which something is refused for what was before, as an open turn is."""
 BY_SOMEBODY = frozenset(("cancelled", "replaced", "closed"))
 """Causes that are deeds of a participant, not of a machine."""
 NOT_DONE = ("failed", "interrupted", "unknown", "refused", "lapsed", "aborted", "taken_over", "Refused")
@@ -90,8 +92,9 @@ def _flaw(end: Event, injuries: Sequence[Injury], after: Seconds) -> str:
         return "" if blamed else f"{cause}, but not by whom"
     now = [each for each in injuries if each.began <= end["t"] <= each.over + after]
     if not cause:  # nothing has happened, it says: the service itself refused, or could not
+        before = [each for each in injuries if each.began <= end["t"] <= each.over + REMEMBERED]
         hit = {name for words, names in CONTENT.items() if words in end["reason"] for name in names}
-        if not now or any(hit & each.injured for each in now):
+        if not now or any(hit & each.injured for each in before):
             return ""
         return f"no cause, while {', '.join(each.kind for each in now)}: {end['reason']}"
     is_unseen = blamed == PERSON and cause == "gone"  # and nobody can know more of a person
