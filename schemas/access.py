@@ -1,5 +1,7 @@
 """Table of access: who publishes, subscribes to, serves and asks what. `engage keys acl` makes the rules from it.
 
+Each row has bounds (schemas/limits.py), which hold without keys as well.
+
 A certificate belongs to a holder: a role at a robot, with a name. All that a process does has to be in a row of its
 role. What is in no row is denied. `{own}` in a key stands for the holder's name; a process of this holder calls its
 participants so too, or by this name with `-` and more behind it.
@@ -13,6 +15,7 @@ from typing import Literal, NamedTuple
 from msgspec import Struct
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.limits import most
 
 Does = Literal["publishes", "subscribes", "serves", "asks"]
 OWN = "{own}"
@@ -49,6 +52,11 @@ class Row(NamedTuple):
     does: Does
     key: str
     why: str = ""
+
+    @property
+    def most(self) -> int:
+        """Bytes of a message, question or answer of this row, without what stands beside the payload."""
+        return most(owned(self.key, OWN[1:-1]))
 
 
 SERVED = {

@@ -26,6 +26,8 @@ CAUSES: Mapping[Cause, str] = {
 """What can have happened, as far as the service that reports it can know. `whose`: the participant that did it."""
 ROUTER = "router"
 """Whose fault it is where the cause is `unlinked`."""
+LONGEST_TEXT = 2500
+"""Characters of each text in a fault. The rest is cut off: a fault has to fit into a message, in any form."""
 
 
 class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
@@ -47,13 +49,15 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
     whose: str = ""
 
     def __post_init__(self) -> None:
-        """Write half characters with backslashes, so that a fault can always be encoded.
+        """Make sure that a fault can always be sent: shorten texts, and write half characters with backslashes.
 
-        Python itself makes such text, for example of file names that are not UTF-8.
+        Python itself makes such text, for example of file names that are not UTF-8. What is refused may be quoted in
+        the reason, whatever its length.
         """
         for name in ("reason", "where", "advice", "service", "whose"):
             text = getattr(self, name)
-            if isinstance(text, str) and not text.isascii():
+            if isinstance(text, str) and not (text.isascii() and len(text) <= LONGEST_TEXT):
+                text = text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 3]}..."
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
 
     def at(self, where: str, line: int = 0) -> "Fault":

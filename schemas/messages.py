@@ -42,7 +42,7 @@ from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncP
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
 from engage_hri.schemas.holds import BodyHeld, Held
 from engage_hri.schemas.ledger import Taken
-from engage_hri.schemas.limits import LARGEST
+from engage_hri.schemas.limits import LARGEST, check_size
 from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -120,19 +120,19 @@ def encode_json(message: Message) -> bytes:
     return _json_encoder.encode(message)
 
 
-def published(message: Message) -> tuple[bytes, str]:
-    """Encode a message as it is published. Returns payload and encoding. Raises InputRefused: it is too large."""
-    form = "json" if isinstance(message, OUTWARD) else "msgpack"
-    payload = encode_json(message) if form == "json" else encode(message)
-    if len(payload) > LARGEST:
-        raise InputRefused(_too_large(payload, type(message).__name__))
-    return payload, encoding_of(message, form)
+def in_form(key: str, message: Message, form: str) -> tuple[bytes, str]:
+    """Encode a message that is sent on this key. Returns payload and encoding. Raises InputRefused: it is too large.
+
+    form: `json` or `msgpack`.
+    """
+    payload, encoding = (encode_json if form == "json" else encode)(message), encoding_of(message, form)
+    check_size(key, payload, encoding)
+    return payload, encoding
 
 
-def _too_large(payload: bytes, where: str) -> Fault:
-    return Fault(
-        reason=f"{len(payload)} bytes; at most {LARGEST} are read", where=where, advice="split it into several"
-    )
+def published(key: str, message: Message) -> tuple[bytes, str]:
+    """Encode a message as it is published on this key. Returns and raises as `in_form` does."""
+    return in_form(key, message, "json" if isinstance(message, OUTWARD) else "msgpack")
 
 
 def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
@@ -140,7 +140,8 @@ def decode(payload: bytes, encoding: str = "application/msgpack") -> Message:
     decoder = _decoder_of(encoding)
     form, _, schema = encoding.partition(";")
     if len(payload) > LARGEST:
-        raise InputRefused(_too_large(payload, schema or form))
+        reason = f"{len(payload)} bytes; at most {LARGEST} are read"
+        raise InputRefused(Fault(reason=reason, where=schema or form, advice="split it into several"))
     try:
         return decoder.decode(payload)  # type: ignore[no-any-return]
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:

@@ -14,7 +14,7 @@ from math import inf
 from typing import Any, Self
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, NoReply
+from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
@@ -57,6 +57,7 @@ class Bus(ABC):
         self._life_numbers = life_numbers
         self._loop = asyncio.get_running_loop()
         self._gone = False
+        self._is_told_unsent = False
 
     @property
     @abstractmethod
@@ -134,9 +135,20 @@ class Bus(ABC):
             self.log.exception("%s: the fault could not be told", self.name)
 
     def publish(self, key: str, message: Message) -> None:
-        """Send to all subscribers of `key`, this process' own included. It is no error if there are none."""
+        """Send to all subscribers of `key`, this process' own included. It is no error if there are none.
+
+        Raises InputRefused for a message that is larger than its key allows (schemas/limits.py). One of a stream, of
+        which any may be lost, is not sent then, and the first such of a participant is told in the log.
+        """
         journal.note(self.log, key, message)
-        self._send(key, message)
+        try:
+            self._send(key, message)
+        except InputRefused as error:
+            if keys.key_class(key) != "stream":
+                raise
+            if not self._is_told_unsent:
+                self._is_told_unsent = True
+                self.log.warning("%s: not sent: %s", self.name, error.fault)
 
     @abstractmethod
     def _send(self, key: str, message: Message) -> None:

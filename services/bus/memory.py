@@ -12,7 +12,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.faults import EngageError, InputRefused
 from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.messages import Message, decode, encode, encoding_of, in_form, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
@@ -97,7 +97,7 @@ class MemoryHub(Hub):
     def send(self, sender: str, key: str, message: Message) -> None:
         if isinstance(message, LOCAL):
             raise TypeError(f"{type(message).__name__} is never sent")
-        payload, encoding = published(message)
+        payload, encoding = published(key, message)
         now, life = self._loop.time(), self._buses[sender].run
         sample = Sample(key, payload, encoding, sender, now, life=life, number=self.sent + 1, clock="loop", sent=now)
         if self._decodes or isinstance(message, DOCUMENTS):
@@ -108,9 +108,9 @@ class MemoryHub(Hub):
                 return
         self._pass_on(sender, Received(key, message, sender, now, life=life, number=self.sent + 1), sample)
 
-    def carried(self, message: Message) -> Message:
+    def carried(self, key: str, message: Message) -> Message:
         """The question or answer as its receiver gets it. Raises what makes it impossible to send."""
-        payload = encode(message)
+        payload, _ = in_form(key, message, "msgpack")
         return decode(payload) if self._decodes else message
 
     def wants(self, key: str) -> bool:
@@ -326,14 +326,15 @@ class MemoryBus(Bus):
             self._overflowed += tap.overflowed
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+        asked = self._hub.carried(key, message)
         await asyncio.sleep(0)
         deadline = self.now() + timeout
         while not self._gone and (server := await self._hub.answerer(key, self.name, deadline)) is not None:
             task: asyncio.Task[Message] | None = None
             try:
-                told = server.answers[key](self._hub.carried(message))
+                told = server.answers[key](asked)
                 if not isinstance(told, Coroutine):
-                    return self._hub.carried(told)
+                    return self._hub.carried(key, told)
                 task = server.under_way.begin(told, key)
             except EngageError as error:
                 raise InputRefused(error.fault) from error
@@ -349,7 +350,7 @@ class MemoryBus(Bus):
     def _answer_of(self, task: "asyncio.Task[Message]", server: "MemoryBus", key: str) -> Message:
         """The answer that a server has given in steps. Raises InputRefused."""
         try:
-            return self._hub.carried(task.result())
+            return self._hub.carried(key, task.result())
         except EngageError as error:
             raise InputRefused(error.fault) from error
         except (Exception, asyncio.CancelledError) as error:

@@ -11,7 +11,7 @@ from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_source import id_of
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.limits import LARGEST_XML_SENT
+from engage_hri.schemas.limits import LARGEST_XML_SENT, check_size
 from engage_hri.schemas.messages import Message, decode
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
@@ -26,6 +26,7 @@ def read_payload(payload: bytes, encoding: str, key: str, source: str) -> Messag
     XML holds a block or a fragment; it becomes a request with the same id. It may have `LARGEST_XML_SENT` bytes.
     """
     if encoding.partition(";")[0] not in ("application/xml", "text/xml"):
+        check_size(key, payload, encoding)
         message = decode(payload, encoding)
         if isinstance(message, LOCAL):
             reason = f"{type(message).__name__} is what each bus makes for its own subscribers; it is never sent"

@@ -1,6 +1,6 @@
 """Checks of a client's input before it is sent: a fragment in any form, a request as its server will read it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -79,12 +79,16 @@ def call_in(call: Any, unnamed: str) -> TurnFragment:
 
 
 R = TypeVar("R", bound=Request)
+V = TypeVar("V")
 
 
-def checked(request: R) -> R:
-    """Check that the server can read the request: a struct takes values of any type. Raises InputRefused."""
+def checked(key: str, request: R) -> R:
+    """Check that the server can read the request: a struct takes values of any type. Raises InputRefused.
+
+    key: where it is sent.
+    """
     try:
-        decode(*published(request))  # type: ignore[arg-type]
+        decode(*published(key, request))  # type: ignore[arg-type]
     except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
         raise InputRefused(Fault(reason=str(error), where=str(request.id))) from error
     return request
@@ -93,9 +97,27 @@ def checked(request: R) -> R:
 def taken(value: Any, kind: Any, where: str) -> Any:
     """Return a value as readers of messages take it: of this type, and within its bounds. Raises InputRefused."""
     try:
+        if isinstance(value, bytes | bytearray | memoryview):  # JSON would make text of them
+            raise TypeError("these are bytes")
         return msgspec.json.decode(msgspec.json.encode(value), type=kind)
     except (UnicodeEncodeError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
-        raise InputRefused(Fault(reason=f"{value!r:.60} is refused: {error}", where=where)) from error
+        raise InputRefused(Fault(reason=f"{shown(value)} is refused: {error}", where=where)) from error
+
+
+def listed(values: Iterable[V], where: str) -> tuple[V, ...]:
+    """Return several values as a tuple. Raises InputRefused: they are no collection."""
+    try:
+        return tuple(values)
+    except TypeError as error:
+        raise InputRefused(Fault(reason=f"{shown(values)} is no list", where=where)) from error
+
+
+def shown(value: object) -> str:
+    """Show the beginning of a value, also of one that cannot be shown."""
+    try:
+        return f"{value!r:.60}"
+    except Exception:  # it is too deep, or its class has an error
+        return f"a value of type {type(value).__name__!r}"
 
 
 def _encoded(encode: Callable[[], bytes]) -> bytes:

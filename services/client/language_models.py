@@ -30,7 +30,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.client.chunking import UNKNOWN, Chunk, Chunker
 from engage_hri.services.client.feeds import Feed
-from engage_hri.services.client.inputs import call_in
+from engage_hri.services.client.inputs import call_in, shown, taken
 from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.requests.ends import Patience, Pending
@@ -98,15 +98,16 @@ async def stream(
     await_answer: return only when the turn has been answered, or it is too late.
 
     Raises:
-        InputRefused: `pieces` cannot be followed, or `turn` is no `ToolInput`, and nothing was said; or a piece is
-            neither text nor a part, and the turn is broken off there.
+        InputRefused: `pieces` cannot be followed, `id` is no text or `turn` no `ToolInput`, and nothing was said; or
+            a piece is neither text nor a part, and the turn is broken off there.
         Exception: what `pieces` raised.
     """
+    taken(id, str, "id")
     if not isinstance(pieces, AsyncIterable):
         raise InputRefused(_unreadable(f"{type(pieces).__name__!r} is no asynchronous iterable of pieces", id))
     if not isinstance(turn, ToolInput):
         raise InputRefused(
-            Fault(reason=f"{turn!r:.60} is no ToolInput", where=f"{id}: turn", advice=f"for example {PLAIN_TURN!r}")
+            Fault(reason=f"{shown(turn)} is no ToolInput", where=f"{id}: turn", advice=f"for example {PLAIN_TURN!r}")
         )
     speaking = _Speaking(robot, id, turn, await_answer)
     try:
@@ -142,7 +143,7 @@ async def _read(robot: Robot, pieces: AsyncIterable[Piece], chunker: Chunker, sp
                 if settling is not None:
                     settling.cancel()
                 if not isinstance(piece, Piece):
-                    raise _NoPiece(_unreadable(f"the piece {piece!r} is neither text nor a `Part`", speaking.id))
+                    raise _NoPiece(_unreadable(f"the piece {shown(piece)} is neither text nor a `Part`", speaking.id))
                 ids = await objects.ids(is_needed=isinstance(piece, str) and "[" in piece)
                 for chunk in chunker.feed(piece, ids):
                     speaking.go_on(chunk)

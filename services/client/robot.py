@@ -35,7 +35,16 @@ from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed, Feed, NewFeed
 from engage_hri.services.client.hearing import Hearing, NewWords
-from engage_hri.services.client.inputs import BlockSource, FragmentSource, block_in, checked, fragment_in, taken
+from engage_hri.services.client.inputs import (
+    BlockSource,
+    FragmentSource,
+    block_in,
+    checked,
+    fragment_in,
+    listed,
+    shown,
+    taken,
+)
 from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.configuration import bus_config
@@ -107,7 +116,7 @@ class Robot(Hearing):
 
     def _send(self, fragment: TurnFragment) -> Pending:
         request = PerformFragment(id=self._request_id(fragment.id), fragment=fragment)
-        return self._requests.send(keys.FRAGMENT, checked(request))
+        return self._requests.send(keys.FRAGMENT, checked(keys.FRAGMENT, request))
 
     async def _end_of(
         self, pending: Pending, *, await_answer: bool, timeout: Seconds | None = None
@@ -123,15 +132,15 @@ class Robot(Hearing):
         """Make the id of a fragment or block that has none."""
         return f"{self._bus.name}-{self._life}-{next(self._numbers)}"
 
-    def begin_to_perform(self, fragment: TurnFragment) -> None:
+    def begin_to_perform(self, fragment: FragmentSource) -> None:
         """Send a fragment and do not wait for what becomes of it.
 
-        fragment: as it is; a fault that only generation can find is told on `faults`.
+        fragment: as for `perform`; a fault that only generation can find is told on `faults`.
 
         Raises:
-            InputRefused: a value in it is of the wrong type. Nothing was sent.
+            InputRefused: it is no fragment, or a value in it is of the wrong type. Nothing was sent.
         """
-        self._send(fragment)
+        self._send(fragment_in(fragment, self._unnamed()))
 
     async def _performed(self, pending: Pending, timeout: Seconds | None) -> FragmentOutcome:
         outcome = await self._finished(pending, timeout)
@@ -178,11 +187,12 @@ class Robot(Hearing):
             PerformFailed: it began, and failed.
             RunFailed: the realizer is gone, or has not come within `timeout`.
         """
-        if isinstance(block, str) and (parts := tuple(behaviors)):
-            made = Block(id=block, behaviors=parts, constraints=tuple(constraints), composition=composition)
+        if isinstance(block, str) and (parts := listed(behaviors, "behaviors")):
+            between = listed(constraints, "constraints")
+            made = Block(id=block, behaviors=parts, constraints=between, composition=composition)
         else:
             made = block_in(block, self._unnamed())
-        request = PerformBlock(id=self._request_id(made.id), block=made, follows=tuple(follows))
+        request = PerformBlock(id=self._request_id(made.id), block=made, follows=listed(follows, "follows"))
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
         return successful(outcome, made.id)
@@ -212,7 +222,7 @@ class Robot(Hearing):
             RunFailed: generation is gone, or has not come within `timeout`.
         """
         request = Inhibit(id=self._request_id("inhibit"), part=part, mode=mode, target=target, ttl=ttl)
-        pending = self._requests.send(keys.INHIBIT, checked(request))
+        pending = self._requests.send(keys.INHIBIT, checked(keys.INHIBIT, request))
         try:
             await self._answer_of(pending, pending.accepted, timeout)
         except (asyncio.CancelledError, RunFailed):
@@ -227,7 +237,7 @@ class Robot(Hearing):
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
         taken(timeout, Seconds | None, "timeout")
-        return await self._finished(self._requests.send(key, checked(request)), timeout)
+        return await self._finished(self._requests.send(key, checked(key, request)), timeout)
 
     async def _finished(self, pending: Pending, timeout: Seconds | None) -> Outcome:
         try:
@@ -264,10 +274,10 @@ class Robot(Hearing):
             InputRefused: `actor` is no text.
             ValueError: a name that can be no person, or no kind.
         """
-        kinds = (kind,) if isinstance(kind, str) else tuple(kind)
+        kinds = (kind,) if isinstance(kind, str) else listed(kind, "kind")
         taken(actor, str, "actor")
-        if unknown := set(kinds) - set(get_args(EventKind)):
-            raise ValueError(f"{', '.join(map(repr, unknown))}: the kinds are {', '.join(get_args(EventKind))}")
+        if unknown := [each for each in kinds if each not in get_args(EventKind)]:
+            raise ValueError(f"{', '.join(map(shown, unknown))}: the kinds are {', '.join(get_args(EventKind))}")
         self._requests.check()
         stream = EventStream(self.now(), self._bus.stamp, kinds=kinds, opening=open)
         return EventFeed(self._bus, stream, keys.event_stream(actor, kinds))

@@ -156,13 +156,13 @@ def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterabl
             lives |= {event.session} if is_here else set()
     before = sum(not counts for counts in known.values())
     if not recording.is_whole:
-        yield f"the recorder did not end in order: the numbers are of the first {recording.duration:.0f} s"
+        yield f"its end is missing or damaged: the numbers are of the first {recording.duration:.0f} s"
     if recording.losses.total:
         yield f"{recording.losses.total} messages are missing"
     if recording.losses.still:
         yield f"the recorder stood still for {recording.losses.still:.1f} s: motion of that time is missing"
     if recording.damaged:
-        yield f"{len(recording.damaged)} damaged chunks are left out"
+        yield f"{len(recording.damaged)} places in the file are damaged, and what they held is left out"
     if before:
         yield f"{before} events that began before the recording are not counted"
     if len(lives) > 1:

@@ -30,11 +30,11 @@ def opened(path: Path) -> "Recording":
     if not recording.is_whole:
         behind = f", {recording.lost_bytes} bytes behind them are not" if recording.lost_bytes else ""
         complain(
-            f"{path}: its recorder did not end in order; {len(recording)} messages until {recording.duration:.2f} s"
+            f"{path}: its end is missing or damaged; {len(recording)} messages until {recording.duration:.2f} s"
             f" are whole{behind}"
         )
-    for chunk in recording.damaged:
-        complain(f"{path}: a damaged chunk at byte {chunk.offset} is left out: {chunk.reason}")
+    for place in recording.damaged:
+        complain(f"{path}: damaged at byte {place.offset}: {place.reason}")
     if recording.losses.total:
         complain(f"{path}: {recording.losses.total} messages are missing, as its recorder says")
     return recording

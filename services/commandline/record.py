@@ -45,7 +45,7 @@ class Options(Connected):
     ] = None
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if there is one.")] = False
     repair: Annotated[
-        bool, typer.Option("--repair", help="Give FILE, whose recorder was killed, the end that it lacks.")
+        bool, typer.Option("--repair", help="Give FILE the end that it lacks, or a new one for a damaged one.")
     ] = False
 
 
@@ -68,7 +68,7 @@ def _repair(path: Path | None) -> int:
         print(f"{path}: nothing to repair")
         return DONE
     cut = repair(path)
-    print(f"{path}: {len(read(path))} messages; {cut} bytes at the end were no whole record and are cut off")
+    print(f"{path}: {len(read(path))} messages; {cut} bytes at the end were not whole and are cut off")
     return DONE
 
 

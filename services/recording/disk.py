@@ -6,6 +6,7 @@ A disk that is full keeps chunks waiting, up to a limit; then the newest are dro
 import mmap
 import os
 import time
+import zlib
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -35,6 +36,7 @@ class RecordingFile:
         self.dropped = 0
         self.written = 0
         self.slowest: Seconds = 0.0
+        self._checksum = 0
         self.tell = tell
         self._waiting: deque[Sealed] = deque()
         self._trouble = ""
@@ -112,7 +114,7 @@ class RecordingFile:
                 self.dropped += sum(each.messages for each in self._waiting)
                 return False
             self._append(self.writer.told("end", note, self.written))
-            self._append(self.writer.finish(self.written))
+            self._append(self.writer.finish(self.written, self._checksum))
             os.fdatasync(self._file)
         except OSError as error:
             self._complain(f"{error.strerror}; the end of the file is missing")
@@ -132,6 +134,7 @@ class RecordingFile:
             os.lseek(self._file, self.written, os.SEEK_SET)
             raise
         self.written += len(data)
+        self._checksum = zlib.crc32(data, self._checksum)
 
     def _complain(self, trouble: str) -> None:
         if trouble != self._trouble:
@@ -172,7 +175,7 @@ def repair(path: Path) -> int:
         with path.open("r+b") as file:
             file.truncate(until)
             file.seek(until)
-            file.write(tail + end(contents, until + len(tail)))
+            file.write(tail + end(contents, until + len(tail), zlib.crc32(tail, recording.checksum(until))))
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:

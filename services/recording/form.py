@@ -50,9 +50,15 @@ def kept(sample: Sample) -> Form:
 
 
 def payload(form: Form, encoding: str) -> bytes:
-    """Give back the bytes that came. encoding: that of the sample."""
+    """Give back the bytes that came. encoding: that of the sample.
+
+    What no recorder wrote, and cannot be turned back, is given as it stands: no reader takes it for a message.
+    """
     is_packed = form.encoding == JSON and encoding.partition(";")[0] == "application/msgpack"
-    return _packed(form.data, is_typed=form.is_typed) if is_packed else form.data
+    try:
+        return _packed(form.data, is_typed=form.is_typed) if is_packed else form.data
+    except _BAD:
+        return form.data
 
 
 def _packed(text: bytes, *, is_typed: bool) -> bytes:

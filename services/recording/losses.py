@@ -1,11 +1,33 @@
-"""Losses of a recording, and the topics under which the recorder itself writes. Pure."""
+"""What the recorder itself writes into a recording, by topic: marks of chunks, clocks, losses. Pure."""
+
+from typing import Any
 
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
 
-CLOCK, LOST, MORE = "recording/clock", "recording/lost", "recording/more"
-"""Topics of the recorder's own: offsets of clocks, messages that were lost, and all for which no channel is left."""
+CHUNK, CLOCK, LOST, MORE = "recording/chunk", "recording/clock", "recording/lost", "recording/more"
+"""Topics of the recorder's own: the mark at the beginning of each chunk, offsets of clocks, messages that were lost,
+and all for which no channel is left."""
+
+
+class Mark(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Mark at the beginning of a chunk, under the chunk's checksum: so none is told twice, moved, or of another file.
+
+    number: of the chunk in its recording, from 0. of: `wall` of the recording. facts: those of the recording, in
+    chunk 0.
+    """
+
+    number: int
+    of: str
+    facts: dict[str, str] = {}
+
+
+class Offset(Struct, frozen=True, kw_only=True):
+    """Offset of another clock to the recorder's, and its error."""
+
+    offset: Seconds
+    error: Seconds
 
 
 class Losses(Struct, frozen=True, kw_only=True):
@@ -25,3 +47,7 @@ class Losses(Struct, frozen=True, kw_only=True):
     @property
     def total(self) -> int:
         return self.dropped + self.overflowed + self.lost + self.disk
+
+
+OWN: dict[str, Any] = {CHUNK: Mark, CLOCK: dict[str, Offset], LOST: Losses}
+"""Type of what is JSON under each topic."""

@@ -1,13 +1,17 @@
 """Reader of recordings, whole ones and those whose writer was killed. Pure: bytes in, messages out.
 
-A file is read from its beginning, record by record. Where one is cut off, or holds what no recorder writes, the
-recording ends: everything before is there, and `lost_bytes` says how much was not. Needs the extra `record`.
+What is given stood in a chunk, and the chunk agrees with its checksum. The index behind the data only tells of
+channels that no such chunk tells of, and only where it agrees with its own checksum. Whatever is not as a recorder
+writes it is left out, and told in `damaged`. Where a file is cut off the recording ends, and `lost_bytes` says how
+much was not read. Needs the extra `record`.
 """
 
+import re
 import struct
+import zlib
 from array import array
-from bisect import bisect_left, bisect_right
 from collections import Counter, OrderedDict
+from collections.abc import Iterator
 from io import BytesIO
 from math import isfinite
 from typing import Any
@@ -17,7 +21,18 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, Message, MessageIndex, Metadata, MetadataIndex, Schema
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Header,
+    Message,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+)
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 from msgspec import Struct
@@ -30,27 +45,32 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.bus.samples import Received, Sample
 from engage_hri.services.recording.form import Form, payload
-from engage_hri.services.recording.losses import LOST, MORE, Losses
+from engage_hri.services.recording.losses import CHUNK, LOST, MORE, OWN, Losses, Mark
 from engage_hri.services.recording.writing import PROFILE, Contents
 
 _HEAD = struct.Struct("<BQ")
-_BAD = (McapError, struct.error, ValueError, OverflowError, UnicodeDecodeError, zstandard.ZstdError)
-_OURS = (Opcode.HEADER, Opcode.CHUNK, Opcode.METADATA)
-"""Records that may stand before the end of the data, besides indexes."""
-_DATA_END, _INDEX = 4, 2 + 4
-"""Lengths of the end of the data, and of an index of no messages."""
-_ZSTD = b"\x04\0\0\0zstd"
-"""Name of the compression in the head of each of our chunks, and its place behind the chunk's beginning."""
-_ZSTD_AT = _HEAD.size + 8 + 8 + 8 + 4
+_MESSAGE = struct.Struct("<HIQQ")
+_FOOTER = struct.Struct("<BQQQI")
+_BAD = (
+    McapError, struct.error, ValueError, OverflowError, UnicodeDecodeError, RuntimeError, EOFError, MemoryError,
+    zstandard.ZstdError, msgspec.MsgspecError, RecursionError,
+)  # fmt: skip
+"""Errors of the libraries over bytes that nobody wrote; lz4 has a `RuntimeError`."""
+_CHUNK = re.compile(rb"\x06.{4}\0{4}.{16}.{4}\0{4}.{4}(?:\x04\0{3}zstd|\x03\0{3}lz4|\0{4})", re.DOTALL)
+"""Beginning of a chunk of less than 4 GiB."""
+_DATA_END = _HEAD.size + 4
+"""Bytes of the record at the end of the data."""
 LARGEST_CHUNK = 64 * 1024 * 1024
 """Bytes of a chunk's content. Ours have one MiB, and one message more."""
 CHUNKS_KEPT = 16
 """Number of chunks that are kept decompressed."""
 BILLION = 1_000_000_000
+LATEST = 2**63 - 1
+"""Latest time in a file, in nanoseconds since 1970: in the year 2262."""
 
 
 class Damaged(Struct, frozen=True):
-    """A chunk in the middle that cannot be read, as after a fault of the disk. offset: where it begins."""
+    """Something in a file that is not as a recorder wrote it. offset: byte where it begins. reason: in words."""
 
     offset: int
     reason: str
@@ -60,7 +80,8 @@ class Recording:
     """A recording. Its messages are numbered from 0, in the order in which they came to the recorder.
 
     facts: what the recorder wrote of itself at the beginning (docs/recordings.md). notes: what it wrote later, by
-    name. is_whole: its recorder ended in order. lost_bytes: bytes at the end that are no whole record.
+    name. is_whole: its end is there, and agrees with its checksum. lost_bytes: bytes at the end that were not read.
+    damaged: everything else that is not as a recorder wrote it.
     """
 
     def __init__(self, data: bytes, name: str = "recording") -> None:
@@ -73,13 +94,19 @@ class Recording:
         self.damaged: list[Damaged] = []
         self._data = data
         self._channels: dict[int, Channel] = {}
+        self._spare: dict[int, Channel] = {}
+        """Channels as the index tells of them."""
+        self._readable: dict[int, bool] = {}
+        """Whether messages of a channel can be read, by its id."""
+        self._left_out: dict[str, tuple[int, int]] = {}
+        """Place of the first chunk with such messages, and their number, by what is wrong with them."""
+        self._mark = Mark(number=-1, of="")
+        """The last one that was read."""
         self._contents = Contents([], [], [], [], Counter())
         self._chunks: list[tuple[int, int]] = []
         """Begin and end of each chunk's content in the file."""
         self._indexed: ChunkIndex | None = None
         """The chunk to which the indexes belong that come next."""
-        self._is_over = False
-        """The end of the data has been read: what comes repeats it."""
         self._open: OrderedDict[int, bytes] = OrderedDict()
         self._times = array("q")
         self._of_channel = array("H")
@@ -87,16 +114,18 @@ class Recording:
         self._places = array("I")
         self.end = self._read()
         """Bytes of the file up to where it may go on."""
+        for reason, (offset, number) in self._left_out.items():
+            self._damage(offset, f"{number} messages are left out: {reason}")
         if not self.facts:
-            reason = "nothing in it can be read" if not self._channels else "it is a recording of another program"
+            known = "nothing in it can be read" if not self._channels else "it is a recording of another program"
+            reason = "what it says of its beginning is damaged" if self.damaged else known
             raise InputRefused(Fault(reason=reason, where=name, advice="`engage record` makes recordings"))
         try:
-            is_readable = isfinite(self.began) and self.wall >= 0
+            is_readable = isfinite(self.began) and 0 <= self.wall <= LATEST
         except ValueError:
             is_readable = False
         if not is_readable:
             raise InputRefused(Fault(reason="what it says of its beginning is damaged", where=name))
-        self._leave_out_unknown()
 
     # -- what it says of itself ---------------------------------------------------------------------------------
 
@@ -170,33 +199,38 @@ class Recording:
         """Return a message, decoded; None if nobody can read it."""
         return received(self.sample(number))
 
-    def own(self, topic: str) -> list[tuple[Seconds, dict[str, Any]]]:
-        """Return what the recorder itself has said under this topic, with the times."""
+    def own(self, topic: str) -> list[tuple[Seconds, Any]]:
+        """Return what the recorder itself has said under this topic, as its type in `OWN`, with the times."""
         channels = {id for id, channel in self._channels.items() if channel.topic == topic}
         numbers = (number for number, channel in enumerate(self._of_channel) if channel in channels)
-        return [(self.time(number), msgspec.json.decode(self._message(number).data)) for number in numbers]
+        return [(self.time(each), msgspec.json.decode(self._message(each).data, type=OWN[topic])) for each in numbers]
 
     @property
     def losses(self) -> Losses:
         """Messages that are known to be missing."""
         told = self.own(LOST)
-        return msgspec.convert(told[-1][1], Losses) if told else Losses()
+        return told[-1][1] if told else Losses()
 
     def indexes(self, chunk: int) -> list[MessageIndex]:
         """Make the indexes of a chunk anew, one for each of its channels. chunk: its number."""
         found: dict[int, MessageIndex] = {}
-        for number in range(bisect_left(self._of_chunk, chunk), bisect_right(self._of_chunk, chunk)):
-            channel = self._of_channel[number]
-            index = found.setdefault(channel, MessageIndex(channel_id=channel, records=[]))
-            index.records.append((self._times[number], self._places[number]))
+        content = self._content(chunk)
+        for opcode, place, _ in _records(content):
+            if opcode == Opcode.MESSAGE:
+                channel, _, log_time, _ = _MESSAGE.unpack_from(content, place + _HEAD.size)
+                index = found.setdefault(channel, MessageIndex(channel_id=channel, records=[]))
+                index.records.append((log_time, place))
         return list(found.values())
+
+    def checksum(self, until: int) -> int:
+        """CRC-32 of the first bytes of the file."""
+        with memoryview(self._data) as view, view[:until] as part:
+            return zlib.crc32(part)
 
     def _message(self, number: int) -> Message:
         chunk, place = self._of_chunk[number], self._places[number]
-        content = self._content(chunk)
-        _, length = _HEAD.unpack_from(content, place)
-        begin = place + _HEAD.size
-        message: Message = Message.read(ReadDataStream(BytesIO(content[begin : begin + length])), length)
+        body = _body(self._content(chunk), place)
+        message: Message = Message.read(ReadDataStream(BytesIO(body)), len(body))
         return message
 
     def _content(self, chunk: int) -> bytes:
@@ -216,134 +250,199 @@ class Recording:
         data, size = self._data, len(self._data)
         if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
             raise InputRefused(Fault(reason="this is no MCAP file", where=self.name))
+        until = self._read_index()
+        self.is_whole = until is not None
+        until = size if until is None else until
         at = good = len(MCAP0_MAGIC)
-        while at + _HEAD.size <= size:
+        while at + _HEAD.size <= until:
             opcode, length = _HEAD.unpack_from(data, at)
-            begin, end = at + _HEAD.size, at + _HEAD.size + length
-            if end > size or not self._may_be(opcode, length, end):
-                if (found := self._next_chunk(at)) is None:
-                    break
-                self._damage(at, "no record is here")
-                at = found
-                continue
-            if opcode == Opcode.FOOTER:
-                self.is_whole = True
-                return good
-            self._is_over |= opcode == Opcode.DATA_END
+            end = at + _HEAD.size + length
+            if opcode == Opcode.DATA_END and end == at + _DATA_END:
+                break
             try:
-                self._take(opcode, data[begin:end], at, begin, end)
+                if end > until:
+                    raise ValueError("no record is here")
+                self._take(opcode, data[at + _HEAD.size : end], at, end)
+                at = good = end
             except _BAD as error:
-                found = self._next_chunk(at)
-                if found is None and opcode != Opcode.CHUNK:
+                found = self._next_chunk(at, until)
+                if found is None and not self.is_whole:
                     break
-                self._damage(at, f"{type(error).__name__}: {error}")
-                at = end if found is None else found
-                continue
-            at = end
-            if opcode in (Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA):
-                good = at
-        self.lost_bytes = size - good
+                words = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
+                self._damage(at, f"what is here is left out: {words}")
+                at = until if found is None else found
+        if not self.is_whole:
+            self.lost_bytes = size - good
+        self._check_data(at)
         return good
 
-    def _may_be(self, opcode: int, length: int, end: int) -> bool:
-        """Tell whether a record of this kind and length can stand here. Where a length is damaged none can."""
-        match opcode:
-            case Opcode.FOOTER:
-                return bytes(self._data[end:]) == MCAP0_MAGIC
-            case Opcode.DATA_END:
-                return length == _DATA_END
-            case Opcode.MESSAGE_INDEX:
-                told = int.from_bytes(self._data[end - length + 2 : end - length + _INDEX], "little")
-                return not self._is_over and told == length - _INDEX
-        return 0 < opcode < Opcode.DATA_END if self._is_over else opcode in _OURS
+    def _read_index(self) -> int | None:
+        """Read the index behind the data. Returns where the data ends; None: it is not as it was written."""
+        data, size = self._data, len(self._data)
+        footer = size - len(MCAP0_MAGIC) - _FOOTER.size
+        if footer < 0 or bytes(data[footer + _FOOTER.size :]) != MCAP0_MAGIC:
+            return None
+        opcode, length, begin, _, checksum = _FOOTER.unpack_from(data, footer)
+        index = bytes(data[begin:footer])
+        if (opcode, length) != (Opcode.FOOTER, _FOOTER.size - _HEAD.size) or begin < len(MCAP0_MAGIC) + _DATA_END:
+            return None
+        if zlib.crc32(data[footer : footer + _FOOTER.size - 4], zlib.crc32(index)) != checksum:
+            return None
+        try:
+            for opcode, _, body in _records(index):
+                if opcode == Opcode.CHANNEL:
+                    channel = Channel.read(ReadDataStream(BytesIO(body)))
+                    self._spare[channel.id] = channel
+        except _BAD:
+            return None
+        return int(begin) - _DATA_END
+
+    def _check_data(self, at: int) -> None:
+        """Compare all data with its checksum, which is told at this place. Old recordings have none: 0."""
+        try:
+            opcode, length = _HEAD.unpack_from(self._data, at)
+            told = DataEnd.read(ReadDataStream(BytesIO(self._data[at + _HEAD.size : at + _DATA_END])))
+            is_right = told.data_section_crc in (0, self.checksum(at))
+        except _BAD:
+            opcode, length, is_right = 0, 0, False
+        is_end = (opcode, length) == (Opcode.DATA_END, _DATA_END - _HEAD.size)
+        if self.is_whole and not is_end:
+            self._damage(at, "the record at the end of the data is damaged")
+        elif is_end and not is_right and not self.damaged:  # what is damaged differs from the checksum, of course
+            self._damage(at, "the data differs from its checksum outside of the messages")
 
     def _damage(self, at: int, reason: str) -> None:
         self._indexed = None
         self.damaged.append(Damaged(at, reason))
 
-    def _next_chunk(self, at: int) -> int | None:
-        """Find the next chunk behind a damaged record that can be read whole."""
-        data, place = self._data, at + 1 + _ZSTD_AT
-        while (place := data.find(_ZSTD, place)) >= 0:
-            begin = place - _ZSTD_AT
-            opcode, length = _HEAD.unpack_from(data, begin)
-            if opcode == Opcode.CHUNK and length <= len(data) - begin - _HEAD.size:
-                try:
-                    _plain(_chunk(data[begin + _HEAD.size : begin + _HEAD.size + length]))
-                except _BAD:
-                    pass
-                else:
+    def _next_chunk(self, at: int, until: int) -> int | None:
+        """Find the next chunk behind a damaged record that can be read whole, before another file begins."""
+        until = min(until, self._data.find(MCAP0_MAGIC, at) % (len(self._data) + 1))
+        place = at + 1
+        while (found := _CHUNK.search(self._data, place, until)) is not None:
+            begin = found.start()
+            end = begin + _HEAD.size + _HEAD.unpack_from(self._data, begin)[1]
+            try:
+                if end <= until:
+                    _plain(_chunk(self._data[begin + _HEAD.size : end]))
                     return begin
-            place += 1
+            except _BAD:
+                pass
+            place = begin + 1
         return None
 
-    def _leave_out_unknown(self) -> None:
-        """Leave out messages whose channel nobody tells of any more: that stood in a chunk that is damaged."""
-        known = [number for number, channel in enumerate(self._of_channel) if channel in self._channels]
-        lost = len(self._of_channel) - len(known)
-        if lost:
-            where = self.damaged[0].offset if self.damaged else 0
-            self.damaged.append(Damaged(where, f"{lost} later messages are of channels that only it told of"))
-            for name in ("_times", "_of_channel", "_of_chunk", "_places"):
-                values = getattr(self, name)
-                setattr(self, name, array(values.typecode, [values[number] for number in known]))
-        self._contents.counts = Counter(self._of_channel)
-
-    def _take(self, opcode: int, body: bytes, at: int, begin: int, end: int) -> None:
+    def _take(self, opcode: int, body: bytes, at: int, end: int) -> None:
+        """Take a record of the data. Raises one of `_BAD`."""
         stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.CHUNK:
-            self._take_chunk(_chunk(body), at, begin, end)
-        elif opcode == Opcode.MESSAGE_INDEX and self._indexed is not None:
-            self._indexed.message_index_offsets[MessageIndex.read(stream).channel_id] = at
-            self._indexed.message_index_length += end - at
-        elif opcode == Opcode.CHANNEL:  # told again at the end, also those of a chunk that is damaged
-            self._tell_of(Channel.read(stream))
+            self._take_chunk(_chunk(body), at, end)
+        elif opcode == Opcode.MESSAGE_INDEX:
+            if int.from_bytes(body[2:6], "little") != len(body) - 6:
+                raise ValueError("no record is here")
+            if self._indexed is not None:
+                self._indexed.message_index_offsets[MessageIndex.read(stream).channel_id] = at
+                self._indexed.message_index_length += end - at
         elif opcode == Opcode.METADATA:
             told = Metadata.read(stream)
             self._contents.metadata.append(MetadataIndex(offset=at, length=end - at, name=told.name))
-            if told.name == PROFILE and not self.facts:
-                self.facts = told.metadata
-            else:
+            if told.name != PROFILE:
                 self.notes[told.name] = told.metadata
+            elif not self.facts:
+                self.facts = told.metadata
+        elif opcode == Opcode.ATTACHMENT:  # of another program
+            if int.from_bytes(body[-4:], "little") not in (0, zlib.crc32(body[:-4])):
+                raise ValueError("an attachment differs from its checksum")
+        elif opcode == Opcode.HEADER:
+            Header.read(stream)
+        else:
+            raise ValueError("no record is here")
 
-    def _take_chunk(self, chunk: Chunk, at: int, begin: int, end: int) -> None:
+    def _take_chunk(self, chunk: Chunk, at: int, end: int) -> None:
+        """Take a chunk, or nothing of it. Raises one of `_BAD`."""
         content = _plain(chunk)
-        number, place = len(self._chunks), 0
         found: list[tuple[int, int, int]] = []
-        channels: list[Channel] = []
-        while place < len(content):
-            opcode, length = _HEAD.unpack_from(content, place)
-            inner = place + _HEAD.size
-            if opcode == Opcode.MESSAGE:
-                channel, _, log_time = struct.unpack_from("<HIQ", content, inner)
-                found.append((log_time, channel, place))
-            elif opcode == Opcode.CHANNEL:
-                channels.append(Channel.read(ReadDataStream(BytesIO(content[inner : inner + length]))))
+        channels: dict[int, Channel] = {}
+        schemas: list[Schema] = []
+        marks: list[Mark] = []
+        for opcode, place, body in _records(content):
+            if opcode == Opcode.CHANNEL:
+                channel = Channel.read(ReadDataStream(BytesIO(body)))
+                if self._channels.get(channel.id, channel) != channel:
+                    raise ValueError(f"it tells of channel {channel.id} otherwise than a chunk before it")
+                channels[channel.id] = channel
             elif opcode == Opcode.SCHEMA:
-                schema = Schema.read(ReadDataStream(BytesIO(content[inner : inner + length])))
-                if schema.id not in {each.id for each in self._contents.schemas}:
-                    self._contents.schemas.append(schema)
-            place = inner + length
-        for channel in channels:
-            self._tell_of(channel)
-        self._chunks.append((begin, end))
+                schemas.append(Schema.read(ReadDataStream(BytesIO(body))))
+            elif opcode == Opcode.MESSAGE:
+                id, _, log_time, _ = _MESSAGE.unpack_from(body)
+                if log_time > LATEST:
+                    raise ValueError("a time in it is none")
+                known = channels.get(id) or self._channels.get(id) or self._spare.get(id)
+                if known is not None and known.topic == CHUNK:
+                    marks.append(msgspec.json.decode(body[_MESSAGE.size :], type=Mark))
+                found.append((log_time, id, place))
+        self._follow(marks, at)
+        for id, told in channels.items():
+            if id not in self._channels:
+                self._contents.channels.append(told)
+            self._channels[id] = told
+        known_schemas = {each.id for each in self._contents.schemas}
+        self._contents.schemas += [each for each in schemas if each.id not in known_schemas]
+        self._contents.counts += Counter(id for _, id, _ in found)
         self._indexed = ChunkIndex(
             chunk_length=end - at, chunk_start_offset=at, compression=chunk.compression,
-            compressed_size=len(chunk.data), message_end_time=chunk.message_end_time,
-            message_start_time=chunk.message_start_time, message_index_length=0, message_index_offsets={},
-            uncompressed_size=chunk.uncompressed_size,
+            compressed_size=len(chunk.data), message_end_time=max((each[0] for each in found), default=0),
+            message_start_time=min((each[0] for each in found), default=0), message_index_length=0,
+            message_index_offsets={}, uncompressed_size=len(content),
         )  # fmt: skip
         self._contents.chunks.append(self._indexed)
-        for log_time, channel, place in found:
-            self._times.append(log_time)
-            self._of_channel.append(channel)
-            self._of_chunk.append(number)
-            self._places.append(place)
+        number = len(self._chunks)
+        self._chunks.append((at + _HEAD.size, end))
+        for log_time, id, place in found:
+            if self._is_message(id, content, place, at):
+                self._times.append(log_time)
+                self._of_channel.append(id)
+                self._of_chunk.append(number)
+                self._places.append(place)
 
-    def _tell_of(self, channel: Channel) -> None:
-        if channel.id not in self._channels:
-            self._contents.channels.append(channel)
-        self._channels[channel.id] = channel
+    def _follow(self, marks: list[Mark], at: int) -> None:
+        """Check that a chunk is the next one of this recording. Raises ValueError: it is not."""
+        last = self._mark
+        for mark in marks:
+            if last.number >= 0 and mark.of != last.of:
+                raise ValueError("a chunk of another recording")
+            if mark.number <= last.number:
+                raise ValueError("a chunk that was there before, or belongs before another one")
+            last = mark
+        if marks and marks[0].number > self._mark.number + 1 and not self.damaged:
+            self._damage(at, f"the chunks from number {self._mark.number + 1} to {marks[0].number - 1} are not here")
+        for mark in marks:
+            self.facts = mark.facts or self.facts
+            self._mark = mark
+
+    def _is_message(self, id: int, content: bytes, place: int, at: int) -> bool:
+        """Tell whether a message of a chunk is one to give; those that nobody can read are counted."""
+        channel = self._channels.setdefault(id, self._spare[id]) if id in self._spare else self._channels.get(id)
+        if channel is None:
+            return self._leave_out("only a damaged part told of their channels", at)
+        if channel.topic == CHUNK:
+            return False
+        key = channel.metadata.get("key", "")
+        try:
+            if channel.topic == MORE:
+                key = msgspec.msgpack.decode(_body(content, place)[_MESSAGE.size :], type=Sample).key
+            elif channel.topic in OWN:
+                msgspec.json.decode(_body(content, place)[_MESSAGE.size :], type=OWN[channel.topic])
+                return True
+        except _BAD:
+            return self._leave_out("nobody can read these words of the recorder", at)
+        if id not in self._readable or channel.topic == MORE:
+            self._readable[id] = _is_in_table(key)
+        return self._readable[id] or self._leave_out("their keys are none of Engage", at)
+
+    def _leave_out(self, reason: str, at: int) -> bool:
+        first, number = self._left_out.get(reason, (at, 0))
+        self._left_out[reason] = first, number + 1
+        return False
 
 
 def received(sample: Sample) -> Received | None:
@@ -358,19 +457,48 @@ def received(sample: Sample) -> Received | None:
     return Received(sample.key, message, sample.source, sample.at, sample.past, sample.life, sample.number)
 
 
+def _is_in_table(key: str) -> bool:
+    """Tell whether a key has the form of those in the table of keys."""
+    try:
+        kind = keys.key_class(key)
+    except ValueError:
+        return False
+    chunks = key.split("/")
+    return all(map(keys.is_chunk, chunks)) and (len(chunks) == 4 if kind == "alive" else len(chunks) > 4)
+
+
+def _records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Kind, place and body of each record of a chunk or of the index. Raises ValueError: one is cut off."""
+    place = 0
+    while place < len(content):
+        opcode, length = _HEAD.unpack_from(content, place)
+        if place + _HEAD.size + length > len(content):
+            raise ValueError("a record in it is cut off")
+        yield opcode, place, _body(content, place)
+        place += _HEAD.size + length
+
+
+def _body(content: bytes, place: int) -> bytes:
+    """Body of the record at a place."""
+    return content[place + _HEAD.size : place + _HEAD.size + _HEAD.unpack_from(content, place)[1]]
+
+
 def _chunk(body: bytes) -> Chunk:
     chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     if len(chunk.data) != len(body) - (8 + 8 + 8 + 4 + 4 + len(chunk.compression) + 8):
-        raise ValueError("it is cut off")
+        raise ValueError("a chunk is cut off")
     size = chunk.uncompressed_size
     if chunk.compression == "zstd" and zstandard.frame_content_size(chunk.data) not in (size, -1):
-        raise ValueError("its two sizes differ")  # and memory for the greater one may not be there
+        raise ValueError("the two sizes of a chunk differ")  # and memory for the greater one may not be there
     if size > LARGEST_CHUNK:
-        raise ValueError(f"it says that it has {size} bytes")
+        raise ValueError(f"a chunk says that it has {size} bytes")
     return chunk
 
 
 def _plain(chunk: Chunk) -> bytes:
     """Content of a chunk, compared with its checksum. Raises one of `_BAD`."""
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    return stream.read(length)
+    stream, length = get_chunk_data_stream(chunk)
+    content = stream.read(length)
+    if length != chunk.uncompressed_size or zlib.crc32(content) != chunk.uncompressed_crc:
+        raise ValueError("a chunk differs from its checksum")
+    return content

@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
 from engage_hri.services.recording.disk import RecordingFile, Tell
 from engage_hri.services.recording.form import JSON, MSGPACK, kept
-from engage_hri.services.recording.losses import CLOCK, LOST, MORE, Losses
+from engage_hri.services.recording.losses import CLOCK, LOST, MORE, Losses, Offset
 from engage_hri.services.recording.reading import BILLION
 from engage_hri.services.recording.writing import Line
 
@@ -86,12 +86,12 @@ class Recorder:
     def look(self) -> None:
         """Note what has changed of other machines' clocks and of what was lost, and write to the disk."""
         changed = {
-            each.clock: {"offset": each.offset, "error": each.error}
+            each.clock: Offset(offset=each.offset, error=each.error)
             for each in self._bus.health.clocks
             if self._offsets.get(each.clock) != each.offset
         }
         if changed:
-            self._offsets |= {clock: told["offset"] for clock, told in changed.items()}
+            self._offsets |= {clock: told.offset for clock, told in changed.items()}
             self._own(CLOCK, msgspec.json.encode(changed))
         health = self._bus.health
         losses = Losses(

@@ -26,7 +26,7 @@ class Times:
             for clock, known in told.items():
                 since, offsets = self._offsets.setdefault(clock, ([], []))
                 since.append(at)
-                offsets.append(float(known["offset"]))
+                offsets.append(known.offset)
 
     def at(self, stamp: Stamp, told_at: Seconds) -> Seconds | None:
         """Time of an instant, from the beginning of the recording. told_at: time at which its message came."""

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
+import msgspec
 import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
@@ -36,6 +37,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.export import bundle
 from engage_hri.services.recording.form import JSON
+from engage_hri.services.recording.losses import CHUNK, Mark
 
 PROFILE = "engage"
 MOST_CHANNELS = 60_000
@@ -72,6 +74,9 @@ class Line(Struct, frozen=True):
         return {name: value for name, value in named.items() if value}
 
 
+_MARKS = Line(topic=CHUNK, form=JSON)
+
+
 class Sealed(Struct):
     """A chunk that is not in the file yet. index: its offsets count from its own beginning. lines: new in it.
 
@@ -92,6 +97,9 @@ class Writer:
     def __init__(self) -> None:
         self.waiting = 0
         self._of_bus = 0
+        self._facts: Mapping[str, str] = {}
+        self._number = 0
+        """Number of the chunk that is being filled."""
         self._chunk = RecordBuilder()
         self._compressor = zstandard.ZstdCompressor(level=LEVEL)
         self._indices: dict[int, MessageIndex] = {}
@@ -112,7 +120,8 @@ class Writer:
         return self._chunk.count
 
     def begin(self, metadata: Mapping[str, str]) -> bytes:
-        """Beginning of a file."""
+        """Beginning of a file. The first chunk tells the facts again, where they have a checksum."""
+        self._facts = metadata
         head = written(Header(profile=PROFILE, library="engage"))
         offset = len(MCAP0_MAGIC) + len(head)
         return MCAP0_MAGIC + head + self.told(PROFILE, metadata, offset)
@@ -125,13 +134,20 @@ class Writer:
 
     def add(self, line: Line, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
         """Add a message to the chunk. Times in nanoseconds since 1970."""
+        if not self.waiting:
+            facts = {} if self._number else dict(self._facts)
+            mark = msgspec.json.encode(Mark(number=self._number, of=self._facts.get("wall", ""), facts=facts))
+            self._first = self._last = log_time
+            self._add(_MARKS, mark, log_time, log_time, 0)
+        self._add(line, data, log_time, publish_time, sequence)
+
+    def _add(self, line: Line, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
         channel = self._channel(line)
         index = self._indices.get(channel)
         if index is None:
             index = self._indices[channel] = MessageIndex(channel_id=channel, records=[])
         index.records.append((log_time, self._chunk.count))
-        self._first = min(self._first, log_time) if self.waiting else log_time
-        self._last = max(self._last, log_time) if self.waiting else log_time
+        self._first, self._last = min(self._first, log_time), max(self._last, log_time)
         self.waiting += 1
         self._of_bus += bool(line.key)
         number = sequence & 0xFFFFFFFF
@@ -191,6 +207,7 @@ class Writer:
             self._schema is not None and any(self._channels[line].schema_id for line in self._new),
         )  # fmt: skip
         self._indices, self.waiting, self._of_bus, self._new = {}, 0, 0, []
+        self._number += 1
         return sealed
 
     def placed(self, sealed: Sealed, offset: int) -> None:
@@ -200,16 +217,17 @@ class Writer:
         self._counts += sealed.counts
 
     def dropped(self, sealed: Sealed) -> None:
-        """Note that a chunk will never be in the file: what it told of its channels has to be told again."""
+        """Note that the last chunk will never be in the file: what it told of its channels has to be told again."""
+        self._number -= 1
         self._written -= set(sealed.lines)
         if sealed.has_schema:
             self._has_schema = False
 
-    def finish(self, offset: int) -> bytes:
-        """End of the file, to be written at this offset, behind the last chunk."""
+    def finish(self, offset: int, checksum: int) -> bytes:
+        """End of the file, to be written at this offset, behind the last chunk. checksum: of all before."""
         channels = [channel for line, channel in self._channels.items() if line in self._written]
         schemas = [] if self._schema is None else [self._schema]
-        return end(Contents(schemas, channels, self._chunks, self._metadata, self._counts), offset)
+        return end(Contents(schemas, channels, self._chunks, self._metadata, self._counts), offset, checksum)
 
 
 class Contents(Struct):
@@ -231,9 +249,12 @@ class Contents(Struct):
         )  # fmt: skip
 
 
-def end(contents: Contents, offset: int) -> bytes:
-    """End of a file, to be written at this offset: where everything is, for readers that seek."""
-    data = written(DataEnd(data_section_crc=0))
+def end(contents: Contents, offset: int, checksum: int) -> bytes:
+    """End of a file, to be written at this offset: where everything is, for readers that seek.
+
+    checksum: CRC-32 of all bytes before.
+    """
+    data = written(DataEnd(data_section_crc=checksum))
     start = offset + len(data)
     groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
         (Opcode.SCHEMA, contents.schemas),

@@ -53,6 +53,13 @@ class Told:
             *lines, self._rest = (self._rest + came).split(b"\n")
             self.lines += [line.decode() for line in lines]
 
+    def drain(self) -> None:
+        """Take the lines that are there, without waiting."""
+        assert self.process.stdout is not None
+        while select.select([self.process.stdout], [], [], 0)[0] and (came := self.process.stdout.read(2**16)):
+            *lines, self._rest = (self._rest + came).split(b"\n")
+            self.lines += [line.decode() for line in lines]
+
     def end(self) -> None:
         self.process.terminate()
         self.process.communicate(timeout=PATIENCE)

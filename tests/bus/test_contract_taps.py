@@ -31,7 +31,8 @@ async def test_a_tap_gets_payload_and_envelope_as_they_travel(place: Place):
 
     found = await samples(here, tap, 3)
     assert [decode(each.payload, each.encoding) for each in found] == [state(number) for number in range(3)]
-    assert [(each.payload, each.encoding) for each in found] == [published(state(number)) for number in range(3)]
+    sent = [published(keys.fault("there"), state(number)) for number in range(3)]
+    assert [(each.payload, each.encoding) for each in found] == sent
     assert {(each.key, each.source, each.life) for each in found} == {(keys.fault("there"), "there", there.run)}
     numbers = [each.number for each in found]
     assert numbers == list(range(numbers[0], numbers[0] + 3))
@@ -59,7 +60,7 @@ async def test_a_tap_in_the_process_of_the_publisher_gets_the_same(place: Place)
     there.publish(keys.fault("there"), state(1))
 
     [sample] = await samples(here, tap, 1)
-    assert (sample.payload, sample.encoding) == published(state(1))
+    assert (sample.payload, sample.encoding) == published(keys.fault("there"), state(1))
     assert (sample.source, sample.life) == ("there", there.run)
     assert sample.number > 0
 
@@ -98,7 +99,7 @@ async def test_a_tap_gets_what_nobody_can_read(place: Place):
 async def test_a_full_tap_drops_the_oldest_and_counts_it(place: Place):
     process = await place.process()
     there, here = process.join("there"), process.join("here")
-    size = len(published(state(0))[0]) + len(keys.fault("there"))
+    size = len(published(keys.fault("there"), state(0))[0]) + len(keys.fault("there"))
     tap = here.tap(keys.ANY_FAULT, capacity=3 * size)
 
     for number in range(5):

@@ -68,7 +68,7 @@ class Recording(MemoryHub):
         self.log: list[tuple[str, str, bytes]] = []
 
     def _pass_on(self, sender: str, received: Received, sample: Sample) -> None:
-        self.log.append((sender, received.key, published(received.message)[0]))
+        self.log.append((sender, received.key, published(received.key, received.message)[0]))
         super()._pass_on(sender, received, sample)
 
 

@@ -118,7 +118,7 @@ def test_a_cut_file_is_read_and_repaired_and_that_is_said(run: Engage, tmp_path:
     again = run("record", path, "--repair")
 
     assert shown.code == 0
-    assert "its recorder did not end in order; 49 messages until 7.00 s are whole" in shown.err
+    assert "its end is missing or damaged; 49 messages until 7.00 s are whole" in shown.err
     assert (repaired.code, again.code) == (0, 0)
     assert "49 messages" in repaired.out
     assert "nothing to repair" in again.out
@@ -131,7 +131,7 @@ def test_of_a_file_that_ends_between_two_chunks_no_bytes_are_said_to_be_lost(run
 
     shown = run("export", path, "--csv")
 
-    assert "did not end in order" in shown.err
+    assert "its end is missing or damaged" in shown.err
     assert shown.err.splitlines()[0].endswith(" are whole")
 
 

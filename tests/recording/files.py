@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from zlib import crc32
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode, encoding_of, published
@@ -17,7 +18,7 @@ FACTS = {"format": "1", "robot": "robot", "clock": "loop", "began": "0.0", "wall
 def sample(
     key: str, message: Message, at: float, *, source: str = "there", life: str = "1", number: int = 1
 ) -> Sample:
-    payload, encoding = (encode(message), encoding_of(message)) if keys.is_presence(key) else published(message)
+    payload, encoding = (encode(message), encoding_of(message)) if keys.is_presence(key) else published(key, message)
     return Sample(key, payload, encoding, source, at, life=life, number=number, clock="loop", sent=at)
 
 
@@ -32,10 +33,10 @@ def nanoseconds(at: float) -> int:
     return WALL + round(at * BILLION)
 
 
-def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True) -> bytes:
+def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True, wall: int = WALL) -> bytes:
     """A file with these messages, in chunks of so many."""
     writer = Writer()
-    data = writer.begin(FACTS)
+    data = writer.begin({**FACTS, "wall": str(wall)})
     for number, one in enumerate(samples, 1):
         form = kept(one)
         writer.add(line(one, form), form.data, nanoseconds(one.at), nanoseconds(one.sent), one.number)
@@ -47,7 +48,7 @@ def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True
     if not is_whole:
         return data
     data += writer.told("end", {"messages": str(len(samples)), "lost": "0"}, len(data))
-    return data + writer.finish(len(data))
+    return data + writer.finish(len(data), crc32(data))
 
 
 def recording(samples: Sequence[Sample], chunk: int = 7) -> Recording:

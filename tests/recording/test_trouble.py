@@ -11,7 +11,7 @@ from engage_hri.services.recording import disk
 from engage_hri.services.recording.disk import RecordingFile, read
 from engage_hri.services.recording.writing import Line
 
-LINE = Line(topic="r/evt/x", form="json", key="evt/x", sender="there")
+LINE = Line(topic="r/x", form="json", key="engage/v1/evt/there/x", sender="there")
 
 
 class Told:

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.export import bundle
 from engage_hri.schemas.faults import Fault
@@ -166,8 +167,8 @@ def test_the_exported_schema_has_the_keys_of_a_line(message: Message) -> None:
 def test_what_is_for_programs_of_others_travels_as_json() -> None:
     state = OpenEvents(actor="ann", session="7a4d6501", at=at(1))
 
-    payload, encoding = published(state)
+    payload, encoding = published(keys.open_events("ann"), state)
 
     assert encoding == "application/json;engage.OpenEvents/1"
     assert json.loads(payload) == {"type": "open_events", "actor": "ann", "session": "7a4d6501", "at": ["loop", 1.0]}
-    assert published(Fault(reason="bad"))[1] == "application/msgpack;engage.Fault/1"
+    assert published(keys.fault("a"), Fault(reason="bad"))[1] == "application/msgpack;engage.Fault/1"

@@ -8,10 +8,10 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.messages import Message, decode
+from engage_hri.schemas.messages import Message, decode, in_form
 from engage_hri.services.bus.answering import MOST, Answering
 from engage_hri.services.bus.interface import Answer, Bus, is_asked_to_stop
-from engage_hri.services.bus.zenoh.history import finish, form_asked, in_form, refuse
+from engage_hri.services.bus.zenoh.history import finish, form_asked, refuse
 from engage_hri.services.bus.zenoh.session import LoopBridge
 
 
@@ -69,7 +69,7 @@ class Answers:
             finish(query)
 
     def _reply(self, query: zenoh.Query, key: str, message: Message, form: str) -> None:
-        payload, encoding = in_form(message, form)
+        payload, encoding = in_form(key, message, form)
         query.reply(key, payload, encoding=encoding)
 
     def close(self) -> None:

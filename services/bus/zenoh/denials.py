@@ -1,4 +1,5 @@
-"""Refusals of a router in plain lines: links without a good certificate, and messages that no rule allows.
+"""Refusals of a router in plain lines: links without a good certificate, messages that no rule allows, and too large
+or too many ones.
 
 Zenoh tells both only in its log, which it writes to the standard output of the process, each message that is allowed
 among them. So the log goes through a pipe here, and the loop picks out what was refused.
@@ -16,9 +17,7 @@ import zenoh
 
 from engage_hri.schemas.utf8 import printable
 
-LEVELS = (
-    "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace,zenoh::net::routing::hat=off"
-)
+LEVELS = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor=trace,zenoh::net::routing::hat=off"
 """Parts of Zenoh's log that tell of refusals, and all errors but those about the end of what was denied."""
 MOST = 200
 """Number of different refusals of one holder that are told; a flood of them fills neither log nor memory."""
@@ -38,6 +37,9 @@ _LAST_CACHED = "Declare Liveliness Subscriber"
 _ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
 _NOBODY = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
+_TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
+_DROPPED = b"Msg intercepted!"
+"""Last line about any message that is dropped, whatever the reason. It names nobody."""
 _LEVEL = re.compile(r"\d{4}-\d\d-\d\dT\S+Z +(?P<level>[A-Z]+) ")
 
 
@@ -59,9 +61,18 @@ class Denials:
         self._count: Counter[str] = Counter()
         self._kinds: Counter[str] = Counter()
         """Number of different refusals, by what they are about."""
+        self._before: dict[bytes, bytes] = {}
+        """Last line of each thread."""
 
     def feed(self, line: bytes) -> None:
         """Take a line of the log."""
+        begin = line.find(b"ThreadId(")
+        on = line[begin : line.find(b")", begin)]
+        if line.endswith(_DROPPED):
+            self._drop(self._before.pop(on, b""))
+            return
+        if on in self._before or len(self._before) < MOST:  # a key may have line ends, and say anything
+            self._before[on] = line
         if b"Using cached result" in line and b"unauthorized" not in line:
             return  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
@@ -73,6 +84,9 @@ class Denials:
             self._check(thread, checked)
         elif (caching := _CACHING.search(text)) is not None:
             self._caching[thread] = (caching["flow"], caching["key"])
+        elif (many := _TOO_MANY.search(text)) is not None:
+            who = next((name for zid, name in self._names.items() if zid.startswith(many["zid"])), "somebody")
+            self._say(f"dropped: {who} sends more on {many['key']} than may come in a second", f"of what {who} does")
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
         elif (nobody := _NOBODY.search(text)) is not None:
@@ -82,6 +96,14 @@ class Denials:
         elif level["level"] in ("WARN", "ERROR"):
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
+
+    def _drop(self, before: bytes) -> None:
+        """Tell what was dropped though a rule allows it: it is too large. before: what was said of it."""
+        checked = _CHECKED.search(_COLOR.sub(b"", before).decode(errors="replace"))
+        if checked is not None and not checked["verdict"] and checked["flow"] == "ingress":
+            who = self._names.get(checked["zid"], f"process {checked['zid']}")
+            what = f"{checked['what'].lower()} on {checked['key']}"
+            self._say(f"dropped: {who} sends a {what} that is larger than may be sent", f"of what {who} does")
 
     def _check(self, thread: str, checked: re.Match[str]) -> None:
         if checked["name"]:

@@ -11,7 +11,7 @@ last key was dropped: so they know that all has come, and that there is nothing 
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from math import isnan
@@ -23,7 +23,8 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.messages import Message, decode, encode, encode_json, encoding_of
+from engage_hri.schemas.limits import LONGEST_KEY, MEDIUM, most
+from engage_hri.schemas.messages import decode, in_form
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing, Past, SentLog, Written
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
@@ -32,8 +33,8 @@ BATCH = 32
 """Number of replies in one go: a question for everything must not hold up the loop."""
 PATTERNS = 64
 """Number of patterns in a question for the past. Each key that there is gets compared with each."""
-LONGEST = 1024 * 1024
-"""Bytes of such a question: it has a count for each key that the asking process knows."""
+ABOUT = LONGEST_KEY + 512
+"""Bytes, or more than there are, that a message in such an answer has besides its payload."""
 CATCH_UP: Seconds = 1.0
 """Time that a process has to hand out its past."""
 
@@ -111,6 +112,9 @@ class History:
                     part = _parts.decode(reply.ok.payload.to_bytes())
                     answers.setdefault(replier, []).extend(one for one in part if one.key == key)
 
+        question = pack(_Question(tuple(patterns), missing))
+        if len(question) > MEDIUM:  # all that is kept comes then, and what was there before is known by its count
+            question = pack(_Question(tuple(patterns), msgspec.structs.replace(missing, seen={})))
         self._session.get(
             keys.own(run or "*", "past"),
             self._bridge.on_loop(replied, lambda _: ended()),
@@ -118,7 +122,7 @@ class History:
             consolidation=zenoh.ConsolidationMode.NONE,
             accept_replies=zenoh.ReplyKeyExpr.ANY,
             allowed_destination=zenoh.Locality.REMOTE,
-            payload=pack(_Question(tuple(patterns), missing)),
+            payload=question,
             timeout=CATCH_UP,
             **QOS,
         )
@@ -128,8 +132,6 @@ class History:
     def _missing_asked(self, query: zenoh.Query) -> None:
         try:
             payload = query.payload.to_bytes() if query.payload else b""
-            if len(payload) > LONGEST:
-                raise InputRefused(Fault(reason=f"a question of {len(payload)} bytes; at most {LONGEST} are read"))
             asked = _questions.decode(payload)
             if len(asked.patterns) > PATTERNS:
                 raise InputRefused(Fault(reason=f"{len(asked.patterns)} patterns; at most {PATTERNS} are answered"))
@@ -140,11 +142,12 @@ class History:
             return
         oldest = self._loop.time() - keys.HISTORY_MAX_AGE - asked.missing.age
         past = self._sent.past(partial(_is_in, expressions), asked.missing, oldest)
-        parts: dict[str, list[object]] = {}
+        parts: dict[str, list[Written]] = {}
         for one in past.written:
-            parts.setdefault(one.key, []).append((one.key, one.encoding, one.payload, one.envelope))
-        for key, part in parts.items():
-            query.reply(key, pack(part))
+            parts.setdefault(one.key, []).append(one)
+        for key, whole in parts.items():
+            for part in _fitting(whole, most(key)):
+                query.reply(key, pack([(key, one.encoding, one.payload, one.envelope) for one in part]))
         query.reply(keys.own(self._sent.run, "counts"), pack((past.counts, past.dropped)))
         finish(query)
 
@@ -170,13 +173,31 @@ class History:
             one = waiting.popleft()
             payload, encoding = one.payload, one.encoding
             if form and not encoding.startswith(f"application/{form}"):
-                payload, encoding = in_form(decode(payload, encoding), form)
+                try:
+                    payload, encoding = in_form(one.key, decode(payload, encoding), form)
+                except InputRefused as error:  # JSON is longer than MessagePack
+                    refuse(query, error.fault, form)
+                    continue
             attachment = pack(one.envelope)
             query.reply(one.key, payload, encoding=encoding, attachment=attachment, timestamp=one.stamp)  # type: ignore[arg-type]
         if waiting and self._open:
             self._loop.call_soon(self._answer, query, waiting, form)
         else:
             finish(query)
+
+
+def _fitting(written: Sequence[Written], limit: int) -> Iterator[list[Written]]:
+    """Divide messages of one key into parts that can be sent: each has `limit` bytes, or one message."""
+    part: list[Written] = []
+    size = 0
+    for one in written:
+        weight = len(one.payload) + ABOUT
+        if part and size + weight > limit:
+            yield part
+            part, size = [], 0
+        part.append(one)
+        size += weight
+    yield part
 
 
 def _is_in(expressions: Sequence[zenoh.KeyExpr], key: str) -> bool:
@@ -196,14 +217,9 @@ def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:
     return form
 
 
-def in_form(message: Message, form: str) -> tuple[bytes, str]:
-    """Encode the message in this form; returns payload and encoding."""
-    return (encode_json if form == "json" else encode)(message), encoding_of(message, form)
-
-
 def refuse(query: zenoh.Query, fault: Fault, form: str) -> None:
     """Answer the query with an error."""
-    payload, encoding = in_form(fault, form)
+    payload, encoding = in_form(str(query.key_expr), fault, form)
     query.reply_err(payload, encoding=encoding)
 
 

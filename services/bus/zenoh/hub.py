@@ -15,7 +15,7 @@ import zenoh
 
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady
-from engage_hri.schemas.messages import Message, decode, encode, encoding_of, published
+from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
@@ -215,7 +215,7 @@ class ZenohHub(Hub):
             self.rights.check(bus.name, "publishes", key)
         ordered = keys.key_class(key) != "stream"
         now = self._loop.time()
-        payload, encoding = published(message)
+        payload, encoding = published(key, message)
         stamp = self.session.new_timestamp()
         if ordered:
             if not self._sent.number:
@@ -314,7 +314,7 @@ class ZenohBus(Bus):
         if self._hub.rights is not None:
             self._hub.rights.check(self.name, "asks", key)
         deadline = self._loop.time() + timeout
-        payload, encoding = encode(message), encoding_of(message)
+        payload, encoding = in_form(key, message, "msgpack")
         while self._loop.time() < deadline:
             known = self._hub.peers.changes
             reply = await self._ask(key, payload, encoding, deadline)

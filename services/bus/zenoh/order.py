@@ -24,6 +24,7 @@ from itertools import chain
 from msgspec import Struct
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.limits import SMALL
 from engage_hri.schemas.units import Seconds
 
 KEPT = 4096
@@ -32,6 +33,8 @@ KEPT_BYTES = 16 * 1024 * 1024
 """Bytes of these messages, of all together; the last is kept whatever its size."""
 STATES_KEPT = 1024
 """Number of states of which a subscription knows when the newest value was sent."""
+COUNT = 16
+"""Bytes that a count takes at most beside its key. Those of a pulse, and what is around them, have to fit in it."""
 PULSE_FOR: Seconds = 3.0
 """Time after a message for which its count is published, for receivers that lost the last one of a burst."""
 
@@ -126,7 +129,8 @@ class SentLog:
         base = self._bases.setdefault(key, self._base)
         nth = self.counts[key] = self.counts.get(key, base) + 1
         written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth, base), stamp)
-        self._written_at[key] = now
+        self._written_at.pop(key, None)
+        self._written_at[key] = now  # the last in order
         if keys.key_class(key) == "state":
             self._states[key] = written
         else:
@@ -175,8 +179,15 @@ class SentLog:
         return one.envelope.nth > seen or (is_state and seen > self.counts[one.key])
 
     def recent(self, now: Seconds) -> Counts:
-        """Counts of the keys written in the last `PULSE_FOR`."""
-        return {key: self.counts[key] for key, at in self._written_at.items() if now - at <= PULSE_FOR}
+        """Counts of the keys written in the last `PULSE_FOR`: of the last ones, as many as a pulse can have."""
+        found: Counts = {}
+        size = 0
+        for key, at in reversed(self._written_at.items()):
+            size += len(key.encode()) + COUNT
+            if now - at > PULSE_FOR or size > SMALL - COUNT:
+                break
+            found[key] = self.counts[key]
+        return found
 
 
 class Follower:

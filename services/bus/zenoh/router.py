@@ -16,6 +16,8 @@ from engage_hri.services.bus.zenoh.denials import telling_denials
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
+from engage_hri.services.bus.zenoh.sizes import paced
+from engage_hri.services.bus.zenoh.volume import Listening
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""
@@ -55,7 +57,9 @@ async def routing(
     with ExitStack() as stack:
         more: dict[str, object] = {}
         if keys_of_router is not None:
-            more = {**encrypted(keys_of_router), "access_control": access_control(keys_of_router.holders())}
+            holders = keys_of_router.holders()
+            more = {**encrypted(keys_of_router), "access_control": access_control(holders)}
+            more["downsampling"] = paced(holders)
             stack.enter_context(telling_denials(tell))
             own = keys_of_router.holder
             stack.enter_context(closing(Expiry(own.common_name, own.until, LOG.warning)))
@@ -77,9 +81,11 @@ async def _passing_on(session: zenoh.Session, tell: Callable[[str], None]) -> As
     watching = session.liveliness().declare_subscriber(
         f"*/{keys.ANY_TOKEN}", bridge.on_loop(changed), history=True
     )  # fmt: skip
+    listening = Listening(session, tell)
     try:
         yield Routing(session, bridge)
     finally:
+        listening.close()
         bridge.close()
         watching.undeclare()  # type: ignore[no-untyped-call]
         session.close()  # type: ignore[no-untyped-call]

@@ -16,6 +16,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import ADVICE, is_endpoint
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
+from engage_hri.services.bus.zenoh.sizes import bounded
 
 ROUTER_WITH_KEYS = "tls/localhost:7447"
 """Endpoint of the router for processes with keys that name no other."""
@@ -169,7 +170,7 @@ def _config(
     }
     if robot is not None:
         settings["namespace"] = robot
-    for key, value in {**settings, **more}.items():
+    for key, value in {**settings, **bounded(), **more}.items():
         config.insert_json5(key, json.dumps(value))
     return config
 
