@@ -90,7 +90,7 @@ def _flaw(end: Event, injuries: Sequence[Injury], after: Seconds) -> str:
         return f"names no cause ({end['reason'] or 'nothing is said'}), or nobody who says it"
     if cause in BY_SOMEBODY:
         return "" if blamed else f"{cause}, but not by whom"
-    now = [each for each in injuries if each.began <= end["t"] <= each.over + after]
+    now = [each for each in injuries if each.injured and each.began <= end["t"] <= each.over + after]
     if not cause:  # nothing has happened, it says: the service itself refused, or could not
         before = [each for each in injuries if each.began <= end["t"] <= each.over + REMEMBERED]
         hit = {name for words, names in CONTENT.items() if words in end["reason"] for name in names}

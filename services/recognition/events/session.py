@@ -301,7 +301,8 @@ class Session:
             return Fault(reason="directed gaze without objects", where=where)
         unknown = [name for name in event.objects if not self.scene.knows(name)]
         if event.turn and event.turn in self._aborted_turns:
-            return Fault(reason=f"turn {event.turn!r} has been cut off", where=where)
+            reason = f"turn {event.turn!r} has been cut off"  # nobody but generation says so
+            return Fault(reason=reason, where=where, cause="cancelled", whose="generation")
         if unknown:
             return Fault(reason=f"unknown object {', '.join(map(repr, unknown))}", where=where)
         if event.limit is not None and not event.limit > 0:
