@@ -55,7 +55,7 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation realizer recognition"
     " simulation study > client > recording > requests > runtime > bus > tangram text",
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
-    "services/bus": "memory zenoh > interface > payloads subscription > samples > answering config journal keyring",
+    "services/bus": "memory zenoh > answering > interface > payloads subscription > samples > config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions blame estimates refusals spoken switching told unheard waiting > live warned > body"

@@ -5,7 +5,10 @@ trust, and who it is. The folder above, with the folders of several holders, wil
 whose keys it is to take.
 """
 
+import ssl
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +79,43 @@ def read_keys(folder: str | Path, name: str) -> Keys:
     if holder.until <= time.time():
         reason = f"the certificate of {holder.common_name} has expired"
         raise InputRefused(Fault(reason=reason, where=str(place), advice="`engage keys renew`"))
-    return Keys(place, holder)
+    keys = Keys(place, holder)
+    _try(keys)
+    return keys
+
+
+def _try(keys: Keys) -> None:
+    """Use the keys once, without a network: Zenoh says of damaged ones no more than that nobody answers.
+
+    Raises InputRefused: a file is damaged, or the three do not belong together.
+    """
+    server, client = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname, client.verify_mode, server.verify_mode = False, ssl.CERT_NONE, ssl.CERT_REQUIRED
+    steps: tuple[tuple[str, Callable[[], object]], ...] = (
+        (AUTHORITY, lambda: server.load_verify_locations(keys.authority)),
+        (CERTIFICATE, lambda: client.load_verify_locations(keys.certificate)),
+        (PRIVATE, lambda: server.load_cert_chain(keys.certificate, keys.private, "")),
+        (PRIVATE, lambda: client.load_cert_chain(keys.certificate, keys.private, "")),
+        (PRIVATE, lambda: _shake_hands(server, client)),
+    )
+    for file, step in steps:
+        try:
+            step()
+        except (ssl.SSLError, ValueError) as error:
+            beside = f", or not of the {CERTIFICATE} beside it" if file == PRIVATE else ""
+            reason, advice = f"damaged{beside}: {error}", "copy the folder anew from where `engage keys` made it"
+            if isinstance(error, ssl.SSLCertVerificationError):  # one of the two, or the clock of this computer
+                file, reason = CERTIFICATE, f"not accepted with the {AUTHORITY} beside it: {error.verify_message}"
+            raise InputRefused(Fault(reason=reason, where=str(keys.folder / file), advice=advice)) from error
+
+
+def _shake_hands(server: ssl.SSLContext, client: ssl.SSLContext) -> None:
+    """Connect the two in memory. Raises ssl.SSLError."""
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    sides = client.wrap_bio(back, there), server.wrap_bio(there, back, server_side=True)
+    for side in sides * 3:
+        with suppress(ssl.SSLWantReadError):
+            side.do_handshake()
 
 
 def _read(path: Path, kind: type) -> Any:

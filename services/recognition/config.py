@@ -7,6 +7,7 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.ranges import not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
+from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 GazeResolution = Literal["object", "table"]
@@ -101,7 +102,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     look_break: Seconds = 0.15
     """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
     meanwhile waits for the decision."""
-    forgotten_after: Seconds = 600.0
+    forgotten_after: Seconds = FORGOTTEN_AFTER
     """Time after which a person who has gone, or of whom no report comes, is forgotten: the same id then means a new
     person. What the old one did stays in the statistics of all together."""
     longest_speech: Seconds = 60.0

@@ -7,7 +7,7 @@ from engage_hri.services.requests.asking_table import State
 
 
 class Asked:
-    """One request. run: the life of the server that accepted it. is_sent: the server may have got it."""
+    """One request. run: the life of the server that accepted it. sent_at: when it was sent last; None: never."""
 
     def __init__(self, expression: str, request: Request) -> None:
         self.expression = expression
@@ -17,7 +17,7 @@ class Asked:
         self.cancel: Cancel | None = None
         self.state = State.SENT
         self.run = ""
-        self.is_sent = False
+        self.sent_at: Seconds | None = None
         self.resend_after: Seconds = 0.0
 
 

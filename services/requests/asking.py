@@ -53,6 +53,7 @@ from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.records import ANEW, unwieldy
 from engage_hri.services.requests.window import Window
+from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
 _Said = Answer | None
 """The answer of the server that is the event; None with all other events."""
@@ -61,12 +62,18 @@ _Said = Answer | None
 SHORTEST_PULSE: Seconds = 0.05
 """Least time between two `KeepAlive`, whatever the lease: a shorter one would flood the bus."""
 
+ASLEEP: Seconds = FORGOTTEN_AFTER / 2
+"""Time after which a request without an answer is not sent again. This process was asleep meanwhile, as a notebook is
+that was closed, and the server may soon have forgotten that it has performed the request already."""
+
 # Members that are used with each message: an enum is slow to look one up.
 _SENT, _ENDED, _FINISHED = State.SENT, State.ENDED, Event.FINISHED
 _OVER = (State.GIVEN_UP, State.ENDED)
+_UNDECIDED = (State.SENT, State.HEARD)
 _RESEND, _GRACE, _PATIENCE, _CANCEL, _SWALLOW = _CLOCKS = (
     Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
 )  # fmt: skip
+_SENDS_AGAIN = (Event.RESEND_DUE, Event.BACK)
 _ANSWERS = {Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDATED, Refused: Event.REFUSED}
 """The event that an answer of the server is; every other answer is an end."""
 
@@ -158,7 +165,7 @@ class Asking:
         if asked is None or asked.cancel is not None:
             return
         asked.cancel = self._cancellation(asked, why)
-        if not asked.is_sent:
+        if asked.sent_at is None:
             fault = asked.cancel.fault(id).following("cancelled before it was sent", id)
             self._step(asked, Event.REFUSED, now, Refused(id=id, fault=fault))
         else:
@@ -222,6 +229,12 @@ class Asking:
     def _step(self, asked: Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
         """Let `event` happen to a request: take its row of the table and do what that says."""
         before = asked.state
+        if (
+            event in _SENDS_AGAIN
+            and before in _UNDECIDED
+            and now - (now if asked.sent_at is None else asked.sent_at) > ASLEEP
+        ):
+            event = Event.PATIENCE_OVER
         asked.state, actions = TABLE[before][event]
         for action in actions:
             _ACTIONS[action](self, asked, now, answer)
@@ -259,7 +272,7 @@ class Asking:
         self._deadlines.set((_RESEND, asked.request.id), now + wait)
 
     def _send(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        asked.is_sent = True
+        asked.sent_at = now
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
         self._effects.append(Publish(expression, asked.cancel or asked.request))
 

@@ -74,6 +74,8 @@ class Serving:
         self._newest: dict[Key, Record] = {}
         """The newest request of each key, of any kind."""
         self._named: dict[str, Record] = {}
+        self._live: dict[str, Record] = {}
+        """Requests that have not ended, by name."""
         self._ended = Ended()
         self._names = Names()
         self._runs: dict[str, str] = {}
@@ -88,12 +90,17 @@ class Serving:
         return None if self._deadlines.look == inf else self._deadlines.look
 
     def is_live(self, name: str) -> bool:
-        return name in self._named and self._named[name].state is not _ENDED
+        return name in self._live
 
     @property
     def live(self) -> int:
         """Number of requests that have not ended."""
-        return len(self._named) - len(self._ended)
+        return len(self._live)
+
+    @property
+    def remembered(self) -> int:
+        """Bytes of the requests that have ended and are remembered."""
+        return self._ended.bytes
 
     def asked(self, name: str) -> Request | None:
         """The request as it came, with its own id; None if it was never made, or is forgotten."""
@@ -110,6 +117,8 @@ class Serving:
 
         sender: the process, or the connection, that it came from; empty if nothing tells.
         """
+        for old in self._ended.forgotten(now):
+            self._forget(old)
         key, kind = key_of(request), kind_meant(request)
         newest = self._newest.get(key)
         if newest is not None and newest.state is not _ENDED and kind not in ("", newest.kind):
@@ -196,8 +205,7 @@ class Serving:
         return effects
 
     def _live_of(self, requester: str) -> Iterable[Record]:
-        live = (record for record in self._named.values() if record.state is not _ENDED)
-        return [record for record in live if record.request.requester == requester]
+        return [record for record in self._live.values() if record.key[0] == requester]
 
     def _is_new(self, record: Record, request: Request, now: Seconds) -> bool:
         """True if `request` is another than the one of `record`, which has ended.
@@ -231,12 +239,13 @@ class Serving:
         known = (record.key, record.kind)
         if (before := self._known.get(known)) is not None:
             self._forget(before)
-        self._known[known] = self._named[record.name] = self._newest[record.key] = record
+        self._known[known] = self._named[name] = self._live[name] = self._newest[record.key] = record
         return record
 
     def _forget(self, record: Record) -> None:
         self._ended.discard(record)
         self._named.pop(record.name, None)
+        self._live.pop(record.name, None)
         if self._known.get((record.key, record.kind)) is record:
             del self._known[record.key, record.kind]
         if self._newest.get(record.key) is record:
@@ -253,8 +262,11 @@ class Serving:
                 self._deadlines.clear(clock)
             if record.state is _ENDED:
                 record.ended_at = now
-                for oldest in self._ended.add(record):
+                self._live.pop(record.name, None)
+                for oldest in self._ended.add(record, now):
                     self._forget(oldest)
+        elif before is _ENDED:
+            self._ended.named(record, now)
 
     # -- actions of the table, each with the message that has caused it -------------------------------------------
 
@@ -309,8 +321,8 @@ class Serving:
 
     def _answer(self, record: Record, now: Seconds, cause: _Cause) -> None:
         assert isinstance(cause, Answer)
-        record.answer = answering(record.request, cause)
-        self._effects.append(Publish(record.answer))
+        record.answer = answer = answering(record.request, cause)
+        self._effects.append(Publish(answer))
 
     def _repeat(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Answer again: the request that comes now, since a cancellation of no kind may have come before it."""

@@ -5,13 +5,12 @@ from collections.abc import Iterable
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.runtime.absent import Absent
 
 ActionEvent = ActionBegan | ActionEnded | ActorFound | ActorLost
 Which = tuple[str, str, tuple[str, ...]]
 MOST = 256
 """Number of actions of one actor that can go on: of more, the oldest are forgotten."""
-FORGOTTEN_AFTER: Seconds = 600.0
-"""Time for which the state of somebody who is not seen any more is kept for late readers, if nothing goes on."""
 
 
 def which(action: ActionBegan | ActionEnded) -> Which:
@@ -67,8 +66,8 @@ class OngoingActionTracker:
 
     def __init__(self) -> None:
         self._actors: dict[str, Ongoing] = {}
-        self._idle: dict[str, Seconds] = {}
-        """Actors who are not seen and do nothing, and since when; the longest ago first."""
+        self._idle: Absent[str] = Absent()
+        """Actors who are not seen and do nothing."""
 
     def feed(self, events: Iterable[Message], at: Stamp) -> list[OngoingActions]:
         """Take events that are being published. Returns the states to publish after them. at: now.
@@ -85,18 +84,14 @@ class OngoingActionTracker:
 
     def _state(self, actor: str, at: Stamp, now: Seconds) -> OngoingActions:
         ongoing = self._actors[actor]
-        self._idle.pop(actor, None)
+        self._idle.comes(actor)
         if not ongoing.seen and not ongoing.actions:
-            self._idle[actor] = now
+            self._idle.leaves(actor, now)
         return OngoingActions(actor=actor, at=at, actions=ongoing.actions, seen=ongoing.seen)
 
     def forget(self, now: Seconds) -> list[str]:
         """Forget the actors of whom there has been nothing to tell for long. Returns whose states to withdraw."""
-        forgotten = []
-        while self._idle:
-            actor, since = next(iter(self._idle.items()))
-            if since + FORGOTTEN_AFTER > now:
-                break
-            del self._idle[actor], self._actors[actor]
-            forgotten.append(actor)
+        forgotten = self._idle.forgotten(now)
+        for actor in forgotten:
+            del self._actors[actor]
         return forgotten

@@ -278,3 +278,19 @@ def test_the_pulse_tells_of_the_keys_written_lately():
     assert sent.recent(2.5) == {keys.FEEDBACK: 1, keys.BLOCK: 1}
     assert sent.recent(4.0) == {keys.BLOCK: 1}
     assert sent.recent(6.0) == {}
+
+
+def test_what_was_told_before_a_reader_came_is_not_lost_and_what_is_gone_later_is() -> None:
+    sent, follower = SentLog("run"), Follower(HEARD, 100.0)
+    for now in range(5):
+        write(sent, keys.FEEDBACK, float(now))  # long before the reader came
+    assert follower.catch_up(answer(sent, follower, 100.0)) == []
+    assert follower.lost == 0
+
+    for now in (101.0, 102.0):
+        write(sent, keys.FEEDBACK, now)
+    follower.pulse(sent.recent(200.0))
+    follower.behind = True
+    gone = Past(dict(sent.counts), ())
+    assert follower.catch_up(gone) == []
+    assert follower.lost == 2

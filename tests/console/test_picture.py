@@ -396,3 +396,22 @@ def test_two_references_of_one_name_are_two() -> None:
     made = picture((outcome, 10.0), (outcome, 11.0))
 
     assert [each["number"] for each in section(made, "references")] == [0, 1]
+
+
+def test_what_is_over_goes_and_who_has_gone_is_forgotten_though_nobody_looks() -> None:
+    made = Picture("robot", 0.0)
+    none = WindowStatistics()
+    for number in range(50):
+        now = number * 20.0
+        for message in (
+            BlockProgress(block=f"b{number}", progress="start", time=0.0, at=at(now)),
+            net(f"b{number}"),
+            BlockProgress(block=f"b{number}", progress="end", time=1.0, status="done", at=at(now)),
+            NetMarked(block=f"b{number}", is_over=True),
+            Statistics(actor=f"track-{number}", at=at(now), session=none, recent=none),
+        ):
+            made.feed(message, now, now)
+
+    assert len([each for each in made.versions if each.startswith((BLOCK, NET))]) < 10
+    people = {each["actor"] for each in section(made, "measures")["people"]}
+    assert people == {f"track-{number}" for number in range(20, 50)}

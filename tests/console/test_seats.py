@@ -1,6 +1,7 @@
 """Visitors who sit down at the same instant: each is a person of their own, in one window and in two."""
 
 import asyncio
+import gc
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 
@@ -149,3 +150,16 @@ def test_who_gives_way_takes_no_place_and_none_is_kept_for_them() -> None:
 
     assert before == [1, 2]
     assert [seats.before(name, ()) for name in ("seat-00000005-kim", "seat-00000007-uma")] == before
+
+
+@pytest.mark.filterwarnings("error")
+async def test_who_leaves_in_the_very_instant_of_an_order_leaves_nothing_behind(hub: MemoryHub) -> None:
+    async with visitors(hub, 1, 1) as (visitor,):
+        give(visitor, '{"do": "sit", "name": "ann"}')
+        await asyncio.sleep(1.0)
+        for order in ('{"do": "type", "text": "hello"}', '{"do": "point", "target": "cup"}', '{"do": "head"}'):
+            give(visitor, order)
+        await visitor.leave()
+        gc.collect()
+
+        assert visitor.you.person == ""

@@ -223,12 +223,42 @@ async def test_a_prepared_fragment_is_said_at_a_key(place: Place) -> None:
 
 @needs_browser
 async def test_without_the_token_one_only_looks_and_is_told_why(place: Place) -> None:
-    async with opened(place, place.url.partition("?")[0]) as page:
+    elsewhere = place.url.partition("?")[0].replace("127.0.0.1", "localhost")  # which has no cookie of the window
+    async with opened(place, elsewhere) as page:
         await page.until("document.querySelector('#part').textContent.includes('token')")
         await page.value("window.engage.send({ do: 'steer', to: 'stop' })")
 
         await page.until("document.querySelector('#wizard .told').textContent.includes('token')")
         assert await page.value("document.querySelector('#part form').hidden")
+
+
+@needs_browser
+async def test_the_token_is_in_the_address_at_the_first_visit_only_and_no_script_reads_it(place: Place) -> None:
+    async with opened(place) as page:
+        await page.until("window.engage.state.you && !window.engage.state.you.denied?.seat")
+        shown, history, cookies = await page.value("[location.href, document.referrer, document.cookie]")
+        assert (shown, history, cookies) == (place.url.partition("?")[0], "", "")
+        assert not any("token" in each for each in page.requests[1:])
+        await page.go(shown)
+
+        await page.until("window.engage?.state.you && !window.engage.state.you.denied?.seat")
+
+
+@needs_browser
+async def test_no_page_from_elsewhere_shows_the_window_in_a_frame(place: Place) -> None:
+    home = place.url.partition("?")[0]
+    shows = f"""(() => {{ const frame = document.body.appendChild(document.createElement('iframe'));
+      frame.src = '{home}'; return new Promise((done) => frame.onload = () => setTimeout(() => {{
+        let is; try {{ is = !!frame.contentDocument?.querySelector('.window'); }} catch {{ is = false; }}
+        done(is); }}, 1500)); }})()"""
+    async with browser.at_port(place.port) as running, running.page() as page:
+        await page.go(f"{home}pages/")  # of the window's own: it may
+        await page.until("document.body")
+        assert await page.value(shows) is True
+        await page.go(f"{home.replace('127.0.0.1', 'localhost')}pages/")  # to a browser this is elsewhere
+        await page.until("document.body")
+
+        assert await page.value(shows) is False
 
 
 @needs_browser

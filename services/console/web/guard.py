@@ -14,6 +14,13 @@ Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
+HEADERS = (
+    (b"x-frame-options", b"SAMEORIGIN"),
+    (b"referrer-policy", b"same-origin"),
+    (b"x-content-type-options", b"nosniff"),
+)
+"""Said with everything. No page from elsewhere shows the window in a frame, where it could have its visitor click on
+what he does not see; no link tells another server from where it was followed; a file is only what it says it is."""
 REFUSED = 4403
 """Code with which a WebSocket of another page is closed."""
 
@@ -81,14 +88,24 @@ class Guarded:
         programs = scope["path"] in self._for_programs
         refused = refusal(scope["headers"], self._hosts, socket=socket, programs=programs)
         if refused is None:
-            await self._app(scope, receive, send)
+            await self._app(scope, receive, send if socket else _with_headers(send))
         elif socket:
             await send({"type": "websocket.close", "code": REFUSED, "reason": refused[1]})
         else:
             body = refused[1].encode()
             headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(body)).encode())]
+            send = _with_headers(send)
             await send({"type": "http.response.start", "status": refused[0], "headers": headers})
             await send({"type": "http.response.body", "body": body})
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: MutableMapping[str, Any]) -> None:
+        if message["type"] == "http.response.start":
+            message["headers"] = [*message.get("headers", ()), *HEADERS]
+        await send(message)
+
+    return sending
 
 
 def _values(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> list[str]:

@@ -43,6 +43,11 @@ class Measures:
                 return True
         return False
 
+    def forget(self, person: str) -> None:
+        """Drop somebody who has been gone for long."""
+        self._people.pop(person, None)
+        self._left.pop(person, None)
+
     def presence(self, message: PeerAlive | PeerGone) -> bool:
         """Take news of who is on the bus: without recognition nobody's engagement is known. Another life of it tells
         everything anew; the same one goes on with what it had told. Returns whether anything has changed.

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
@@ -35,6 +36,7 @@ from engage_hri.services.console.web.looking import plainly
 from engage_hri.services.console.web.measures import Measures
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, Utterance
 from engage_hri.services.console.web.turns import Turns
+from engage_hri.services.runtime.absent import Acquaintances
 
 CHOICES_KEPT = 40
 NOTES_KEPT = 40
@@ -54,6 +56,8 @@ SECTIONS = (
 """Names of the sections that are always there; `sections.py` has their fields."""
 BLOCK, NET = "block/", "net/"
 """Beginnings of the names of the sections that each block, and each net, has for itself: `block/step-3`."""
+SETTLED_EVERY: Seconds = 1.0
+"""Longest time, while messages come, until what is over is forgotten, whether or not somebody looks."""
 SLOWLY: dict[str, Seconds] = {"measures": 1.0}
 """Sections that are told at most so often: they are large, and nobody sees the difference."""
 
@@ -75,6 +79,7 @@ class Picture:
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
+        self.people = Acquaintances()
         self._numbers = count()
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
@@ -83,6 +88,8 @@ class Picture:
         """Number of the newest state of each section."""
         self._number = 1
         self._encoded: dict[str, tuple[int, bytes]] = {}
+        self._settles = began + SETTLED_EVERY
+        """Time by which the next message lets time pass: else a window that nobody looks at would keep everything."""
         self._late: dict[str, Seconds] = {}
         """Sections that have changed and are told slowly, and when they may be told."""
 
@@ -126,11 +133,14 @@ class Picture:
     def feed(self, message: Message, at: Seconds, now: Seconds) -> None:
         """Take a message. at: local instant that it tells of. now: local time, which never goes back."""
         self.now = max(self.now, now)
+        if self.now >= self._settles:
+            self.advance(self.now)
         is_again = isinstance(message, WarningFeedback) and view.is_again(self._scene, message)
         self._see(message, at)
         match message:
             case World():
                 self._world = message
+                self.people.see([each.id for each in message.people], self.now)
                 self._changed("scene")
             case RobotState():
                 self._state = message
@@ -144,9 +154,13 @@ class Picture:
             case ConnectionEvent(retold=False):
                 self._events.feed(message, at)
                 self._changed("events", *(("measures",) if self._measures.feed(message, at) else ()))
-            case Statistics():
+            case Statistics(actor=actor):
                 self._measures.feed(message, at)
+                if actor:
+                    self.people.hear(actor, self.now)
                 self._changed("measures")
+            case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
+                self.people.hear(message.actor, self.now)
             case BlockProgress() | SyncPointProgress() | PredictionFeedback():
                 self._take_block(message, at)
             case NetPlanned() | NetMarked() | NetWaiting():
@@ -256,6 +270,10 @@ class Picture:
     def advance(self, now: Seconds) -> None:
         """Let time pass: forget what is over, and tell what is told slowly."""
         self.now = max(self.now, now)
+        self._settles = self.now + SETTLED_EVERY
+        for person in self.people.forgotten(self.now):
+            self._measures.forget(person)
+            self._changed("measures")
         for id in self._blocks.forget(now):
             self._drop(f"{BLOCK}{id}")
         left = self._latest_shown(nets.without_old(self._nets, now))

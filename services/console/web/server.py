@@ -2,9 +2,12 @@
 
 import asyncio
 import contextlib
+import re
 import secrets
 import socket
+from base64 import b64encode
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from hashlib import sha256
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +16,7 @@ from typing import Any
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -53,6 +56,12 @@ MESSAGES = "/messages"
 PAGES = "/pages"
 """Path of pages of others."""
 MOST_PROGRAMS = 100
+POLICY = (
+    "default-src 'none'; script-src 'self' 'sha256-{imports}'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'self'"
+)
+"""What our own page may load and do. imports: digest of its map of modules, the only script in the page itself."""
 NO_TEXT = 1003
 """Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
@@ -61,15 +70,29 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
     """The page and its frames, for requests that name one of these hosts.
 
     pages: a folder of pages of somebody else, which may listen to the messages. token: who takes part has it in the
-    address of the page.
+    address of the page at the first visit, and then in a cookie, which no script can read: the page's address may be
+    seen, copied, and kept in the history of the browser.
     """
+    cookie = f"engage-{sha256(token.encode()).hexdigest()[:12]}"  # windows at all ports of a host share their cookies
+
+    def is_token(given: str) -> bool:
+        return secrets.compare_digest(given.encode(), token.encode())
+
+    def enter(request: Request) -> Response | None:
+        if (given := request.query_params.get("token")) is None:
+            return None
+        response = RedirectResponse("./", 303)
+        if is_token(given):
+            response.set_cookie(cookie, token, path=None, httponly=True, samesite="strict")  # path: that of the page
+        return response
+
     sessions = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
 
     async def frames(browser: WebSocket) -> None:
-        given = browser.query_params.get("token", "")
+        given = browser.query_params.get("token", browser.cookies.get(cookie, ""))
         window.viewers += 1
         try:
-            await _shown(browser, sessions, secrets.compare_digest(given.encode(), token.encode()))
+            await _shown(browser, sessions, is_token(given))
         finally:
             window.viewers -= 1
 
@@ -87,7 +110,7 @@ def application(window: Window, hosts: Hosts, token: str, pages: Path | None = N
     more: list[BaseRoute] = [WebSocketRoute(MESSAGES, messages)]
     if pages is not None:
         more.append(Mount(PAGES, StaticFiles(directory=pages, html=True)))
-    return Guarded(_app(window.bus.robot, frames, sessions.close, more), hosts, {MESSAGES})
+    return Guarded(_app(window.bus.robot, frames, sessions.close, more, enter), hosts, {MESSAGES})
 
 
 def recorded(recording: Recording, hosts: Hosts) -> App:
@@ -105,12 +128,18 @@ def _app(
     frames: Callable[[WebSocket], Awaitable[None]],
     close: Callable[[], Awaitable[None]],
     more: Iterable[BaseRoute] = (),
+    enter: Callable[[Request], Response | None] = lambda request: None,
 ) -> Starlette:
-    """The page and its frames. close: is called at the end."""
+    """The page and its frames. close: is called at the end. enter: may answer in place of the page."""
     page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{robot}", escape(robot))
 
+    imports = re.search("<script type=.importmap.>(.*?)</script>", page)
+    assert imports is not None
+    digest = b64encode(sha256(imports[1].encode()).digest()).decode()
+    headers = {"content-security-policy": POLICY.format(imports=digest)}
+
     async def index(request: Request) -> Response:
-        return HTMLResponse(page)
+        return enter(request) or HTMLResponse(page, headers=headers)
 
     @contextlib.asynccontextmanager
     async def life(app: Starlette) -> AsyncIterator[None]:

@@ -86,7 +86,10 @@ class Window:
         """Note who tells of whom, until the subscription is closed."""
         async for received in reports:
             if isinstance(received.message, OngoingActions):
-                self._reporters[received.message.actor] = keys.reporter_of(received.key)
+                actor, people = received.message.actor, self.picture.people
+                people.hear(actor, self.bus.now())
+                self._reporters = {one: by for one, by in self._reporters.items() if one in people}
+                self._reporters[actor] = keys.reporter_of(received.key)
 
     def new_id(self) -> str:
         """Make an id for a fragment that somebody makes at the page."""

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -244,10 +245,11 @@ class Visitor:
 
         task = asyncio.create_task(contained(), name="visitor")
         self._tasks.add(task)
-        task.add_done_callback(self._ended)
+        task.add_done_callback(partial(self._ended, work))
         return task
 
-    def _ended(self, task: asyncio.Task[None]) -> None:
+    def _ended(self, work: Coroutine[Any, Any, None], task: asyncio.Task[None]) -> None:
+        work.close()  # it has not begun if the visitor left in the very instant of the order
         self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
             self._window.bus.failed(error, "an order of the page")

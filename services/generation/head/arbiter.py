@@ -22,6 +22,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.inhibitions import Inhibition
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
+from engage_hri.services.runtime.absent import Acquaintances
 
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0
@@ -89,6 +90,7 @@ class Arbiter:
         self._hands = HandWatch(robot, config)
         self._faces = FaceWatch(robot, config)
         self._glances = GlanceWatch(config)
+        self._people = Acquaintances()
         self._inhibition: Inhibition | None = None
         self._fragment: Claim | None = None
         self._thought: Claim | None = None
@@ -117,10 +119,13 @@ class Arbiter:
                 self._world = observation
                 self._hands.feed(observation, now)
                 self._faces.feed(observation, now)
+                self._people.see([person.id for person in observation.people], now)
             case RobotState():
                 self._state = observation
-            case Statistics():
+            case Statistics(actor=actor):
                 self._glances.feed(observation, now)
+                if actor:
+                    self._people.hear(actor, now)
             case ConnectionEvent():
                 self._glances.feed(observation, now)
                 self._responses.feed(
@@ -202,6 +207,9 @@ class Arbiter:
 
     def rule(self, now: Seconds) -> Ruling:
         """Decide on the owner by now, and on the gaze shift that takes the head to its target."""
+        for person in self._people.forgotten(now):
+            self._faces.forget(person)
+            self._glances.forget(person)
         claims = self._claims(now)
         before, waited = self._owner, self._waiting
         if waited is None:

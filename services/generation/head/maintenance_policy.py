@@ -5,6 +5,7 @@ They watch moving hands, the face of the person, and the time since the last con
 
 import math
 from collections import Counter
+from itertools import takewhile
 
 from msgspec import Struct
 
@@ -14,6 +15,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.runtime.absent import Absent
 from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 
@@ -32,6 +34,7 @@ class HandWatch:
         self._robot = robot
         self._config = config
         self._hands: dict[str, _Hand] = {}
+        """Hands that move, or are tracked."""
         self._places: dict[str, Entity] = {}
         self._acts: dict[tuple[str, tuple[str, ...]], str] = {}
         """Manipulations under way: actor and targets -> the hand, or the object if no hand of the actor is known."""
@@ -117,6 +120,7 @@ class HandWatch:
                 and now >= hand.still_since + self._config.hand_stillness
             ):
                 hand.active = False
+        self._hands = {id: hand for id, hand in self._hands.items() if hand.active or hand.moving_since is not None}
         active = [id for id, hand in self._hands.items() if hand.active]
         if not active:
             self._watched = ""
@@ -134,8 +138,11 @@ class FaceWatch:
         self._robot = robot
         self._config = config
         self._people: dict[str, Entity] = {}
-        self._lost: dict[str, Seconds] = {}
-        self._known: list[str] = []
+        self._here: set[str] = set()
+        """Those with a face who have not been lost; the world may still tell of one who has."""
+        self._lost: Absent[str] = Absent()
+        """Those with a face who have been lost since; they are known until they are forgotten."""
+        self._has_met = False
         self._seen: Seconds = float("-inf")
         self._followed = ""
         self.partner = ""
@@ -146,15 +153,30 @@ class FaceWatch:
             case World():
                 seen = {person.id: person for person in message.people if person.id != self._robot}
                 for id in self._people.keys() - seen.keys():
-                    self._lost.setdefault(id, now)
+                    self._lose(id, now)
                 for id in seen.keys() - self._people.keys():
-                    self._lost.pop(id, None)
+                    self._find(id)
                 self._people = seen
-                self._known += [id for id in seen if id not in self._known]
+                self._has_met |= bool(seen)
             case ActorLost(actor=actor):
-                self._lost.setdefault(actor, now)
+                self._lose(actor, now)
             case ActorFound(actor=actor):
-                self._lost.pop(actor, None)
+                if actor in self._lost:
+                    self._find(actor)
+
+    def _lose(self, id: str, now: Seconds) -> None:
+        if id in self._here:
+            self._here.discard(id)
+            self._lost.leaves(id, now)
+
+    def _find(self, id: str) -> None:
+        self._lost.comes(id)
+        self._here.add(id)
+
+    def forget(self, id: str) -> None:
+        """Drop somebody who has been gone for long."""
+        self._here.discard(id)
+        self._lost.comes(id)
 
     def present(self, now: Seconds) -> list[str]:
         """Ids of the people with a face that is seen, or was a moment ago; the nearest first."""
@@ -163,19 +185,19 @@ class FaceWatch:
             person = self._people.get(id)
             return (math.hypot(person.position[0], person.position[1]) if person else math.inf, id)
 
-        here = [id for id in self._known if id not in self._lost or now < self._lost[id] + FACE_GRACE]
-        return sorted(here, key=distance)
+        missed = takewhile(lambda lost: now < lost[1] + FACE_GRACE, self._lost.latest())
+        return sorted((*self._here, *(id for id, _ in missed)), key=distance)
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [lost + FACE_GRACE for lost in self._lost.values()]
-        return min((each for each in due if each > self._seen), default=None)
+        due = (since + FACE_GRACE for _, since in self._lost.latest())
+        return min(takewhile(lambda at: at > self._seen, due), default=None)
 
     def claim(self, now: Seconds) -> Claim | None:
         self._seen = now
         present = self.present(now)
         if not present:
-            return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._known else None
+            return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._has_met else None
         if self.partner in present:
             self._followed = self.partner
         elif self._followed not in present:  # stay with a face while it is seen, however people move about
@@ -184,7 +206,7 @@ class FaceWatch:
         return Claim(kind="face", priority=6, target=self._followed, reason=reason)
 
     def is_face(self, target: str) -> bool:
-        return target in self._known
+        return target in self._here or target in self._lost
 
 
 class GlanceWatch:
@@ -218,6 +240,11 @@ class GlanceWatch:
                     self._own.clear()
                 if cause == "maintenance":
                     self._own.update((responder, ""))
+
+    def forget(self, actor: str) -> None:
+        """Drop somebody who has been gone for long, as recognition does."""
+        self._statistics.pop(actor, None)
+        self._own.pop(actor, None)
 
     def head_is_on_face(self, on_face: bool, now: Seconds) -> None:
         if self._on_face != on_face or self._quiet_since is None:

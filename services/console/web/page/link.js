@@ -30,7 +30,6 @@ export function follow({ take, tell, report, wait }) {
   function open() {
     const place = new URL("frames", document.baseURI);
     place.protocol = place.protocol.replace("http", "ws");
-    place.search = location.search;
     place.searchParams.set("session", orders.session);
     const own = new WebSocket(place);
     socket = own;

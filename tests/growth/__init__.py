@@ -1,0 +1,1 @@
+"""One law over all that runs long: nothing grows with what is over."""

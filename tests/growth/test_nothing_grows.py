@@ -1,0 +1,64 @@
+"""Nothing grows: N passers-by, blocks, clients and visitors leave no more behind than the N before them.
+
+The law knows no class: it measures whatever can be reached from what runs (`reach.py`), and names what has grown by
+the attributes that lead there.
+"""
+
+import asyncio
+from pathlib import Path
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.subscription import KEYS_KEPT
+from engage_hri.services.client.hearing import MOST as UTTERANCES_KEPT
+from engage_hri.services.console.view import EVENTS_KEPT, WARNINGS_KEPT
+from engage_hri.services.console.view import UTTERANCES_KEPT as UTTERANCES_SHOWN
+from engage_hri.services.generation.turns.heard import MOST as WORDS_KEPT
+from engage_hri.services.generation.turns.heard import PEOPLE
+from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
+from engage_hri.services.recognition.events.machine import TEXTS_KEPT
+from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
+from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
+from engage_hri.services.requests.deadlines import SLACK
+from engage_hri.services.requests.names import KEPT as NAMES_KEPT
+from tests.growth.lives import CALM, life
+from tests.growth.reach import Growth, grown, modules, running, sizes
+
+LIMITS = {
+    "_carriers": KEYS_KEPT, "_wanting": KEYS_KEPT, "_used": NAMES_KEPT, "_told": UTTERANCES_KEPT, "_told_of": PEOPLE,
+    "_said": WORDS_KEPT, "_errors": PEOPLE_KEPT + 1, "_ended_turns": TURNS_KEPT, "_aborted_turns": TURNS_KEPT,
+    "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_points": BLOCKS_KEPT,
+    "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
+    "_heap": 4 * SLACK, "_scheduled": 400,
+}  # fmt: skip
+"""Containers that are bounded by number, not by time. The last two drop what is outdated once there is much of it."""
+STEPS = 6
+"""Steps of life between two measures; of each, whatever leaks keeps at least one thing."""
+REST: Seconds = 20.0
+"""Time after which all that was begun is over."""
+
+
+async def growth(folder: Path, *, windows: bool) -> list[Growth]:
+    """What is larger after 2 N steps of life than after N, each time after a calm, one more step, and a rest."""
+    found = []
+    async with life(folder, windows=windows) as step:
+        for stretch in range(2):
+            for number in range(STEPS + 1):
+                if number == STEPS:
+                    await asyncio.sleep(CALM)
+                await step(stretch * (STEPS + 1) + number)
+            await asyncio.sleep(REST)
+            found.append(sizes({**running(), **modules()}, LIMITS))
+    return grown(found[0], found[1], slack=STEPS // 2)
+
+
+def of_recorder(one: Growth) -> bool:
+    """Whether it is the index of a recording: a line for each chunk and channel, which the file needs at its end."""
+    return any(word in one.path for word in (".writer.", "recorder._lines", "writing.Line", "mcap.records"))
+
+
+async def test_a_robot_and_its_clients_keep_nothing_of_those_who_have_gone(tmp_path: Path) -> None:
+    assert [str(one) for one in await growth(tmp_path, windows=False) if not of_recorder(one)] == []
+
+
+async def test_a_window_keeps_nothing_of_what_is_over_whether_somebody_looks_or_not(tmp_path: Path) -> None:
+    assert [str(one) for one in await growth(tmp_path, windows=True) if not of_recorder(one)] == []
