@@ -19,12 +19,14 @@ from hypothesis import settings
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
 from tests.longest import LONGEST
+from tests.skips import Skips
 
 pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generation.head_stories")
 
 # No deadline: how long an example takes on a busy machine says nothing.
 settings.register_profile("same", derandomize=True, database=None, deadline=None)
 settings.register_profile("long", parent=settings.get_profile("same"))
+settings.register_profile("map", parent=settings.get_profile("same"), max_examples=5)
 settings.register_profile("search", parent=settings.get_profile("default"), deadline=None)
 settings.load_profile("same")
 
@@ -52,6 +54,8 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
     )
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Skips(), "skips")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

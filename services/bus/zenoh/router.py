@@ -83,7 +83,7 @@ async def routing(
         session = open_router(connect, listen, more)
         bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
         door = Door(session, bridge, Crowd(holders), tell, served)
-        listening = Listening(session, tell)
+        listening = Listening(door.names, tell)
         try:
             yield Routing(session, bridge)
         finally:
@@ -105,6 +105,8 @@ class Door:
         served: Callable[[], None],
     ) -> None:
         """tell, served: see `routing`."""
+        self.names: dict[str, str] = {}
+        """Common names by the address at the other end of a link."""
         self._crowd = crowd
         self._tell = tell
         self._served = served
@@ -144,8 +146,11 @@ class Door:
         zid, name, address = str(event.link.zid), event.link.auth_identifier or "", str(event.link.dst)
         link = Link(zid, name, address)
         if event.kind == zenoh.SampleKind.PUT:
+            if name:
+                self.names[place(address)] = name
             self._keep_out(*self._crowd.came(link, self._loop.time()))
         else:
+            self.names.pop(place(address), None)
             self._crowd.went(link)
 
     def _keep_out(self, line: str, links: Iterable[Link]) -> None:
