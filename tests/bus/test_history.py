@@ -374,7 +374,7 @@ async def test_a_question_with_more_counts_than_it_can_have_gets_all_that_is_kep
     history: History = far._history
     history.ask(
         ["engage/v1/evt/**"], near.run, Missing(seen, is_new=False),
-        lambda run, past: told.append([one.envelope.nth for one in past.written]), ended.set,
+        lambda past: told.append([one.envelope.nth for one in past.written]), ended.set,
     )  # fmt: skip
     await asyncio.wait_for(ended.wait(), PATIENCE)
 
