@@ -9,7 +9,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_D
 	$(BIN)/python -m pip install -qq
 PROFILE := same
 
-.PHONY: demo test test-long lint style docs generate coverage bench reachy-mini clean
+.PHONY: demo test test-long test-machines mutants lint style docs generate coverage bench reachy-mini clean
 
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
@@ -23,6 +23,24 @@ test: style
 # All random cases; `make test` tries one of three (tests/random_cases.py).
 test-long: PROFILE := long
 test-long: test
+
+# What `make test` leaves out on most machines, and never has the time for: several machines on this one, which wants root,
+# and all of the contract on the mock-up of a Reachy Mini. CI does it each week.
+test-machines: $(READY) reachy-mini
+	@REACHY_MINI_FULL=1 ENGAGE_PLATFORM=weekly $(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder \
+		--hypothesis-profile=long tests/lab tests/control/reachy_mini $(ARGS)
+
+# Change the code in one place, and see whether a test notices: tests/mutants. `make mutants ARGS="--folder services/bus"`.
+mutants: build/mutants/seconds.json
+	@nice $(BIN)/python -m tests.mutants $(ARGS)
+
+# Which test file runs which line: about as long as the tests, once. To make it anew when much has changed: rm -r build/mutants
+build/mutants/seconds.json: | $(READY)
+	@$(PIP) -e '.[coverage]'
+	@COVERAGE_PROCESS_START=$(CURDIR)/tests/mutants/coverage.toml $(BIN)/pytest -p tests.mutants.contexts -n auto \
+		--dist loadfile --no-loadscope-reorder --hypothesis-profile=map --ignore tests/lab --ignore tests/docs \
+		--ignore tests/test_wheel.py --ignore tests/control/reachy_mini/test_mockup.py || test -s $@
+	@$(BIN)/coverage combine -q --rcfile=tests/mutants/coverage.toml
 
 lint: style
 	@$(BIN)/mypy --no-error-summary

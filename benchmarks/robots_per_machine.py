@@ -1,26 +1,53 @@
-"""What one robot takes of a machine while it plays the tangram: a process for each service, beside all in one.
+"""Robots that run on one machine and one router, each with a manager that talks: memory, processor time, delay.
 
-    python benchmarks/robots_per_machine.py [--seconds 40] [--settle 8] [--json]
+    python benchmarks/robots_per_machine.py [--robots 10] [--seconds 20] [--way processes] [--json]
 
-Each way plays by itself, in real time, one after the other; this process only looks. Processor time is that of all
-its processes between two looks, as the kernel counts it. Memory is the proportional share (Pss): what several
-processes have in common counts once. Linux only.
+All robots of a run start first, and are looked at while nobody speaks to them. Then each has a manager that performs
+one fragment and one block of speeches that wait for one another, again and again without pause; the managers are in
+one further process. Processor time is that of all processes of a robot between two looks, as the kernel counts it.
+Memory is what is resident (Rss), and the proportional share (Pss): what several processes have in common counts once.
+The delay is from the sync point that ends a speech to the command for the next one, by the times at which the robot
+sent them, which uvloop tells in whole milliseconds. What was not done is told on standard error. Linux only.
 """
 
 import argparse
+import asyncio
 import json
 import os
 import subprocess
 import sys
 import time
+from contextlib import AsyncExitStack, ExitStack
 from pathlib import Path
+from statistics import mean
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.bus_roundtrip import free_endpoint
+from benchmarks.harness import percentile
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import PerformBehavior, SyncPointReached
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.messages import decode
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.client.robot import Robot
+from engage_hri.services.commandline.process import run
+from engage_hri.services.commandline.roster import ROBOT
 
 TICKS = os.sysconf("SC_CLK_TCK")
-WAYS = {"a process for each service": (), "all in one (`--in-one`)": ("--in-one",)}
+WAYS = {
+    "processes": (),
+    "pair": ("--together", "realizer,control"),
+    "in-one": ("--in-one",),
+}
+ROUND: Seconds = 4.0
+"""Time that one fragment and one block take."""
+FRAGMENT = {"turn_status": "full", "parts": [{"say": "One moment please, I am going to have a look."}]}
+CHAIN = """<bml id="{id}"><speech id="s0"><text>Well.</text></speech>
+<speech id="s1" start="s0:end"><text>Well.</text></speech>
+<speech id="s2" start="s1:end"><text>Well.</text></speech></bml>"""
 
 
 def family(pid: int) -> list[int]:
@@ -32,51 +59,149 @@ def family(pid: int) -> list[int]:
     return found
 
 
-def processor_seconds(pids: list[int]) -> float:
+def processor_seconds(pids: list[int]) -> Seconds:
     """Time that the processes have computed so far, in user and system mode."""
     fields = [Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split() for pid in pids]
     return sum(int(each[11]) + int(each[12]) for each in fields) / TICKS
 
 
-def megabytes(pids: list[int]) -> float:
-    """Proportional share of memory."""
+def megabytes(pids: list[int], what: str) -> float:
+    """Memory of the processes. what: `Rss` or `Pss`."""
     lines = (line for pid in pids for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines())
-    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024
+    return sum(int(line.split()[1]) for line in lines if line.startswith(f"{what}:")) / 1024
 
 
-def measure(way: tuple[str, ...], settle: float, seconds: float) -> dict[str, float]:
-    """Start a robot, let it play, and look twice."""
-    command = [sys.executable, "-m", "engage_hri", "up", "--task", "--quiet", "--robot", "measured", *way]
-    robot = subprocess.Popen([*command, "--listen", free_endpoint()], stdout=subprocess.DEVNULL)
-    try:
-        time.sleep(settle)
-        before, began = processor_seconds(family(robot.pid)), time.monotonic()
-        time.sleep(seconds)
-        pids = family(robot.pid)
-        share = (processor_seconds(pids) - before) / (time.monotonic() - began)
-        return {"processes": len(pids), "percent_of_a_core": 100 * share, "MB": megabytes(pids)}
-    finally:
-        robot.terminate()
-        robot.wait()
+def percent(pids: list[int], seconds: float) -> float:
+    """Processor time of the next seconds, in percent of a core."""
+    before, began = processor_seconds(pids), time.monotonic()
+    time.sleep(seconds)
+    return 100 * (processor_seconds(pids) - before) / (time.monotonic() - began)
+
+
+def name(number: int) -> str:
+    return f"measured-{number}"
+
+
+def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
+    """Start a router and the robots, look, let the managers talk, and look again."""
+    engage, endpoint = [sys.executable, "-m", "engage_hri"], free_endpoint()
+    with ExitStack() as stack:
+
+        def start(*command: str, errors: int | None = subprocess.DEVNULL) -> "subprocess.Popen[str]":
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+            stack.callback(process.wait)
+            stack.callback(process.terminate)
+            return process
+
+        def heard(process: "subprocess.Popen[str]", text: str) -> str:
+            assert process.stdout is not None
+            for line in process.stdout:
+                if text in line:
+                    return line
+            raise RuntimeError(f"{process.args} ended without {text!r}")
+
+        router = start(*engage, "router", "--listen", endpoint)
+        began = time.monotonic()
+        where = ("--connect", endpoint, "--mode", "client")
+        all_up = [start(*engage, "up", "--robot", name(one), *where, *WAYS[way]) for one in range(robots)]
+        for each in all_up:
+            heard(each, "all services are up")
+        up = time.monotonic() - began
+        time.sleep(3.0)
+        families = [family(each.pid) for each in all_up]
+        pids = [pid for each in families for pid in each]
+        idle = percent(pids, min(seconds, 10.0))
+        managers = start(sys.executable, __file__, "--talk", endpoint, str(robots), str(seconds), errors=None)
+        heard(managers, "talking")
+        time.sleep(ROUND)
+        before = processor_seconds(family(router.pid))
+        talking = percent(pids, seconds)
+        routed = 100 * (processor_seconds(family(router.pid)) - before) / seconds
+        told = json.loads(heard(managers, "{"))
+        return {
+            "robots": robots, "processes": len(pids) / robots, "all_up_s": up,
+            "idle_percent": idle / robots, "talking_percent": talking / robots, "router_percent": routed / robots,
+            "Rss_MB": mean(megabytes(each, "Rss") for each in families),
+            "Pss_MB": mean(megabytes(each, "Pss") for each in families),
+            "router_MB": megabytes(family(router.pid), "Rss"), **told,
+        }  # fmt: skip
+
+
+async def talk(endpoint: str, robots: int, seconds: Seconds) -> None:
+    """Be the managers of all robots, and tell on standard output what became of it."""
+    delays: list[Seconds] = []
+    ends = {"done": 0, "not_done": 0}
+    async with AsyncExitStack() as stack:
+        buses = []
+        for number in range(robots):
+            hub = await stack.enter_async_context(await open_hub(name(number), connect=[endpoint], mode="client"))
+            buses.append(hub.join("manager"))
+            with buses[-1].subscribe(keys.ANY_ALIVE) as who:
+                missing = {*ROBOT}
+                while missing:
+                    received = await who.next()
+                    assert received is not None
+                    missing.discard(getattr(received.message, "participant", ""))
+        watching = [asyncio.create_task(watch(bus, delays)) for bus in buses]
+        print("talking", flush=True)
+        async with asyncio.TaskGroup() as group:
+            for number, bus in enumerate(buses):
+                # Real managers do not begin in one instant: they are spread over about the time of one round.
+                wait = ROUND * number / robots
+                group.create_task(manage(bus, wait, bus.now() + wait + seconds, ends))
+        for task in watching:
+            task.cancel()
+    known = {f"p{p}_ms": 1000 * percentile(delays, p) for p in (50, 99)}
+    print(json.dumps({**ends, "delays": len(delays), **known, "worst_ms": 1000 * max(delays)}), flush=True)
+
+
+async def manage(bus: Bus, wait: Seconds, until: Seconds, ends: dict[str, int]) -> None:
+    await asyncio.sleep(wait)
+    async with Robot.on(bus) as robot:
+        number = 0
+        while bus.now() < until:
+            for work in (robot.perform(FRAGMENT), robot.realize(CHAIN.format(id=f"chain-{number}"))):
+                try:
+                    async with asyncio.timeout(60.0):
+                        status = (await work).status
+                except (EngageError, TimeoutError) as error:
+                    status = str(error)
+                ends["done" if status == "done" else "not_done"] += 1
+                if status != "done":
+                    print(bus.robot, status, file=sys.stderr)
+            number += 1
+
+
+async def watch(bus: Bus, delays: list[Seconds]) -> None:
+    """Note how soon each speech of a chain is asked for after the one before has ended."""
+    ended: dict[tuple[str, str], Seconds] = {}
+    with bus.tap(keys.SYNC_POINT, keys.BEHAVIOR) as tap:
+        async for sample in tap:
+            match decode(sample.payload, sample.encoding):
+                case SyncPointReached(block=block, behavior=behavior, sync="end") if block.startswith("chain-"):
+                    ended[block, f"s{int(behavior[1:]) + 1}"] = sample.sent
+                case PerformBehavior(block=block, behavior=each) if (block, each.id) in ended:
+                    delays.append(sample.sent - ended.pop((block, each.id)))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=40.0, help="between the two looks")
-    parser.add_argument("--settle", type=float, default=8.0, help="before the first look")
+    parser.add_argument("--robots", type=int, default=10)
+    parser.add_argument("--seconds", type=float, default=20.0, help="between two looks")
+    parser.add_argument("--way", choices=WAYS, action="append", help="may be repeated; without it all of them")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--talk", nargs=3, metavar=("ENDPOINT", "ROBOTS", "SECONDS"), help=argparse.SUPPRESS)
     options = parser.parse_args()
-    found = {name: measure(way, options.settle, options.seconds) for name, way in WAYS.items()}
-    if options.json:
-        print(json.dumps(found))
+    if options.talk:
+        endpoint, robots, seconds = options.talk
+        run(talk(endpoint, int(robots), float(seconds)))
         return
-    first = next(iter(found.values()))
-    for name, each in found.items():
-        cores, memory = (each[key] / first[key] for key in ("percent_of_a_core", "MB"))
-        print(
-            f"{name:28} {each['processes']:2.0f} processes  {each['percent_of_a_core']:5.1f} % of a core"
-            f" ({cores:.2f})  {each['MB']:4.0f} MB ({memory:.2f})  {100 / each['percent_of_a_core']:3.0f} a core"
-        )
+    for way in options.way or WAYS:
+        found = measure(way, options.robots, options.seconds)
+        if options.json:
+            print(json.dumps({"way": way, **found}))
+        else:
+            print(f"{way:10}", "  ".join(f"{key} {value:.4g}" for key, value in found.items()), flush=True)
 
 
 if __name__ == "__main__":

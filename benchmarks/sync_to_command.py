@@ -10,6 +10,9 @@ new request. The first row is a raw Zenoh ping-pong of the same payload between 
 The last row is the honest trip: the same, while recognition serves on that bus and a client follows the feedback, the
 sync points, the actions and the connection events, each in a process of its own.
 
+In the row before it realizer and body are in one process, as with `engage up --together realizer,control`: what they
+say to one another goes in memory, and over Zenoh to such a client in another process.
+
 With `--inside` there is one process and a bus in memory: what is left is the realizer; in the second row with
 recognition and such a client, which take their turns on the same loop. And the memory that it keeps for each of 100
 live blocks, as `tracemalloc` counts it.
@@ -174,6 +177,7 @@ async def client(bus: Bus, ready: Ready) -> None:
 
 REALIZER = partial(realize, config=RealizerConfig())
 RECOGNITION = partial(recognize, config=RecognitionConfig())
+TOGETHER = "the same, both in one process, and a client"
 HONEST = "the same, recognition and a client listening"
 SERVERS = {
     "raw": serve_raw, "bus": serve_bus, "realizer": serve_realizer, "recognition": serve_recognition,
@@ -182,7 +186,7 @@ SERVERS = {
 
 
 async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
-    raw_end, bus_end, realizer_end, other_end, seen_end, client_end = (free_endpoint() for _ in range(6))
+    raw_end, bus_end, realizer_end, other_end, seen_end, client_end, alone_end = (free_endpoint() for _ in range(7))
     with (
         OtherSide(__file__, "raw", raw_end),
         OtherSide(__file__, "bus", bus_end),
@@ -190,15 +194,19 @@ async def measure(laps: int, trips: int, links: int, as_json: bool) -> None:
         OtherSide(__file__, "realizer", other_end),
         OtherSide(__file__, "recognition", f"{seen_end},{other_end}"),
         OtherSide(__file__, "client", f"{client_end},{other_end},{seen_end}"),
+        OtherSide(__file__, "client", alone_end),
     ):
         session = await connected(raw_end)
         quiet = await open_hub(ROBOT, connect=[bus_end, realizer_end])
         honest = await open_hub(ROBOT, connect=[other_end, seen_end, client_end])
-        async with quiet, honest:
+        together = await open_hub(ROBOT, listen=[free_endpoint()], connect=[alone_end])
+        async with quiet, honest, together, running(together, {"realizer": REALIZER}):
             bus = quiet.join("this")
             await _all_there(bus, 2)
             await _all_there(honest.join("this"), 3)
-            bodies = [Body(quiet.join("control"), links), Body(honest.join("control"), links, HONEST)]
+            await _all_there(together.join("this"), 2)
+            places = ((quiet,), (together, TOGETHER), (honest, HONEST))
+            bodies = [Body(hub.join("control"), links, *name) for hub, *name in places]
             contenders: list[Contender] = [RawPings(session), BusPings(bus), *bodies]
             report(await compare(contenders, laps, trips), as_json)
         session.close()  # type: ignore[no-untyped-call]

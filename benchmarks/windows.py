@@ -12,6 +12,7 @@ import sys
 import tempfile
 from itertools import count
 from pathlib import Path
+from time import perf_counter
 
 import aiohttp
 
@@ -48,7 +49,7 @@ class Watching:
 
     async def browse(self, session: aiohttp.ClientSession, url: str, number: int) -> None:
         """Be one browser, until cancelled."""
-        loop, seen = asyncio.get_running_loop(), set[str]()
+        seen = set[str]()
         address = url.replace("http", "ws").replace("/?", "/frames?")
         async with session.ws_connect(address, headers={"Origin": url.rpartition("/")[0]}) as socket:
             async for message in socket:
@@ -58,7 +59,7 @@ class Watching:
                     for target in person["looks"] or ():
                         if number >= self.slow and target in self.told and target not in seen:
                             seen.add(target)
-                            self.delays.append(loop.time() - self.told[target])
+                            self.delays.append(perf_counter() - self.told[target])
                 if number < self.slow:
                     await asyncio.sleep(1.0)
                 await socket.send_str('{"do": "drawn"}')
@@ -75,7 +76,7 @@ async def measure(bus: Bus, url: str, window: "subprocess.Popen[bytes]", slow: i
             if loop.time() > began + SECONDS:
                 break
             target = f"spot-{slow}-{number}"
-            watching.told[target] = loop.time()
+            watching.told[target] = perf_counter()
             look = ActionBegan(actor="probe", action="look", targets=(target,), at=bus.stamp())
             bus.publish(keys.PERCEIVED_ACTION, look)
             await asyncio.sleep(APART)

@@ -19,12 +19,14 @@ from hypothesis import settings
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
 from tests.longest import LONGEST
+from tests.skips import Skips
 
 pytest.register_assert_rewrite("tests.recognition.event_stories", "tests.generation.head_stories")
 
 # No deadline: how long an example takes on a busy machine says nothing.
 settings.register_profile("same", derandomize=True, database=None, deadline=None)
 settings.register_profile("long", parent=settings.get_profile("same"))
+settings.register_profile("map", parent=settings.get_profile("same"), max_examples=5)
 settings.register_profile("search", parent=settings.get_profile("default"), deadline=None)
 settings.load_profile("same")
 
@@ -49,7 +51,11 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
-    config.addinivalue_line("markers", "each_bus: runs twice: virtual time (memory bus) and wall clock (Zenoh)")
+    config.addinivalue_line(
+        "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
+    )
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Skips(), "skips")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -67,8 +73,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 def pytest_asyncio_loop_factories(
     config: pytest.Config, item: pytest.Item
 ) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
-    if item.get_closest_marker("each_bus"):
-        return {"memory": virtual_loop, "zenoh": asyncio.SelectorEventLoop}
+    if marker := item.get_closest_marker("each_bus"):
+        from tests.bus.places import GroupLoop, SharedLoop  # loads Zenoh, and few workers need it
+
+        shared = {"shared": SharedLoop} if marker.kwargs.get("shared", True) else {}
+        return {"memory": virtual_loop, "zenoh": asyncio.SelectorEventLoop, "group": GroupLoop, **shared}
     if item.get_closest_marker("real_time"):
         return {"real": asyncio.SelectorEventLoop}
     return {"virtual": virtual_loop}

@@ -16,9 +16,14 @@ def share_of(whole: int, one_of: int = SHARE) -> int:
 
     one_of: the share that `make test` tries, where the whole takes minutes.
     """
-    return -(-whole // one_of) if settings.get_current_profile_name() == "same" else whole
+    match settings.get_current_profile_name():
+        case "same":
+            return -(-whole // one_of)
+        case "map":  # which lines run (tests/mutants)
+            return 1
+    return whole
 
 
 def trials() -> int | None:
     """Number of random trials of each law, of a body that takes long to try; None: all. For `BodyContract.seeds`."""
-    return 1 if settings.get_current_profile_name() == "same" else None
+    return 1 if settings.get_current_profile_name() in ("same", "map") else None

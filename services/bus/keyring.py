@@ -5,7 +5,10 @@ trust, and who it is. The folder above, with the folders of several holders, wil
 whose keys it is to take.
 """
 
+import ssl
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.access import Holder
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 
 AUTHORITY, CERTIFICATE, PRIVATE, WHO, HOLDERS = (
     "ca.pem",
@@ -63,26 +66,62 @@ def read_keys(folder: str | Path, name: str) -> Keys:
         if not (place / WHO).exists():
             there = sorted(each.parent.name for each in Path(folder).glob(f"*/{WHO}"))
             known = f"there are keys of {', '.join(there)}: name that folder" if there else _ADVICE
-            raise InputRefused(Fault(reason=f"no keys of {name!r}", where=str(folder), advice=known))
+            raise NotReady(Fault(reason=f"no keys of {name!r}", where=str(folder), advice=known))
     holder = _read(place / WHO, Who)
     for file in (AUTHORITY, CERTIFICATE, PRIVATE):
         try:
             (place / file).read_bytes()
         except OSError as error:
-            raise InputRefused(Fault(reason=error.strerror or str(error), where=str(place / file))) from error
+            raise NotReady(Fault(reason=error.strerror or str(error), where=str(place / file))) from error
     if mode := (place / PRIVATE).stat().st_mode & 0o077:
         reason = f"others may read this private key (mode {mode:03o} for group and others)"
         raise InputRefused(Fault(reason=reason, where=str(place / PRIVATE), advice="chmod 600"))
     if holder.until <= time.time():
         reason = f"the certificate of {holder.common_name} has expired"
-        raise InputRefused(Fault(reason=reason, where=str(place), advice="`engage keys renew`"))
-    return Keys(place, holder)
+        raise NotReady(Fault(reason=reason, where=str(place), advice="`engage keys renew`"))
+    keys = Keys(place, holder)
+    _try(keys)
+    return keys
+
+
+def _try(keys: Keys) -> None:
+    """Use the keys once, without a network: Zenoh says of damaged ones no more than that nobody answers.
+
+    Raises InputRefused: a file is damaged, or the three do not belong together.
+    """
+    server, client = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname, client.verify_mode, server.verify_mode = False, ssl.CERT_NONE, ssl.CERT_REQUIRED
+    steps: tuple[tuple[str, Callable[[], object]], ...] = (
+        (AUTHORITY, lambda: server.load_verify_locations(keys.authority)),
+        (CERTIFICATE, lambda: client.load_verify_locations(keys.certificate)),
+        (PRIVATE, lambda: server.load_cert_chain(keys.certificate, keys.private, "")),
+        (PRIVATE, lambda: client.load_cert_chain(keys.certificate, keys.private, "")),
+        (PRIVATE, lambda: _shake_hands(server, client)),
+    )
+    for file, step in steps:
+        try:
+            step()
+        except (ssl.SSLError, ValueError) as error:
+            beside = f", or not of the {CERTIFICATE} beside it" if file == PRIVATE else ""
+            reason, advice = f"damaged{beside}: {error}", "copy the folder anew from where `engage keys` made it"
+            if isinstance(error, ssl.SSLCertVerificationError):  # one of the two, or the clock of this computer
+                file, reason = CERTIFICATE, f"not accepted with the {AUTHORITY} beside it: {error.verify_message}"
+            raise InputRefused(Fault(reason=reason, where=str(keys.folder / file), advice=advice)) from error
+
+
+def _shake_hands(server: ssl.SSLContext, client: ssl.SSLContext) -> None:
+    """Connect the two in memory. Raises ssl.SSLError."""
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    sides = client.wrap_bio(back, there), server.wrap_bio(there, back, server_side=True)
+    for side in sides * 3:
+        with suppress(ssl.SSLWantReadError):
+            side.do_handshake()
 
 
 def _read(path: Path, kind: type) -> Any:
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind)
     except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path), advice=_ADVICE)) from error
+        raise NotReady(Fault(reason=error.strerror or str(error), where=str(path), advice=_ADVICE)) from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InputRefused(Fault(reason=f"damaged: {error}", where=str(path), advice=_ADVICE)) from error

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Coroutine
+from functools import partial
 from itertools import count
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ import msgspec
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
-from engage_hri.schemas.faults import EngageError, InputRefused
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message, decode, encode, encoding_of, in_form, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -196,7 +196,7 @@ class MemoryHub(Hub):
         """Wait for a participant that serves the key; None at the deadline."""
         while self._loop.time() < deadline:
             for bus in self._buses.values():
-                if key in bus.answers and not self._is_cut(asker, bus.name):
+                if key in bus.answers.served and not self._is_cut(asker, bus.name):
                     return bus
             change: asyncio.Future[None] = self._loop.create_future()
             self._askers.append(change)
@@ -234,8 +234,7 @@ class MemoryBus(Bus):
     def __init__(self, hub: MemoryHub, name: str, role: str, run: str) -> None:
         super().__init__(hub.robot, name, role, "loop", run, count(1))
         self.is_alive = False
-        self.answers: dict[str, Answer] = {}
-        self.under_way = Answering()
+        self.answers = Answering(self)
         self._hub = hub
         self._subscriptions: dict[Subscription, int] = {}
         """Subscriptions, and the number of the last message that was replayed to each."""
@@ -243,10 +242,6 @@ class MemoryBus(Bus):
         """Subscriptions that want a key, of keys seen lately: most messages are for few participants."""
         self._taps: dict[Tap, int] = {}
         self._overflowed = 0
-
-    @property
-    def is_there(self) -> bool:
-        return not self._gone
 
     @property
     def health(self) -> BusHealth:
@@ -330,34 +325,13 @@ class MemoryBus(Bus):
         await asyncio.sleep(0)
         deadline = self.now() + timeout
         while not self._gone and (server := await self._hub.answerer(key, self.name, deadline)) is not None:
-            task: asyncio.Task[Message] | None = None
-            try:
-                told = server.answers[key](asked)
-                if not isinstance(told, Coroutine):
-                    return self._hub.carried(key, told)
-                task = server.under_way.begin(told, key)
-            except EngageError as error:
-                raise InputRefused(error.fault) from error
-            except (Exception, asyncio.CancelledError) as error:  # nothing was awaited: it is the server's mistake
-                raise InputRefused(server.failed(error, f"a question on {key}")) from error
-            await asyncio.wait([task], timeout=max(deadline - self.now(), 0.0))
-            if not task.done():
-                break
-            if server.is_there:
-                return self._answer_of(task, server, key)
+            answer = await server.answers.ask(key, asked, deadline, partial(self._hub.carried, key))
+            if answer is not None:
+                return answer
         raise self.unanswered(key, timeout)
 
-    def _answer_of(self, task: "asyncio.Task[Message]", server: "MemoryBus", key: str) -> Message:
-        """The answer that a server has given in steps. Raises InputRefused."""
-        try:
-            return self._hub.carried(key, task.result())
-        except EngageError as error:
-            raise InputRefused(error.fault) from error
-        except (Exception, asyncio.CancelledError) as error:
-            raise InputRefused(server.failed(error, f"a question on {key}")) from error
-
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
-        self.answers[key] = answer
+        self.answers.served[key] = answer
         self._hub.wake_askers()
 
     def declare_alive(self) -> None:
@@ -375,7 +349,7 @@ class MemoryBus(Bus):
         if self._gone:
             return
         self._gone = True
-        self.under_way.end()
+        self.answers.end()
         self._subscriptions.clear()
         self._wanting.clear()
         self._taps.clear()

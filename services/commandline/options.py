@@ -4,7 +4,8 @@ A command's file has a class `Options` that inherits from these groups and adds 
 """
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import AsyncIterator, Iterable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -142,16 +143,29 @@ class Connected(Configured):
         own = [f"bus.{key}={json.encode(value).decode()}" for key, value in given.items() if value is not None]
         return (*super().overrides, *own)
 
-    async def open(self, bus: "BusConfig", holder: str, listen: Sequence[str] = ()) -> "Hub":
+    async def open(
+        self, bus: "BusConfig", holder: str, listen: Sequence[str] = (), beside: "Hub | None" = None
+    ) -> "Hub":
         """Open the Zenoh hub. Raises EngageError if an endpoint is bad or taken.
 
-        holder: whose keys to take, where the folder of keys is that of several.
+        holder: whose keys to take, where the folder of keys is that of several. beside: another hub of this process.
         """
         from engage_hri.services.bus.keyring import read_keys
         from engage_hri.services.bus.zenoh.hub import open_hub
 
         keys = read_keys(bus.keys, holder) if bus.keys else None
-        return await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode, keys=keys)
+        return await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode, keys=keys, beside=beside)
+
+    @asynccontextmanager
+    async def hubs(self, bus: "BusConfig", names: Iterable[str], beside: "Hub") -> AsyncIterator[dict[str, "Hub"]]:
+        """Hubs of services of this process: `beside`, which is one of it; with keys each has its own."""
+        async with AsyncExitStack() as stack:
+            opened = {}
+            for name in names:
+                opened[name] = beside
+                if bus.keys:
+                    opened[name] = await stack.enter_async_context(await self.open(bus, name, beside=beside))
+            yield opened
 
 
 @dataclass(frozen=True, kw_only=True)

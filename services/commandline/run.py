@@ -1,6 +1,7 @@
-"""Command `engage run SERVICE`: one service as one process on the real bus."""
+"""Command `engage run SERVICES`: one service, or several together, as one process on the real bus."""
 
 import asyncio
+from collections.abc import Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,20 +9,29 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline import last_resort, roster
 from engage_hri.services.commandline.options import Embodied, Listening
 from engage_hri.services.commandline.patient import complain
 from engage_hri.services.commandline.process import DONE, run_until_signal, unique_name, until_closed
 from engage_hri.services.commandline.roster import ROBOT
 from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
-from engage_hri.services.runtime.service import serve
+from engage_hri.services.runtime.service import Service, running
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Embodied, Listening):
     """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
 
-    service: Annotated[roster.ServiceName, typer.Argument(help="Which service.", show_default=False)]
+    services: Annotated[
+        str,
+        typer.Argument(
+            metavar="SERVICE[,SERVICE...]",
+            help=f"One of {', '.join(roster.NAMES)}; several share the process, and speak in memory.",
+            show_default=False,
+            autocompletion=lambda: list(roster.NAMES),
+        ),
+    ]
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
 
@@ -32,32 +42,29 @@ def ready_line(name: str) -> str:
 
 def main(options: Options) -> int:
     """Serve until a signal."""
-    if (options.body or options.voice) and options.service != "control":
+    names = roster.group(options.services)
+    if (options.body or options.voice) and "control" not in names:
         raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
     if options.attended:
         last_resort.end_after_the_parent()
-    on_robot = options.service in ROBOT
+    on_robot = {*names} <= {*ROBOT}
     config = options.read(RobotConfig, elsewhere=ELSEWHERE) if on_robot else options.load()
-    run_until_signal(_serve(options, config))
+    run_until_signal(_serve(options, names, config))
     return DONE
 
 
-async def _serve(options: Options, config: RobotConfig) -> None:
+async def _serve(options: Options, names: tuple[str, ...], config: RobotConfig) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
-    name = options.service
-    service = roster.service(name, config)
-
-    def announce() -> None:
-        complain(ready_line(name))
-
+    services = {name: roster.service(name, config) for name in names}
     async with AsyncExitStack() as stack:
-        hub = await stack.enter_async_context(await options.open(config.bus, name, options.listen or ()))
+        hub = await stack.enter_async_context(await options.open(config.bus, names[0], options.listen or ()))
+        others = await stack.enter_async_context(options.hubs(config.bus, names[1:], hub))
         if not options.attended:  # `engage up` sees for itself who is there
             await stack.enter_async_context(
-                hinting(hub.join(unique_name("run")), config.bus.connect, {*ROBOT} - {name})
+                hinting(hub.join(unique_name("run")), config.bus.connect, {*ROBOT} - {*names})
             )
-        serving = asyncio.create_task(serve(hub, name, service, announce), name=f"service {name}")
+        serving = asyncio.create_task(_until_over({names[0]: hub, **others}, services), name=options.services)
         waiting = {serving}
         if options.attended:
             waiting.add(asyncio.create_task(until_closed(), name="parent"))
@@ -69,3 +76,10 @@ async def _serve(options: Options, config: RobotConfig) -> None:
             await asyncio.wait(waiting)
     if not serving.cancelled():
         serving.result()
+
+
+async def _until_over(hubs: Mapping[str, Hub], services: Mapping[str, Service]) -> None:
+    async with running(hubs, services) as over:
+        for name in services:
+            complain(ready_line(name))
+        await over.wait()

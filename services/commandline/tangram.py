@@ -1,19 +1,18 @@
 """Session of the anchor tangram, from the person's arrival to their leaving, with all services in this process."""
 
-import asyncio
 from collections.abc import Iterable
 from contextlib import nullcontext
 from pathlib import Path
 
 from engage_hri.schemas import keys
-from engage_hri.services.bus.interface import Bus, Hub
+from engage_hri.services.bus.interface import Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.record import recording
 from engage_hri.services.console.follow import Sink, following
-from engage_hri.services.runtime.service import Ready, Service, running
+from engage_hri.services.runtime.service import running
 
 
 async def play_tangram(
@@ -23,20 +22,8 @@ async def play_tangram(
 
     hub: the bus on which they run, for others to look on; None: one in memory. record: a file for all that is said.
     """
-    finished = asyncio.Event()
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
         services = bound(config, *roster.NAMES)
-        services["collaboration"] = ending(services["collaboration"], finished)
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
-        async with kept, following(hub.join("console"), sinks), running(hub, services):
-            await finished.wait()
-
-
-def ending(service: Service, finished: asyncio.Event) -> Service:
-    """Make the service set `finished` when it ends by itself."""
-
-    async def serve(bus: Bus, ready: Ready) -> None:
-        await service(bus, ready)
-        finished.set()
-
-    return serve
+        async with kept, following(hub.join("console"), sinks), running(hub, services) as over:
+            await over.wait()

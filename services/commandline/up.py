@@ -1,4 +1,4 @@
-"""Command `engage up`: run the services on this machine until Ctrl-C, as processes or all in this one."""
+"""Command `engage up`: run services on this machine until Ctrl-C, each as a process, in groups, or all in this."""
 
 import asyncio
 import sys
@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import mode_of
@@ -23,10 +23,9 @@ from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.options import Embodied, Listening, Simulated, Written
 from engage_hri.services.commandline.outputs import Outputs
 from engage_hri.services.commandline.process import DONE, run_until_signal
-from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.roster import ROBOT, TASK, Groups, groups
 from engage_hri.services.commandline.run import ready_line
 from engage_hri.services.commandline.supervisor import Child, supervised
-from engage_hri.services.commandline.tangram import ending
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.control import drivers
@@ -34,17 +33,22 @@ from engage_hri.services.runtime.service import Service, running
 
 WITHOUT_TASK = ("simulation.human=attentive",)
 """Setting without the task: a person who reacts to the robot."""
-TASK = "collaboration"
-"""Service that ends by itself, with the task."""
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Written, Simulated, Embodied, Listening):
     task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False
+    together: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Services that share a process, and speak in memory: realizer,control. May be repeated.",
+            show_default="a process for each",
+        ),
+    ] = None
     in_one: Annotated[
-        bool,
-        typer.Option("--in-one", help="All services in this process: lighter, but one that crashes ends all."),
+        bool, typer.Option("--in-one", help="All services together, in this process: one that crashes ends all.")
     ] = False
 
 
@@ -52,15 +56,17 @@ def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
     config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
     drivers.check(config.control)
+    grouped = _groups(options)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
-        run_until_signal(_up(options, config, outputs, console))
+        run_until_signal(_up(options, grouped, config, outputs, console))
     return DONE
 
 
-async def _up(options: Options, config: Config, outputs: Outputs, console: Console) -> None:
-    # Loaded before there is a bus: messages would wait for that.
-    services = bound(config, *_names(options)) if options.in_one else {}
+async def _up(options: Options, grouped: Groups, config: Config, outputs: Outputs, console: Console) -> None:
+    # Nobody is left to look after one group of all: it is this process. Loaded before there is a bus: messages would
+    # wait for that.
+    services = bound(config, *grouped[0]) if len(grouped) == 1 else {}
     # Our own session comes first and stays, for children find one another through it, and may crash.
     async with await options.open(config.bus, "up", options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
@@ -72,8 +78,11 @@ async def _up(options: Options, config: Config, outputs: Outputs, console: Conso
             sinks = (without_faults(show), tallying, outputs) if options.task else (outputs,)
             async with AsyncExitStack() as stack:
                 await stack.enter_async_context(following(bus, sinks))
-                hubs = await _hubs(options, config, services, hub, stack)
-                serving = in_one(services, hubs, console) if services else _each(options, config, console)
+                if services:
+                    hubs = await stack.enter_async_context(options.hubs(config.bus, services, hub))
+                    serving = in_one(services, hubs, console)
+                else:
+                    serving = _each(options, grouped, config, console)
                 life = await stack.enter_async_context(serving)
                 group = await stack.enter_async_context(asyncio.TaskGroup())
                 holding = group.create_task(claim.held_until(life.up), name="claim")
@@ -97,6 +106,15 @@ def _names(options: Options) -> tuple[str, ...]:
     return (*ROBOT, "simulation", TASK) if options.task else (*ROBOT, "simulation")
 
 
+def _groups(options: Options) -> Groups:
+    """Divide the services among processes. Raises InputRefused."""
+    names = _names(options)
+    if options.in_one and options.together:
+        reason, advice = "--in-one is all together already", "leave one of the two out"
+        raise InputRefused(Fault(reason=reason, where="--together", advice=advice))
+    return (names,) if options.in_one else groups(names, options.together or ())
+
+
 class Life(NamedTuple):
     """Events in the life of the services. up: all of them are ready. over: the task has ended; never without one."""
 
@@ -105,45 +123,40 @@ class Life(NamedTuple):
 
 
 @asynccontextmanager
-async def _each(options: Options, config: Config, console: Console) -> AsyncIterator[Life]:
-    """Run each service in a process of its own."""
-    names = _names(options)
-    arrivals = Arrivals(names, console)
-    width = max(map(len, names))
-    styles = dict(zip(names, STYLES, strict=False))
+async def _each(options: Options, grouped: Groups, config: Config, console: Console) -> AsyncIterator[Life]:
+    """Run each group of services in a process of its own."""
+    ready = {ready_line(name): name for names in grouped for name in names}
+    arrivals = Arrivals(ready.values(), console)
+    titles = {",".join(names): names for names in grouped}
+    width = max(map(len, titles))
+    styles = dict(zip(titles, STYLES, strict=False))
 
-    def tell(name: str, line: str) -> None:
-        console.print(Text(f"{name:>{width}} │ ", style=styles[name]) + Text(line), soft_wrap=True)
-        if line == ready_line(name):
-            arrivals(name)
+    def tell(title: str, line: str) -> None:
+        console.print(Text(f"{title:>{width}} │ ", style=styles[title]) + Text(line), soft_wrap=True)
+        if line in ready:
+            arrivals(ready[line])
 
-    children = {name: Child(name, command(name, options, config), tell, once=name == TASK) for name in names}
+    children = {
+        title: Child(title, command(title, options, config), tell, once=TASK in names)
+        for title, names in titles.items()
+    }
     async with supervised(children):
-        yield Life(arrivals.complete, children[TASK].ended if options.task else asyncio.Event())
-
-
-async def _hubs(
-    options: Options, config: Config, names: Iterable[str], hub: Hub, stack: AsyncExitStack
-) -> dict[str, Hub]:
-    """The hub of each service in this process: `hub`, or one of its own with its keys."""
-    if not config.bus.keys:
-        return dict.fromkeys(names, hub)
-    return {name: await stack.enter_async_context(await options.open(config.bus, name)) for name in names}
+        over = [child.ended for child in children.values() if child.once]
+        yield Life(arrivals.complete, over[0] if over else asyncio.Event())
 
 
 @asynccontextmanager
 async def in_one(services: Mapping[str, Service], hubs: Mapping[str, Hub], console: Console) -> AsyncIterator[Life]:
     """Run the services in this process, each on its hub. The error that ends one of them is raised."""
-    arrivals, over = Arrivals(services, console), asyncio.Event()
-    task = {TASK: ending(services[TASK], over)} if TASK in services else {}
-    async with running(hubs, {**services, **task}):
+    arrivals = Arrivals(services, console)
+    async with running(hubs, services) as over:
         for name in services:
             arrivals(name)
         yield Life(arrivals.complete, over)
 
 
-def command(name: str, options: Options, config: Config) -> list[str]:
-    """Make a child's command line: `engage run NAME`, with our interpreter, bus and configuration."""
+def command(names: str, options: Options, config: Config) -> list[str]:
+    """Make a child's command line: `engage run NAMES`, with our interpreter, bus and configuration."""
     # Values decided here, by default or by option, are passed on, so that all children agree.
     settings = (
         *options.overrides,
@@ -153,7 +166,7 @@ def command(name: str, options: Options, config: Config) -> list[str]:
     )
     endpoints = (*(options.listen or ()), *config.bus.connect)
     return [
-        *(sys.executable, "-P", "-m", "engage_hri", "run", name, "--attended", "--robot", config.robot),
+        *(sys.executable, "-P", "-m", "engage_hri", "run", names, "--attended", "--robot", config.robot),
         *(("--config", str(options.config)) if options.config else ()),
         *(("--log", str(options.log)) if options.log else ()),
         *(part for level in _log_levels(options) for part in ("--log-level", level)),

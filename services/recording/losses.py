@@ -1,4 +1,4 @@
-"""What the recorder itself writes into a recording, by topic: marks of chunks, clocks, losses. Pure."""
+"""Messages that the recorder itself writes into a recording, by topic: marks of chunks, clocks, losses. Pure."""
 
 from typing import Any
 

@@ -114,8 +114,8 @@ class Requester:
         """State of request `id`; ENDED if it is not known."""
         return self._asking.state(id)
 
-    def feed(self, received: Received) -> bool:
-        """Take a message of `PATTERNS`; False for a message of any other type."""
+    def feed(self, received: Received) -> None:
+        """Take a message of `PATTERNS`; one of any other type is nothing to it."""
         message = received.message
         if isinstance(message, Answer):
             effects = self._asking.hear(message, self._bus.now(), keys.server_of(received.key))
@@ -125,9 +125,6 @@ class Requester:
             self._carry_out(self._asking.server_gone(message.participant, self._bus.now()))
         elif isinstance(message, PeerAlive):
             self._carry_out(self._asking.server_there(message.participant, message.run, self._bus.now()))
-        else:
-            return False
-        return True
 
     def _tick(self) -> None:
         self._carry_out(self._asking.tick(self._bus.now(), self._bus.unlinked_at))

@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.status import AskStatus, Status
@@ -86,7 +86,7 @@ async def _rival(bus: Bus, presence: Subscription) -> None:
                 where, advice = bus.name, "stop one of the two, or give it another --robot"
                 if run < bus.run:
                     reason = f"robot {bus.robot!r} has this on the bus twice; the other one stays"
-                    raise InputRefused(Fault(reason=reason, where=where, advice=advice))
+                    raise NotReady(Fault(reason=reason, where=where, advice=advice))
                 told = "robot %r has %s on the bus twice; this one stays (%s)"
                 journal.alert(bus.log, told, bus.robot, where, advice)
 
@@ -103,29 +103,35 @@ def installed_version() -> str:
 
 
 @asynccontextmanager
-async def running(hub: Hub | Mapping[str, Hub], services: Mapping[str, Service]) -> AsyncIterator[None]:
+async def running(hub: Hub | Mapping[str, Hub], services: Mapping[str, Service]) -> AsyncIterator[asyncio.Event]:
     """Run services in this process. The body of `async with` starts when all are ready, and its end stops them.
 
-    hub: that of all, or of each by name.
+    hub: that of all, or of each by name. Yields an event: one of them has ended by itself, as the task does.
     """
     hubs = dict.fromkeys(services, hub) if isinstance(hub, Hub) else hub
+    ended = asyncio.Event()
     standing = {name: asyncio.Event() for name in services}
     async with asyncio.TaskGroup() as group:
         tasks = [
-            group.create_task(_serve_for_ever(hubs[name], name, service, standing[name]), name=f"service {name}")
+            group.create_task(
+                _until_it_ends(hubs[name], name, service, standing[name], ended), name=f"service {name}"
+            )
             for name, service in services.items()
         ]
         try:
             for stands in standing.values():
                 await stands.wait()
-            yield
+            yield ended
         finally:
             for task in reversed(tasks):
                 if not task.cancelling():  # the group has, if one has failed: a second one would break off its end
                     task.cancel()
 
 
-async def _serve_for_ever(hub: Hub, name: str, service: Service, standing: asyncio.Event) -> None:
+async def _until_it_ends(
+    hub: Hub, name: str, service: Service, standing: asyncio.Event, ended: asyncio.Event
+) -> None:
     await serve(hub, name, service, standing.set)
     if not standing.is_set():
         raise RuntimeError(f"service {name} ended before it stood")
+    ended.set()

@@ -33,12 +33,13 @@ def extent(through: str, id: str = "b") -> PerformBehavior:
 
 
 class Server:
-    """Accepts every block, performs it for `seconds`, and keeps a diary."""
+    """Accepts every block, performs it for `seconds`, and keeps a diary. accepts: else it says only that it began."""
 
-    def __init__(self, hub: MemoryHub, seconds: float = 0.5, name: str = "realizer") -> None:
+    def __init__(self, hub: MemoryHub, seconds: float = 0.5, name: str = "realizer", *, accepts: bool = True) -> None:
         self.bus = hub.join(name)
         self.desk = RequestDesk(self.bus, name, self.cancel)
         self.seconds = seconds
+        self.begun = self.desk.accept if accepts else self.desk.hear
         self.taken: list[Request] = []
         self.ended: list[str] = []
         self.timers: dict[str, asyncio.TimerHandle] = {}
@@ -55,7 +56,7 @@ class Server:
                     case Request(id=id) as request:
                         self.taken.append(bare(request))
                         if id not in self.timers:
-                            self.desk.accept(id)
+                            self.begun(id)
                             loop = asyncio.get_running_loop()
                             self.timers[id] = loop.call_later(self.seconds, self.end, id, "done")
 

@@ -13,6 +13,7 @@ from engage_hri.schemas.requests import Accepted
 from engage_hri.services.bus.interface import Bus, Hub, Received, Subscription
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
+from engage_hri.services.bus.zenoh.session import open_session
 
 PATIENCE = 60.0
 """Seconds until something that must come counts as lost. A limit of failure, never waited for."""
@@ -65,14 +66,17 @@ class ZenohPlace:
         self._robot = f"contract-{os.getpid()}-"
 
     async def process(self, robot: str = "robot") -> Hub:
-        hub = await open_hub(self._robot + robot, rendezvous=self._rendezvous)
+        hub = await self._open(self._robot + robot)
         self._hubs.append(hub)
         await acquainted(*(known for known in self._hubs if known.robot == hub.robot))
         return hub
 
+    async def _open(self, robot: str) -> ZenohHub:
+        return await open_hub(robot, rendezvous=self._rendezvous)
+
     async def inject(self, key: str, payload: bytes, encoding: str) -> None:
         """As a program that knows only Zenoh."""
-        session: Any = self._hubs[-1].session
+        session = self._outside()
         loop, matched = asyncio.get_running_loop(), asyncio.Event()
         publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
 
@@ -85,9 +89,51 @@ class ZenohPlace:
         publisher.put(payload, encoding=encoding)
         publisher.undeclare()
 
+    def _outside(self) -> Any:
+        """A session that is no participant's."""
+        return self._hubs[-1].session
+
     async def close(self) -> None:
         for hub in self._hubs:
             await hub.close()
+
+
+class SharedPlace(ZenohPlace):
+    """Services of one group without keys: each "process" of a robot is one session, and all is in memory."""
+
+    _program: Any = None
+
+    async def _open(self, robot: str) -> ZenohHub:
+        return next((hub for hub in self._hubs if hub.robot == robot), None) or await super()._open(robot)
+
+    def _outside(self) -> Any:
+        self._program = self._program or open_session(self._hubs[0].robot, [self._rendezvous], [], None)[0]
+        return self._program
+
+    async def close(self) -> None:
+        await super().close()
+        if self._program is not None:
+            self._program.close()  # type: ignore[no-untyped-call]
+
+
+class GroupPlace(ZenohPlace):
+    """Services of one group with keys: each has a session, and they hear each other in memory.
+
+    Each third one is in another process.
+    """
+
+    async def _open(self, robot: str) -> ZenohHub:
+        others = [hub for hub in self._hubs if hub.robot == robot]
+        beside = others[0] if others and len(others) % 3 != 2 else None
+        return await open_hub(robot, rendezvous=self._rendezvous, beside=beside)
+
+
+class SharedLoop(asyncio.SelectorEventLoop):
+    """The loop of a test that runs in a `SharedPlace`."""
+
+
+class GroupLoop(asyncio.SelectorEventLoop):
+    """The loop of a test that runs in a `GroupPlace`."""
 
 
 Place = MemoryPlace | ZenohPlace
@@ -98,7 +144,7 @@ async def acquainted(*hubs: ZenohHub) -> None:
     loop = asyncio.get_running_loop()
     deadline = loop.time() + PATIENCE
     for hub in hubs:
-        while not {other.run for other in hubs if other is not hub} <= hub.peers.processes:
+        while not {other.run for other in hubs if other not in hub.process} <= hub.peers.processes:
             assert await hub.peers.change(deadline), f"{hub.run} never met all of {[other.run for other in hubs]}"
 
 

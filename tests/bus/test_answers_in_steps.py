@@ -9,6 +9,7 @@ from engage_hri.schemas.faults import Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.bus.answering import MOST, Answering
+from engage_hri.services.bus.memory import MemoryHub
 from tests.bus.places import Place, echo
 
 pytestmark = pytest.mark.each_bus
@@ -129,7 +130,7 @@ async def test_many_long_questions_are_answered_each(place: Place):
 
 
 async def test_no_more_are_taken_on_than_can_be_remembered() -> None:
-    answering, slowly = Answering(), Slowly()
+    answering, slowly = Answering(MemoryHub().join("server")), Slowly()
     for each in range(MOST):
         assert not answering.is_full
         answering.begin(slowly(Accepted(id=str(each))), "key")

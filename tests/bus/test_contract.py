@@ -261,6 +261,7 @@ async def test_liveliness_tells_who_is_there_who_comes_and_who_goes(place: Place
     assert third == [PeerGone(participant="late")]
 
 
+@pytest.mark.each_bus(shared=False)
 async def test_another_life_of_a_name_has_another_run(place: Place):
     here = (await place.process()).join("here")
     inbox = here.subscribe(keys.ANY_ALIVE)

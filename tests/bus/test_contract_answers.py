@@ -118,6 +118,7 @@ async def test_other_programs_may_send_bml_as_it_is(place: Place, encoding: str)
     assert [behavior.id for behavior in request.block.behaviors] == ["s1"]
 
 
+@pytest.mark.each_bus(shared=False)  # a stranger has a session of its own
 @pytest.mark.parametrize("copies", [False, True])
 async def test_a_request_is_cancelled_changed_and_renewed_only_by_who_has_asked(place: Place, copies: bool):
     """A stranger with a session of its own speaks in the client's name; he may have copied its life, too."""

@@ -23,7 +23,7 @@ from engage_hri.services.bus.zenoh.order import Envelope
 from engage_hri.services.bus.zenoh.session import Arrived, open_session
 from tests.bus.places import PATIENCE, MemoryPlace, Place, ZenohPlace, state, take
 
-pytestmark = pytest.mark.each_bus
+pytestmark = pytest.mark.each_bus(shared=False)
 EVENTS = (keys.FEEDBACK, keys.BLOCK, keys.request_state("realizer"))
 KEYS = (*EVENTS, keys.WORLD)
 HEARD = (("engage/v1/**",), KEYS, ("engage/v1/evt/**", keys.WORLD), (keys.FEEDBACK, "engage/v1/*/realizer/**"))
@@ -124,8 +124,19 @@ class Story:
             speaker.hub.kill(speaker.bus.name)
         else:
             crash(speaker.hub)
+            await self._die_with(speaker.hub)
         if isinstance(self.place, ZenohPlace):
             self.place._hubs.remove(speaker.hub)
+
+    async def _die_with(self, hub: ZenohHub) -> None:
+        """End the others of its process, too."""
+        for other in [each for each in self.living if each.hub in hub.process]:
+            other.end = "crashes"
+            self.readers = [reader for reader in self.readers if not self._is_at(reader, other)]
+            crash(other.hub)
+            self.place._hubs.remove(other.hub)  # type: ignore[union-attr]
+        if not self.living:
+            await self.start()
 
     def _is_at(self, reader: Reader, speaker: Speaker) -> bool:
         return reader.inbox in getattr(speaker.bus, "_subscriptions")  # noqa: B009

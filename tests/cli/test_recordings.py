@@ -111,7 +111,7 @@ def test_without_the_library_its_extra_is_named(run: Engage, tmp_path: Path, mon
 
 def test_a_cut_file_is_read_and_repaired_and_that_is_said(run: Engage, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    path.write_bytes(bytes_of(told(), is_whole=False)[:-40])
+    path.write_bytes(bytes_of(told(), is_whole=False)[:-80])
 
     shown = run("export", path, "--csv")
     repaired = run("record", path, "--repair")

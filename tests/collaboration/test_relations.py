@@ -146,5 +146,15 @@ def test_a_piece_is_placed_once_it_rests_elsewhere(now: Entity, placed: bool) ->
     assert has_been_placed("blue-square", [GOAL["blue-square"]], [now]) is placed
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "placed"),
+    [(50.0, 50.0, False), (50.0, 55.0, False), (50.0, -50.0, True), (178.0, -178.0, False)],
+)
+def test_how_far_a_piece_was_turned_counts_from_how_it_lay(before: float, after: float, placed: bool) -> None:
+    then, now = laid("blue-square", yaw=before), laid("blue-square", yaw=after)
+
+    assert has_been_placed("blue-square", [then], [now]) is placed
+
+
 def test_a_piece_that_is_hidden_is_not_placed_yet() -> None:
     assert not has_been_placed("blue-square", [GOAL["blue-square"]], [])

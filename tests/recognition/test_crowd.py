@@ -19,7 +19,7 @@ from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.random_cases import share_of
 from tests.recognition.kept import kinds
-from tests.recognition.observations import HUMAN, ROBOT, Log, stamp, world
+from tests.recognition.observations import HUMAN, ROBOT, Log, request_event, stamp, world
 from tests.recognition.passers import Lobby, visit
 from tests.recognition.test_random_streams import Chance, Stream
 
@@ -50,7 +50,17 @@ def test_who_has_been_gone_for_long_is_forgotten():
     assert forgotten(log) == ["ann"]
     assert "ann" not in log.session.persons
     log.requests_event("mutual_facial_gaze", 63.0, responder="ann")
-    assert [effect.fault.reason for effect in log.effects if isinstance(effect, Refused)] == ["unknown actor 'ann'"]
+    faults = [effect.fault for effect in log.effects if isinstance(effect, Refused)]
+    assert [(fault.reason, fault.advice) for fault in faults] == [("unknown actor 'ann'", "known: host")]
+
+
+def test_a_request_of_a_robot_that_has_met_nobody_is_refused_in_these_words():
+    session = Session(ROBOT, RecognitionConfig())
+
+    (refused,) = session.feed(request_event("mutual_facial_gaze", 0.0, responder="ann", request="r-1"), 0.0)
+
+    assert isinstance(refused, Refused)
+    assert refused.fault.advice == "known: nobody"
 
 
 def test_nothing_waits_for_forgetting():

@@ -132,19 +132,20 @@ def test_an_answer_names_its_request():
 
 
 @pytest.mark.parametrize(
-    ("objects", "responder", "reason"),
+    ("objects", "responder", "reason", "advice"),
     [
-        ((), HUMAN, "without objects"),
-        ((BLUE,), "stranger", "unknown actor 'stranger'"),
-        (("unicorn",), HUMAN, "unknown object 'unicorn'"),
+        ((), HUMAN, "without objects", ""),
+        ((BLUE,), "stranger", "unknown actor 'stranger'", f"known: {HUMAN}"),
+        (("unicorn",), HUMAN, "unknown object 'unicorn'", ""),
     ],
 )
-def test_invalid_requests_are_refused_at_once(objects, responder, reason):
+def test_invalid_requests_are_refused_at_once(objects, responder, reason, advice):
     log = Log()
     log.requests_event("directed_gaze", 1.0, *objects, responder=responder)
 
     (refused,) = [effect for effect in log.effects if isinstance(effect, Refused)]
     assert reason in refused.fault.reason
+    assert refused.fault.advice == advice
     assert (log.events, refused.fault.where) == ([], "block-1: event-1")
 
 

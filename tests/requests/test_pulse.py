@@ -82,6 +82,34 @@ def asked_to_move() -> Asking:
     return asking
 
 
+def test_what_is_not_answered_is_sent_again_after_0_3_s_and_twice_as_late_each_time_up_to_a_third_of_its_lease() -> (
+    None
+):
+    asking, sent = Asking("me", "1", Patience()), list[float]()
+    asking.server_there("control", "run", 10.0)
+    asking.send(keys.BEHAVIOR, replace(MOVES, held_after=0.0), 10.0)
+    for hundredth in range(1, 1001):
+        at = 10.0 + hundredth / 100
+        sent += [at for each in asking.tick(at) if isinstance(each, Publish)]
+
+    assert sent[:5] == pytest.approx([10.3, 10.9, 12.1, 12.1 + 4 / 3, 12.1 + 8 / 3], abs=0.021)
+
+
+@pytest.mark.parametrize("again", [None, 12.0])
+def test_what_has_not_ended_within_the_time_that_it_was_given_is_cancelled_then_and_not_before(again) -> None:
+    asking, cancelled = asked_to_move(), list[float]()
+    asking.send(keys.BEHAVIOR, MOVES, 10.0, within=3.0)
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
+    for tenth in range(1, 70):
+        at = 10.0 + tenth / 10
+        if at == again:
+            asking.send(keys.BEHAVIOR, replace(MOVES, through="end"), at, within=3.0)
+        effects = asking.tick(at)
+        cancelled += [at for each in effects if isinstance(each, Publish) and isinstance(each.message, Cancel)]
+
+    assert cancelled[0] == pytest.approx(13.0 if again is None else 15.0)
+
+
 def test_it_is_renewed_three_times_within_held_after() -> None:
     asking = asked_to_move()
     asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")

@@ -160,6 +160,22 @@ async def test_a_request_that_died_with_its_server_unaccepted_is_performed_by_th
     await again.die(hub)
 
 
+async def test_a_request_that_may_have_begun_unaccepted_is_not_begun_again_by_the_next(hub: MemoryHub):
+    server = Server(hub, accepts=False, seconds=100.0)
+    async with Requester(hub.join("client")) as requests:
+        pending = requests.send(keys.BLOCK, block())
+        await asyncio.sleep(0.1)
+        await server.die(hub)
+        again = Server(hub)
+
+        with pytest.raises(RunFailed, match="restarted"):
+            await pending.outcome
+
+    assert (server.taken, again.taken) == ([block()], [])
+    assert not pending.accepted.done() or pending.accepted.exception()
+    await again.die(hub)
+
+
 async def test_a_short_absence_of_the_server_is_harmless(hub: MemoryHub):
     server = Server(hub, seconds=5.0)
     async with Requester(hub.join("client")) as requests:

@@ -120,3 +120,11 @@ def test_bad_feedback_is_refused(xml: str) -> None:
 
 def test_what_xml_cannot_hold_is_replaced() -> None:
     assert "a\ufffdb" in encode_feedback(WarningFeedback(block="b", kind="LATE", message="a\0b"))
+
+
+def test_there_is_no_negative_zero_in_xml() -> None:
+    points = (PlannedPoint(behavior="g", sync="start", time=-0.0, type="gaze"),)
+    text = encode_feedback(PredictionFeedback(block="b", at=Stamp("", -0.0), points=points))
+
+    assert '"0.0"' in str(text)
+    assert "-0.0" not in str(text)

@@ -177,6 +177,32 @@ def test_whatever_had_letters_and_was_left_out_is_told(text: str, told: str) -> 
     assert problems(read([text], Ids(()))) == problems(read(text, Ids(()))) == (told,)
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Take [cup].", ()),
+        ("Take [Cup].", ("ids were written in other letters than the world has: [Cup]",)),
+        ("Take [cup] and [CUP!].", ("ids were written in other letters than the world has: [CUP!]",)),
+    ],
+)
+def test_an_id_is_told_only_if_it_was_written_in_other_letters(text: str, told: tuple[str, ...]) -> None:
+    assert problems(read([text], Ids(("cup",)))) == problems(read(text, Ids(("cup",)))) == told
+
+
+@pytest.mark.parametrize(
+    ("text", "spoken"),
+    [
+        ("list[2] entry", "list 2  entry"),
+        ("list[2], entry", "list 2, entry"),
+        ("list[2]", "list 2"),
+        ("[is] it", "is it"),
+        ("[is]it", "is it"),
+    ],
+)
+def test_words_in_brackets_do_not_run_into_what_follows(text: str, spoken: str) -> None:
+    assert words(read([text], Ids(()))).rstrip() == words(read(text, Ids(()))).rstrip() == spoken
+
+
 def test_the_world_is_asked_anew_at_each_piece() -> None:
     reader = Reader()
     first = reader.feed("Take [cup] or ", Ids(("cup",)))

@@ -25,10 +25,12 @@ class Answers:
         self._bridge = bridge
         self._run = run
         self._declared: list[Any] = []
-        self._under_way = Answering()
+        self.here = Answering(bus)
+        """The same answers, for those who ask in this process."""
 
     def serve(self, key: str, answer: Answer, empty: Message | None) -> None:
         """See `Bus.answer`."""
+        self.here.served[key] = answer
 
         def reply(query: zenoh.Query) -> None:
             form = "json"
@@ -39,12 +41,12 @@ class Answers:
                 told = answer(question)
                 if not isinstance(told, Coroutine):
                     self._reply(query, key, told, form)
-                elif self._under_way.is_full:
+                elif self.here.is_full:
                     told.close()
                     reason = f"{MOST} questions are being answered"
                     raise InputRefused(Fault(reason=reason, where=key, advice="wait for answers before you ask more"))
                 else:
-                    self._under_way.begin(self._later(query, key, told, form), key)
+                    self.here.begin(self._later(query, key, told, form), key)
                     return
             except EngageError as error:
                 refuse(query, error.fault, form)
@@ -73,6 +75,6 @@ class Answers:
         query.reply(key, payload, encoding=encoding)
 
     def close(self) -> None:
-        self._under_way.end()
+        self.here.end()
         for declared in reversed(self._declared):
             declared.undeclare()

@@ -1,4 +1,7 @@
-"""The bus over Zenoh: one session per process, shared by the participants in it.
+"""The bus over Zenoh: a session shared by participants of one process; with keys, one for each of its services.
+
+What the participants of a process say to one another goes in memory, whichever session is theirs, and to all other
+processes over Zenoh: each reader gets a message once, for a session takes nothing from those of its own process.
 
 Zenoh carries the messages. This module and `order` add what it leaves open: order across keys, history for late
 subscribers, repair of losses in a cut, the list of participants, and questions that get no answer.
@@ -6,6 +9,7 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 
 import asyncio
 from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 from itertools import count
 from typing import Any, TypeVar
@@ -14,10 +18,11 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady
 from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
 from engage_hri.services.bus.interface import CAPACITY, LOG, Answer, Bus, Hub, Keep, Subscription, Tap
 from engage_hri.services.bus.keyring import Keys
@@ -64,6 +69,7 @@ async def open_hub(
     mode: Mode = "auto",
     rendezvous: str | None = RENDEZVOUS,
     keys: Keys | None = None,
+    beside: "Hub | None" = None,
 ) -> "ZenohHub":
     """Join the bus of `robot`. Processes may start in any order: this waits for others for `OPENING` at most.
 
@@ -71,6 +77,7 @@ async def open_hub(
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
     at `rendezvous`. keys: those of this process; it is then a client of a router, with its holder's role and name.
+    beside: a hub of this process, on Zenoh too: its participants and those of the new one hear each other in memory.
     Raises InputRefused when an endpoint is misspelled or does not go with the keys, RunFailed when it is taken.
     """
     if keys is not None:
@@ -89,8 +96,9 @@ async def open_hub(
         zenoh=version("eclipse-zenoh"), mode="peer" if places else "client", connect=tuple(connect),
         holder=keys.holder.common_name if keys else "", until=keys.holder.until if keys else None,
     )  # fmt: skip
-    hub = ZenohHub(robot, session, places, Rights(keys.holder) if keys is not None else None, link)
-    if calls:
+    rights = Rights(keys.holder) if keys is not None else None
+    hub = ZenohHub(robot, session, places, rights, link, beside if isinstance(beside, ZenohHub) else None)
+    if calls and beside is None:
         await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
     return hub
 
@@ -105,10 +113,11 @@ class ZenohHub(Hub):
         places: Sequence[str] = (),
         rights: Rights | None = None,
         link: ProcessFacts | None = None,
+        beside: "ZenohHub | None" = None,
     ) -> None:
         """places: endpoints at which others may connect to this process. rights: those of its keys, if it has any.
 
-        link: how it came to the bus.
+        link: how it came to the bus. beside: see `open_hub`.
         """
         self.robot = robot
         self._link = link or ProcessFacts()
@@ -120,17 +129,26 @@ class ZenohHub(Hub):
         self._loop = asyncio.get_running_loop()
         self.clocks = Clocks(*own_clock(self._loop, self.run))
         self._sent = SentLog(self.run)
+        self.process: list[ZenohHub] = [] if beside is None else beside.process
+        """The hubs of this process, this one among them."""
+        self._logs: dict[str, SentLog] = {} if beside is None else beside._logs
+        """What the sessions of this process have published, by run; of one that is closed nothing."""
+        self.process.append(self)
+        self._logs[self.run] = self._sent
         self._publishers = Publishers(session)
         self._source = zenoh.SourceInfo(session.id, 0)
         self._buses: dict[str, ZenohBus] = {}
         self._pulse: asyncio.TimerHandle | None = None
         self._closed = False
         self.peers = Peers(
-            session, self.bridge, self._sent, self.clocks, places, access.rank if rights is not None else None
-        )
+            session, self.bridge, self._sent, self.clocks, self._logs, places,
+            access.rank if rights is not None else None,
+        )  # fmt: skip
+        for name, run in {(bus.name, bus.run) for hub in self.process for bus in hub.shown}:
+            self.peers.names.setdefault(name, set()).add(run)
         self._history = History(session, self.bridge, self._sent)
         trusts = rights.trusts if rights else None
-        self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, trusts)
+        self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, self._logs, trusts)
         self.peers.stand(self.readers.publisher_came, self.readers.participant_changed)
         self._links = Links(session, self.bridge, self._link.connect, LOG.warning)
         until = self._link.until
@@ -174,10 +192,30 @@ class ZenohHub(Hub):
             if not await self.peers.change(deadline):
                 reason = f"robot {self.robot!r} has {'this' if len(taken) == 1 else 'these'} on the bus already"
                 advice = "stop what runs there, or give this one another --robot or another endpoint"
-                raise InputRefused(Fault(reason=reason, where=", ".join(taken), advice=advice))
+                raise NotReady(Fault(reason=reason, where=", ".join(taken), advice=advice))
 
     def forget(self, name: str) -> None:
         self._buses.pop(name, None)
+
+    @property
+    def shown(self) -> "list[ZenohBus]":
+        """Participants that show their token."""
+        return [bus for bus in self._buses.values() if bus.is_shown]
+
+    def note(self, name: str, there: bool) -> None:
+        """Note in all of this process that a participant of this session has come or gone."""
+        for hub in self.process:
+            hub.peers.note(name, self.run, there)
+
+    def answers_changed(self) -> None:
+        """Let the questions of this process look for their server again."""
+        for hub in self.process:
+            hub.peers.wake_watchers()
+
+    def server(self, key: str) -> Answering | None:
+        """The answers of the participant in this process that serves the key, if there is one."""
+        buses = (bus for hub in self.process for bus in hub._buses.values())
+        return next((bus.answers.here for bus in buses if key in bus.answers.here.served), None)
 
     def failed(self, error: Exception, what: str) -> None:
         """Tell an error that cannot be assigned to a participant: the first one of the process tells it."""
@@ -193,6 +231,8 @@ class ZenohHub(Hub):
             await bus.leave()
         await self.peers.flush()
         self._closed = True
+        self.process.remove(self)
+        self._logs[self.run] = SentLog(self.run)
         self.bridge.close()
         if self._pulse is not None:
             self._pulse.cancel()
@@ -229,7 +269,8 @@ class ZenohHub(Hub):
         self._publishers.of(key, ordered).put(
             payload, encoding=encoding, attachment=attachment, timestamp=stamp, source_info=self._source
         )
-        self.readers.offer(written, message)
+        for hub in self.process:
+            hub.readers.offer(written, message, self.run)
 
     def withdraw(self, key: str) -> None:
         """Forget a state that this process has published."""
@@ -239,7 +280,7 @@ class ZenohHub(Hub):
     def is_heard(self, key: str) -> bool:
         """Tell whether anybody has subscribed to `key`, as far as Zenoh knows."""
         status: Any = self._publishers.of(key, keys.key_class(key) != "stream").matching_status  # its stub says bool
-        return status.matching or self.readers.want(key)
+        return status.matching or any(hub.readers.want(key) for hub in self.process)
 
     def _send_pulse(self) -> None:
         """Publish the recent counts, a few times: they show a receiver that it lost the last message of a burst."""
@@ -256,7 +297,7 @@ class ZenohBus(Bus):
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
         self._subscriptions: list[Subscription | Tap] = []
-        self._answers = Answers(self, hub.session, hub.bridge, hub.run)
+        self.answers = Answers(self, hub.session, hub.bridge, hub.run)
         self._overflowed = 0
         self._token: Any = None
 
@@ -317,6 +358,10 @@ class ZenohBus(Bus):
         payload, encoding = in_form(key, message, "msgpack")
         while self._loop.time() < deadline:
             known = self._hub.peers.changes
+            if (server := self._hub.server(key)) is not None:
+                if (told := await server.ask(key, message, deadline, partial(_sendable, key))) is not None:
+                    return told
+                continue
             reply = await self._ask(key, payload, encoding, deadline)
             if reply is not None and reply.ok is not None:
                 return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
@@ -358,13 +403,19 @@ class ZenohBus(Bus):
         return answered.result()
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
-        self._answers.serve(key, answer, empty)
+        self.answers.serve(key, answer, empty)
+        self._hub.answers_changed()
 
     def declare_alive(self) -> None:
         if self._token is None and not self._gone:
             token = keys.own(self._hub.run, f"alive/{self.name}")
             self._token = self._hub.session.liveliness().declare_token(token)
-            self._hub.peers.note(self.name, self._hub.run, True)
+            self._hub.note(self.name, True)
+
+    @property
+    def is_shown(self) -> bool:
+        """True while this participant's token is there."""
+        return self._token is not None and not self._gone
 
     async def leave(self) -> None:
         if self._gone:
@@ -372,11 +423,17 @@ class ZenohBus(Bus):
         self._gone = True
         for subscription in list(self._subscriptions):
             subscription.close()
-        self._answers.close()
+        self.answers.close()
         if self._token is not None:
             self._token.undeclare()
-            self._hub.peers.note(self.name, self._hub.run, False)
+            self._hub.note(self.name, False)
         self._hub.forget(self.name)
+
+
+def _sendable(key: str, message: Message) -> Message:
+    """The message, which stays in this process. Raises InputRefused if it could not leave it."""
+    in_form(key, message, "msgpack")
+    return message
 
 
 def _is_ours(encoding: str) -> bool:

@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -38,10 +38,11 @@ class Peers:
         bridge: LoopBridge,
         sent: SentLog,
         clocks: Clocks,
+        own: Collection[str],
         places: Sequence[str] = (),
         rank: Callable[[str], int] | None = None,
     ) -> None:
-        """places: endpoints at which others may connect to this process.
+        """own: runs of this process, of which the hub tells. places: endpoints at which others may connect to it.
 
         rank: of the process with this run, by its keys: the lowest is believed what time its machine has.
         """
@@ -59,6 +60,7 @@ class Peers:
         self._watchers: list[asyncio.Future[None]] = []
         self._clock_of: dict[str, str] = {}
         """Clocks of the processes that are there, those that came first first."""
+        self._own = own
         self._rank = rank or (lambda run: 0)
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
         self._declared: tuple[Any, ...] = (
@@ -105,7 +107,7 @@ class Peers:
     def _token_changed(self, sample: zenoh.Sample) -> None:
         run, *subject = str(sample.key_expr).split("/")[3:]
         there = sample.kind == zenoh.SampleKind.PUT
-        if run == self._sent.run:
+        if run in self._own:
             return
         if subject[:1] == ["process"] and len(subject) == 2:
             if there:
@@ -127,7 +129,7 @@ class Peers:
                 del self._places[run]
         elif len(subject) == 2 and subject[0] == "alive":
             self.note(subject[1], run, there)
-        self._wake_watchers()
+        self.wake_watchers()
 
     def _witness(self, clock: str) -> str:
         """The process that is asked for this clock: of those that say that they have it the first that came.
@@ -173,7 +175,8 @@ class Peers:
             if watcher in self._watchers:
                 self._watchers.remove(watcher)
 
-    def _wake_watchers(self) -> None:
+    def wake_watchers(self) -> None:
+        """Let all who wait for a change look again."""
         self.changes += 1
         for watcher in self._watchers:
             _resolve(watcher)

@@ -1,7 +1,7 @@
 """Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any
 
@@ -78,9 +78,12 @@ class Readers:
         sent: SentLog,
         peers: Peers,
         history: History,
+        own: Mapping[str, SentLog],
         trusts: Trusts | None = None,
     ) -> None:
-        """trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed."""
+        """own: what this process has published, by run: each of its hubs offers that to all, so Zenoh's copy is left.
+
+        trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed."""
         self.refused = 0
         self.viewer = ""
         self._loop = asyncio.get_running_loop()
@@ -89,6 +92,7 @@ class Readers:
         self._sent = sent
         self._peers = peers
         self._history = history
+        self._own = own
         self._trusts = trusts
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
@@ -109,20 +113,18 @@ class Readers:
         for declared in self._declared:
             declared.undeclare()
 
-    def offer(self, written: Written, message: Message) -> None:
-        """Deliver what this process has published itself."""
+    def offer(self, written: Written, message: Message, run: str) -> None:
+        """Deliver what this process has published itself. run: of the session."""
         envelope, now = written.envelope, self._loop.time()
-        received = Received(
-            written.key, message, envelope.source, now, life=self._sent.run, number=envelope.number
-        )  # fmt: skip
+        received = Received(written.key, message, envelope.source, now, life=run, number=envelope.number)
         for reader in self._readers:
             if not reader.subscription.wants(received.key):
                 continue
             if isinstance(reader.subscription, Tap):
-                reader.subscription.offer(_sample(written, self._sent.run, now))
+                reader.subscription.offer(_sample(written, run, now))
             else:
                 if may_skip(written.key):
-                    reader.newest.take(written, self._sent.run, now)
+                    reader.newest.take(written, run, now)
                 reader.subscription.offer(received)
 
     def want(self, key: str) -> bool:
@@ -136,8 +138,10 @@ class Readers:
             for run in sorted(runs):
                 self._offer_presence(reader, PeerAlive(participant=name, run=run))
         oldest = self._loop.time() - keys.HISTORY_MAX_AGE
-        for written in self._sent.past(subscription.wants, Missing(), oldest).written:
-            self._deliver(reader, written, self._sent.run, past=True)
+        past = (log.past(subscription.wants, Missing(), oldest) for log in self._own.values())
+        ours = [(written, run) for run, each in zip(self._own, past, strict=True) for written in each.written]
+        for written, run in sorted(ours, key=lambda one: one[0].envelope.sent):
+            self._deliver(reader, written, run, past=True)
         for pattern in subscription.patterns:
             if pattern not in self._carriers:
                 handler = self._bridge.samples(partial(self._sample_came, pattern))
@@ -163,8 +167,9 @@ class Readers:
             return
         key = sample.key
         run, envelope = self._origin(sample)
-        if run == self._sent.run:
-            self.refused += 1  # from outside in this process' own name
+        if run in self._own:
+            # Of this session, it is from outside in this process' own name; of another one it has come in memory.
+            self.refused += run == self._sent.run
             return
         written = Written(key, sample.encoding, sample.payload, envelope)
         if not self._is_trusted(written, run):
@@ -211,7 +216,7 @@ class Readers:
         """
         if sample.sender or not sample.stamped_by:
             return sample.sender
-        passed_on_by = {self._sent.run, *self._peers.processes, *map(str, self._session.info.routers_zid())}
+        passed_on_by = {*self._own, *self._peers.processes, *map(str, self._session.info.routers_zid())}
         return "" if sample.stamped_by in passed_on_by else sample.stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
@@ -313,10 +318,11 @@ class Readers:
         except BAD:
             self.refused += 1
         else:
-            if run != self._sent.run:
-                self._compare(run, pulse)
+            self._compare(run, pulse)
 
     def _compare(self, run: str, pulse: Counts) -> None:
+        if run in self._own:
+            return
         for reader in self._readers:
             follower = self._follower(reader, run)
             follower.pulse(pulse)
@@ -329,8 +335,7 @@ class Readers:
             query.reply_err(str(error))
             finish(query)
             return
-        if run != self._sent.run:
-            self._compare(run, pulse)
+        self._compare(run, pulse)
         self._flushing.append((run, query))
         self._answer_flushes()
 

@@ -42,8 +42,9 @@ FEW = (
 PATIENT = 20.0
 """Seconds of silence that no machine with other work makes."""
 DISTURBED = 0.06
-"""Seconds between two measurements, of 0.02, that tell of a machine without time."""
+"""Seconds between two measurements, of 0.02, that tell of a machine without time: then it is tried again."""
 ATTEMPTS = 3
+"""The last one is judged whatever the machine does: a test that may always say "no time" cannot fail."""
 
 
 @pytest.fixture(scope="module")
@@ -85,14 +86,18 @@ class Witness:
         return max((b - a for a, b in pairwise(self.times)), default=math.inf)
 
     @property
-    def is_busy(self) -> bool:
-        """True if the machine has had no time for what was to be measured, by the measurements or by its load."""
-        return self.worst > DISTURBED or os.getloadavg()[0] > (os.cpu_count() or 1)
+    def stood_still(self) -> float:
+        """How long the machine had no time for what was to be measured, at the longest, seconds; most often 0."""
+        return self.worst if DISTURBED < self.worst < math.inf else 0.0
 
 
 class OnTheMockup(BodyContract):
-    tolerance = 0.25  # of a machine with other work
     noise = math.radians(0.5)  # such a machine tells of a motion 5 ms late, now and then
+
+    @property
+    def tolerance(self) -> float:  # type: ignore[override]
+        """Of a machine with other work, and for as long as this one has stood still, as the measurements tell."""
+        return 0.25 + self.witness.stood_still
 
     @pytest.fixture(autouse=True)
     def _on_the_mockup(self, mockup: Mockup) -> None:
@@ -110,15 +115,23 @@ class TestAll(OnTheMockup):
 @pytest.mark.parametrize("claim", TIMED, ids=lambda claim: claim.__name__)
 async def test_the_contract_on_the_mockup(mockup: Mockup, claim) -> None:
     suite = OnTheMockup()
-    for _ in range(ATTEMPTS):
+    for attempt in range(1, ATTEMPTS + 1):
         try:
             await _claimed(claim, suite, mockup)
         except LawBroken:
-            if not suite.witness.is_busy:
+            if attempt == ATTEMPTS or not suite.witness.stood_still:
                 raise
         else:
             return
-    pytest.skip(f"no time on this machine: {suite.witness.worst:.2f} s between two measurements")
+
+
+@pytest.mark.parametrize(("times", "tolerance"), [((), 0.25), ((0.0, 0.02, 0.04), 0.25), ((0.0, 0.02, 0.52), 0.75)])
+def test_a_machine_that_stands_still_excuses_no_more_than_for_how_long(times, tolerance: float) -> None:
+    suite = OnTheMockup()
+    suite.witness = Witness()
+    suite.witness.times = list(times)
+
+    assert suite.tolerance == pytest.approx(tolerance)
 
 
 async def _claimed(
@@ -251,24 +264,34 @@ def fake_followed() -> tuple[float, float, float]:
 async def test_the_fake_daemon_is_no_better_than_the_real_one(
     mockup: Mockup, fake_followed: tuple[float, float, float]
 ) -> None:
+    unlike: list[str] = []
     for _ in range(ATTEMPTS):
         witness = Witness()
         real = await _followed(lambda: witness(ReachyMiniSettings(url=mockup.url)))  # noqa: B023
-        if not (unlike := list(_unlike(real, fake_followed))):
-            return
-        if not witness.is_busy:
+        unlike = list(_unlike(real, fake_followed, witness.stood_still))
+        if not unlike or not witness.stood_still:
             break
-    else:
-        pytest.skip(f"no time on this machine: {witness.worst:.2f} s between two measurements; {'; '.join(unlike)}")
-    assert unlike == []
+    assert unlike == [], f"{witness.worst:.2f} s at most between two measurements"
 
 
-def _unlike(real: tuple[float, float, float], fake: tuple[float, float, float]) -> Iterator[str]:
-    if fake[0] < real[0] - 0.03 or abs(fake[0] - real[0]) >= 0.05:
+@pytest.mark.parametrize(
+    ("real", "still", "count"),
+    [
+        ((0.04, 0.01, 0.02), 0.0, 0), ((0.10, 0.01, 0.02), 0.0, 1), ((0.10, 0.01, 0.02), 0.1, 0),
+        ((0.20, 0.01, 0.02), 0.1, 1), ((0.04, 0.05, 0.02), 0.0, 1), ((0.04, 0.01, 0.03), 0.0, 1),
+    ],
+)  # fmt: skip
+def test_two_daemons_are_alike_but_for_the_time_that_the_machine_stood_still(real, still: float, count: int) -> None:
+    assert len(list(_unlike(real, (0.04, 0.01, 0.02), still))) == count
+
+
+def _unlike(real: tuple[float, float, float], fake: tuple[float, float, float], still: float) -> Iterator[str]:
+    """What differs by more than the time that the machine stood still, seconds, explains."""
+    if fake[0] < real[0] - 0.03 - still or abs(fake[0] - real[0]) >= 0.05 + still:
         yield f"the real daemon lags {real[0]:.3f} s, the fake {fake[0]:.3f} s"
-    if max(real[1], fake[1]) >= math.radians(2.0):
+    if max(real[1], fake[1]) >= math.radians(2.0) + still * FASTEST:
         yield f"that explains all but {real[1]:.3f} of the real one, and {fake[1]:.3f} rad of the fake"
-    if abs(real[2] - fake[2]) >= 0.008:  # and of a busy machine
+    if abs(real[2] - fake[2]) >= 0.008 + still:
         yield f"the real one measures each {real[2]:.3f} s, the fake each {fake[2]:.3f} s"
 
 
@@ -294,6 +317,10 @@ async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]
     offs = [np.percentile(np.abs(yaws - [_course(t - lag) for t in times]), 90) for lag in lags]
     best = int(np.argmin(offs))
     return float(lags[best]), float(offs[best]), float(np.median(np.diff(times)))
+
+
+FASTEST = 0.5
+"""Of the course, radians a second."""
 
 
 def _course(at: float) -> float:

@@ -1,0 +1,47 @@
+"""A server that stood still: what came meanwhile is heard before anything is ended for being overdue."""
+
+import asyncio
+
+import pytest
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import Block, PerformBlock
+from engage_hri.schemas.requests import Cancel, KeepAlive, Kept
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.samples import Received
+from engage_hri.services.requests.ends import LATE, RequestDesk
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+
+TERM: Seconds = 2.0
+BLOCK = PerformBlock(id="a", requester="client", life="1", block=Block(id="b"))
+
+
+def stand_still(until: Seconds) -> None:
+    """Do nothing until then, as a process that the system has stopped."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    loop._virtual_now = until
+
+
+@pytest.mark.parametrize(("came", "is_ended"), [(0.5 * LATE, False), (2.0 * LATE, True)])
+async def test_a_renewal_that_came_while_the_server_stood_still_is_heard_first(
+    hub: MemoryHub, came: Seconds, is_ended: bool
+) -> None:
+    ended: list[Cancel] = []
+    bus = hub.join("realizer")
+    desk = RequestDesk(bus, "realizer", ended.append, term=TERM)
+    key = keys.command(keys.BLOCK, "manager", "client")
+    assert desk.take(Received(key, BLOCK, "client", 0.0, life="1")) is not None
+    desk.accept("a")
+    loop = asyncio.get_running_loop()
+    renewal = KeepAlive(
+        live=(Kept("perform_block", "a", 0, "", 20.0),), at=Stamp(bus.clock, 1.5), requester="client", life="1"
+    )
+    renewed = keys.command(keys.keep_alive("realizer"), "manager", "client")
+
+    loop.call_at(1.9, stand_still, 5.0)
+    loop.call_at(5.0 + came, lambda: desk.take(Received(renewed, renewal, "client", 5.0 + came, life="1")))
+    await asyncio.sleep(10.0)
+
+    assert [each.id for each in ended] == (["a"] if is_ended else [])
