@@ -7,12 +7,14 @@ from msgspec import Struct
 from msgspec.structs import force_setattr, replace
 
 Cause = Literal[
-    "", "restarted", "gone", "unlinked", "silent", "unrenewed", "forgotten", "late", "cancelled", "replaced", "closed"
+    "", "restarted", "gone", "unlinked", "frozen", "silent", "unrenewed", "forgotten", "late",
+    "cancelled", "replaced", "closed",
 ]  # fmt: skip
 CAUSES: Mapping[Cause, str] = {
     "restarted": "It has started again; its new process knows nothing of what was asked of the one before.",
     "gone": "It is not seen any more: it has ended or stands still, or its machine or the network between does.",
     "unlinked": "The service that reports this had no router, so that it could see nobody.",
+    "frozen": "It reports this, and stood still itself, or its machine did, so that it heard nobody.",
     "silent": "It is seen, and has not answered.",
     "unrenewed": "It has not renewed in time what it had asked for.",
     "forgotten": "It does not know what it is asked about: it has started again since, or had to forget it.",
@@ -100,6 +102,10 @@ class InputRefused(EngageError):
     def __init__(self, fault: Fault | str, block: str | None = None) -> None:
         super().__init__(fault)
         self.block = block
+
+
+class NotReady(InputRefused):
+    """Refusal of input that names what is not there yet, or not any more: the same input may be good later."""
 
 
 class RunFailed(EngageError):

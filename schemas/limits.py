@@ -28,6 +28,11 @@ LARGER: dict[str, int] = {
     keys.own("*", "past"): MEDIUM, keys.own("*", "counts"): MEDIUM,
 }  # fmt: skip
 """Bytes of a message, and of a question or an answer, on keys that take more than `SMALL`."""
+LOUD = {"observer": 256 * 1024, "operator": 256 * 1024, "manager": MEDIUM, "wizard": 2 * MEDIUM}
+"""Bytes a second from which on a router tells that a holder of this role is loud. A manager who asks for 10,000
+fragments at once sends some 0.4 MB a second."""
+LOUD_ROBOT = 16 * 1024 * 1024
+"""The same for all others. A service hands out that much when it is asked for its past."""
 MOST_PULSES = 20
 """Pulses of one process that a router passes on in a second. A process of ours sends one or two."""
 LONGEST_KEY = 2048

@@ -75,7 +75,7 @@ class Cancel(Request, frozen=True, kw_only=True, tag="cancel", omit_defaults=Tru
     whose: str = ""
 
     def fault(self, where: str) -> Fault:
-        """What the outcome of the request says of its end."""
+        """Make the fault by which the outcome of the request says why it ended."""
         cause, whose = (self.cause, self.whose) if self.cause else ("cancelled", self.requester)
         return Fault(reason=self.reason or "cancelled", where=where, cause=cause, whose=whose)
 

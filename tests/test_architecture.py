@@ -27,12 +27,12 @@ MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 """Packages of `services` that pure files don't know either; their own pure files aside."""
 PURE_MACHINERY = {
     "services/requests/asked.py", "services/requests/asking.py", "services/requests/asking_effects.py",
-    "services/requests/asking_table.py",
+    "services/requests/asking_table.py", "services/requests/causes.py",
     "services/requests/deadlines.py", "services/requests/ended.py", "services/requests/window.py",
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
-    "services/runtime/installation.py",
+    "services/runtime/absent.py", "services/runtime/installation.py",
     "services/runtime/publisher.py", "services/runtime/steps.py", "services/runtime/ongoing_actions.py",
     "services/runtime/action_reports.py", "services/runtime/reporters.py", "services/runtime/reports.py",
     "services/runtime/world_report.py", "services/runtime/in_force.py",

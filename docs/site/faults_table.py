@@ -1,11 +1,13 @@
-"""Writes the table of faults in docs/faults.md from `schemas/body_faults.py`: `make generate`."""
+"""Writes the table of a body's faults in docs/faults.md, and that of causes in docs/protocol.md: `make generate`."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 from engage_hri.schemas.body_faults import KINDS, FaultKind
+from engage_hri.schemas.faults import CAUSES
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+CAUSES_HEAD = "| `cause` | what it says of `whose` |\n|---|---|\n"
 HEAD = "| fault | what one sees | options |\n|---|---|---|\n"
 
 
@@ -14,6 +16,11 @@ def table() -> str:
     return HEAD + "".join(
         f"| `{name}` | {kind.does} | {'; '.join(_options(kind))} |\n" for name, kind in KINDS.items()
     )
+
+
+def causes() -> str:
+    """A row for each cause, in the order of the code."""
+    return CAUSES_HEAD + "".join(f"| `{cause}` | {says} |\n" for cause, says in CAUSES.items())
 
 
 def _options(kind: FaultKind) -> Iterator[str]:
@@ -29,11 +36,18 @@ def _options(kind: FaultKind) -> Iterator[str]:
         yield "`--behavior`"
 
 
-def page(text: str) -> str:
-    """The page with the table as the code has it."""
-    before, _, rest = text.partition(HEAD)
-    return before + table() + rest[rest.index("\n\n") + 1 :]
+PAGES = {"faults.md": (HEAD, table), "protocol.md": (CAUSES_HEAD, causes)}
+"""Pages, each with the head of its table and what makes that."""
+
+
+def page(name: str, text: str) -> str:
+    """The page with its table as the code has it."""
+    head, made = PAGES[name]
+    before, _, rest = text.partition(head)
+    return before + made() + rest[("\n" + rest).index("\n\n") :]
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for name in PAGES:
+        path = DOCS / name
+        path.write_text(page(name, path.read_text(encoding="utf-8")), encoding="utf-8")

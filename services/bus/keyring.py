@@ -16,7 +16,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.access import Holder
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 
 AUTHORITY, CERTIFICATE, PRIVATE, WHO, HOLDERS = (
     "ca.pem",
@@ -66,19 +66,19 @@ def read_keys(folder: str | Path, name: str) -> Keys:
         if not (place / WHO).exists():
             there = sorted(each.parent.name for each in Path(folder).glob(f"*/{WHO}"))
             known = f"there are keys of {', '.join(there)}: name that folder" if there else _ADVICE
-            raise InputRefused(Fault(reason=f"no keys of {name!r}", where=str(folder), advice=known))
+            raise NotReady(Fault(reason=f"no keys of {name!r}", where=str(folder), advice=known))
     holder = _read(place / WHO, Who)
     for file in (AUTHORITY, CERTIFICATE, PRIVATE):
         try:
             (place / file).read_bytes()
         except OSError as error:
-            raise InputRefused(Fault(reason=error.strerror or str(error), where=str(place / file))) from error
+            raise NotReady(Fault(reason=error.strerror or str(error), where=str(place / file))) from error
     if mode := (place / PRIVATE).stat().st_mode & 0o077:
         reason = f"others may read this private key (mode {mode:03o} for group and others)"
         raise InputRefused(Fault(reason=reason, where=str(place / PRIVATE), advice="chmod 600"))
     if holder.until <= time.time():
         reason = f"the certificate of {holder.common_name} has expired"
-        raise InputRefused(Fault(reason=reason, where=str(place), advice="`engage keys renew`"))
+        raise NotReady(Fault(reason=reason, where=str(place), advice="`engage keys renew`"))
     keys = Keys(place, holder)
     _try(keys)
     return keys
@@ -122,6 +122,6 @@ def _read(path: Path, kind: type) -> Any:
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind)
     except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path), advice=_ADVICE)) from error
+        raise NotReady(Fault(reason=error.strerror or str(error), where=str(path), advice=_ADVICE)) from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InputRefused(Fault(reason=f"damaged: {error}", where=str(path), advice=_ADVICE)) from error

@@ -8,8 +8,8 @@ from typing import Any
 
 import typer
 
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
-from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, UNREAD, interrupted, silence
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady, RunFailed
+from engage_hri.services.commandline.process import DONE, FAILED, REFUSED, UNREAD, UNREADY, interrupted, silence
 
 UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
 """Class of Typer's errors of usage, which it does not export."""
@@ -99,4 +99,6 @@ def _ended(errors: Sequence[BaseException]) -> int:
         print(readable(error.fault), file=sys.stderr)
     if not expected:
         raise errors[0]
-    return FAILED if any(not isinstance(error, InputRefused) for error in expected) else REFUSED
+    if any(not isinstance(error, InputRefused) for error in expected):
+        return FAILED
+    return UNREADY if all(isinstance(error, NotReady) for error in expected) else REFUSED

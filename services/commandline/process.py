@@ -17,8 +17,9 @@ from engage_hri.services.commandline import last_resort
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
-DONE, REFUSED, FAILED, UNREAD = 0, 2, 3, 128 + signal.SIGPIPE
-"""Exit codes: all done; input refused, nothing moved; failed while running; reader of the output gone."""
+DONE, REFUSED, FAILED, UNREADY, UNREAD = 0, 2, 3, 75, 128 + signal.SIGPIPE
+"""Exit codes: all done; input refused, nothing moved; failed while running; refused as things stand now, so that the
+same may be tried again (EX_TEMPFAIL of sysexits.h); reader of the output gone."""
 SHOW_CURSOR = b"\x1b[?25h"
 AT_ONCE: Seconds = 1.0
 """Time within which two SIGTERM are one: `timeout` tells a process and its group, systemd and `up` tell services."""

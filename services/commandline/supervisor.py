@@ -14,7 +14,7 @@ from typing import Any
 
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.process import left
+from engage_hri.services.commandline.process import REFUSED, UNREADY, left
 
 LOG = logging.getLogger("engage.up")
 Tell = Callable[[str, str], None]
@@ -144,7 +144,7 @@ class Child:
             if self.once and code == 0:
                 self.ended.set()
                 return
-            if code == 2:
+            if code in (REFUSED, UNREADY):
                 raise ChildRefused(self.name)
             pause = pause_after(pause, loop.time() - began)
             news = f"ended with {ending(code)}; starting it again in {pause:g} s"
@@ -175,7 +175,7 @@ class Child:
 
 
 class ChildRefused(RunFailed):
-    """A child ended with exit code 2: its input is wrong, and would be wrong again."""
+    """A child was refused: its input is wrong, or not what it has to be as things stand."""
 
     def __init__(self, name: str) -> None:
         super().__init__(Fault(reason=f"{name} could not start", advice="its own message above says why"))

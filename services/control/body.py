@@ -85,7 +85,7 @@ class TakenOver(BodyFailed):
     def __init__(self, parts: Iterable[str]) -> None:
         """Name the parts."""
         reason = f"another behavior has taken {', '.join(parts)} on the way home"
-        super().__init__(Fault(reason=reason, service="control"))
+        super().__init__(Fault(reason=reason, service="control", cause="replaced"))
 
 
 class Revoked(Exception):

@@ -23,6 +23,8 @@ class LiveBehavior:
         self.fault: Fault | None = None
         self.aborted: Status = "aborted"
         """Its status if it ends early: `lapsed` without its requester."""
+        self.why: Fault | None = None
+        """Why it is to end early."""
         self.passed = ""
         """The last sync point that it has passed."""
         self.aborts: list[str] = []
@@ -43,8 +45,8 @@ class LiveBehavior:
 
     def stop(self, why: Fault, status: Status = "aborted") -> None:
         """Note why it is to end early. status: `lapsed` without its requester."""
-        if self.fault is None:
-            self.aborted, self.fault = status, why
+        if self.why is None:
+            self.aborted, self.why = status, why
 
     def hold(self, is_held: bool) -> None:
         """Hold it on request, or no more."""

@@ -161,7 +161,7 @@ class _Control:
                 self.switch.serve(request)
                 self.shown.look_soon()
             case Cancel() if live is not None:
-                live.stop(request.fault(live.label))
+                live.stop(request.fault(live.request.behavior.id))
                 self._revoke(live)
             case GoHome():
                 self.desk.accept(request.id)
@@ -195,7 +195,10 @@ class _Control:
             return
         self.desk.accept(request.id)
         for live in meant:
-            live.stop(Fault(reason="the body aborted it", where=label, cause="cancelled", whose=request.requester))
+            why = Fault(
+                reason="the body aborted it", where=request.behavior, cause="cancelled", whose=request.requester
+            )
+            live.stop(why)
             self._revoke(live, request.how)
             live.aborts.append(request.id)
 
@@ -246,11 +249,11 @@ class _Control:
             if isinstance(error, DriverBroken) or not isinstance(error, BodyFailed):
                 self._take_home(f"after {live.label} broke")  # nobody knows where its parts are
         if live.status == "aborted":
-            live.status = live.aborted
+            live.status, live.fault = live.aborted, live.why
             if live.authority.revoked == "taken_over":
                 reason, by = "another behavior took its part", request.requester
                 live.status = "taken_over"
-                live.fault = Fault(reason=reason, where=live.label, cause="replaced", whose=by)
+                live.fault = Fault(reason=reason, where=request.behavior.id, cause="replaced", whose=by)
         self._finish(live)
 
     def _give_up(self, live: LiveBehavior) -> None:
@@ -292,7 +295,7 @@ class _Control:
     async def _go_home(self, request: GoHome) -> None:
         with self.desk.serving(request):
             if (fault := await self._homed(request.parts)) is not None:
-                self.desk.refuse(request.id, fault)
+                self.desk.refuse(request.id, replace(fault, whose=request.requester) if fault.cause else fault)
                 return
             self.note_look()
             self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))

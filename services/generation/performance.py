@@ -290,7 +290,7 @@ class FragmentPerformance:
 
     @property
     def why(self) -> Fault:
-        """Why what belongs to the same turn ends with it."""
+        """Reason for the end of what belongs to the same turn."""
         status = f"{self.fragment.id} {self.status}"
         fault = self._ended.fault if self._ended else None
         return Fault(reason=status) if fault is None else replace(fault, reason=status)

@@ -306,7 +306,7 @@ class _Generation:
 
 
 def _how(cancel: Cancel) -> Literal["lapsed", "released", "owner_lost"]:
-    """How an inhibition ends that is cancelled so."""
+    """Tell how an inhibition ends that is cancelled so."""
     if cancel.cause == "unrenewed":
         return "lapsed"
     return "owner_lost" if cancel.cause in ORPHANING - {"closed"} else "released"

@@ -205,7 +205,7 @@ class Asking:
 
     def tick(self, now: Seconds, unlinked_at: Seconds = NEVER) -> list[Effect]:
         """Carry out all that is due by now. unlinked_at: when this process last had no router."""
-        self._sight.unlinked_at = unlinked_at
+        self._sight.look(now, self.deadline, unlinked_at)
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if event is None:

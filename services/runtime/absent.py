@@ -1,4 +1,4 @@
-"""Those who have gone, and when to forget them: one rule for everything that remembers anybody. Pure.
+"""Rule for forgetting: who has gone, and since when, for everything that remembers anybody. Pure.
 
 A robot in a lobby meets thousands of people, clients and programs, each under a name that never comes again. Whoever
 keeps something of each of them grows for ever, and slows down with everybody who ever passed.
@@ -80,5 +80,5 @@ class Acquaintances:
             self._absent.leaves(person, now)
 
     def forgotten(self, now: Seconds) -> list[str]:
-        """Those to forget by now; each is told once."""
+        """Take out those to forget by now; each is told once."""
         return self._absent.forgotten(now)

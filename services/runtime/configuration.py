@@ -10,7 +10,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.explained import explained
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 from engage_hri.schemas.utf8 import is_utf8, utf8
 from engage_hri.services.bus.config import BusConfig, environment
 
@@ -87,7 +87,7 @@ def _file(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(utf8(path.read_bytes(), str(path)))
     except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
+        raise NotReady(Fault(reason=error.strerror or str(error), where=str(path))) from error
     except (ValueError, RecursionError) as error:  # a TOMLDecodeError is a ValueError, and so is a number too long
         raise InputRefused(Fault(reason=f"not TOML: {error}", where=str(path), advice=_ADVICE)) from error
 

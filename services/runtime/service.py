@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.status import AskStatus, Status
@@ -86,7 +86,7 @@ async def _rival(bus: Bus, presence: Subscription) -> None:
                 where, advice = bus.name, "stop one of the two, or give it another --robot"
                 if run < bus.run:
                     reason = f"robot {bus.robot!r} has this on the bus twice; the other one stays"
-                    raise InputRefused(Fault(reason=reason, where=where, advice=advice))
+                    raise NotReady(Fault(reason=reason, where=where, advice=advice))
                 told = "robot %r has %s on the bus twice; this one stays (%s)"
                 journal.alert(bus.log, told, bus.robot, where, advice)
 

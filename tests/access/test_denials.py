@@ -105,3 +105,33 @@ def test_who_sends_a_key_that_takes_for_ever_to_match_is_named_be_it_allowed_or_
 def test_other_errors_of_zenoh_are_passed_on() -> None:
     assert told("2026-11-22T22:21:19Z ERROR acc-0 ThreadId(05) zenoh::x: no memory")[0].startswith("zenoh: 2026")
     assert not told("2026-11-22T22:21:19Z DEBUG acc-0 ThreadId(05) zenoh_link_tls::utils: Loading certificates", "")
+
+
+DROPPED = TRACE.replace("::access_control", "").format("08", "Msg intercepted!")
+
+
+def test_what_a_rule_allows_and_is_dropped_is_too_large() -> None:
+    cached = trace(f"Using cached result: 107387840e15874f6e7b603029be66a0 is authorized to Put (ingress) on {KEY}")
+    news = f"dropped: robot/manager/bob sends a put on {KEY} that is larger than may be sent"
+    assert told(checked("Put", un=""), DROPPED) == [news]
+    assert told(checked("Query", un=""), cached, DROPPED) == [news]
+    # On another thread, to a receiver who may not hear it, or after what is denied, it is no news.
+    assert not told(checked("Put", un="", thread=9), DROPPED)
+    assert not told(checked("Put", un=""), checked("Put", flow="egress"), DROPPED)
+    assert len(told(checked("Put"), DROPPED)) == 1
+
+
+def test_what_comes_too_fast_is_told_with_the_name() -> None:
+    many = TRACE.replace("access_control", "downsampling").format(
+        "08", f"Message dropped by the downsampling interceptor: Push({KEY}) from:south:0:client/10738784:1"
+    )
+    news = f"dropped: robot/manager/bob sends more on {KEY} than may come in a second"
+    assert told(checked("Put", un=""), *[many, DROPPED] * 10) == [news, f"{news} (10 times)"]
+    assert told(many)[0].startswith("dropped: somebody sends more on")
+
+
+def test_a_log_that_lies_about_threads_fills_no_memory() -> None:
+    denials = Denials(lambda line: None)
+    for number in range(5 * MOST):
+        denials.feed(f"x ThreadId({number}) {'y' * 100}".encode())
+    assert len(denials._before) <= MOST

@@ -21,7 +21,7 @@ from engage_hri.services.bus.zenoh import readers
 from engage_hri.services.bus.zenoh import session as zenoh_session
 from engage_hri.services.bus.zenoh.history import BATCH, History, finish
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
-from engage_hri.services.bus.zenoh.order import PULSE_FOR
+from engage_hri.services.bus.zenoh.order import PULSE_FOR, Missing
 from engage_hri.services.runtime.service import Ready, running
 from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, matched, messages, numbers, state
 from tests.commanding import command
@@ -330,3 +330,48 @@ async def test_a_process_that_never_answers_at_first_is_asked_until_it_does(monk
     assert asked > readers.TRIES
     await far.close()
     await near.close()
+
+
+async def test_a_past_of_many_megabytes_comes_whole_to_a_late_process(town: Town):
+    """No single answer may be as large as all that is kept of a key."""
+    near, far, _ = town
+    there, here = near.join("there"), far.join("here")
+    key = keys.request_state("there")
+    for number in range(10):
+        there.publish(key, Accepted(id=f"{number}{'x' * 900_000}"))
+
+    assert [each.id[:2] for each in await messages(here.subscribe(key), 10)] == [f"{n}x" for n in range(10)]
+
+
+async def test_what_is_too_large_in_json_is_refused_alone(town: Town):
+    near, _, visitor = town
+    bus = near.join("there")
+    bus.publish(keys.WORLD, Accepted(id="\x01" * 300_000))  # a letter that JSON writes with six
+    bus.publish(keys.HEAD_OWNER, state(2))
+
+    replies = await visitor.get("engage/v1/state/**?format=json")
+
+    [good] = [reply.ok for reply in replies if reply.ok]
+    [bad] = [reply.err for reply in replies if reply.err]
+    assert texts([good]) == ["2"]
+    assert "bytes; at most 1048576 may be sent" in json.loads(bad.payload.to_bytes())["reason"]
+    assert len(await visitor.samples("engage/v1/state/**")) == 2
+
+
+async def test_a_question_with_more_counts_than_it_can_have_gets_all_that_is_kept(town: Town):
+    near, far, _ = town
+    there = near.join("there")
+    for number in range(3):
+        there.publish(keys.fault("there"), state(number))
+    seen = {f"engage/v1/evt/{number}/{'x' * 1000}": 1 for number in range(1200)} | {keys.fault("there"): 2}
+    told: list[list[int]] = []
+    ended = asyncio.Event()
+
+    history: History = far._history
+    history.ask(
+        ["engage/v1/evt/**"], near.run, Missing(seen, is_new=False),
+        lambda run, past: told.append([one.envelope.nth for one in past.written]), ended.set,
+    )  # fmt: skip
+    await asyncio.wait_for(ended.wait(), PATIENCE)
+
+    assert told == [[1, 2, 3]]

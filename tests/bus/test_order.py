@@ -2,12 +2,14 @@
 
 from typing import Any
 
+import msgspec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.limits import BESIDE, SMALL
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.order import Envelope, Follower, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.order import PULSE_FOR, Envelope, Follower, Past, SentLog, Written, fitting
 
 KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
 NUMBERS = st.integers(1, 10**9)
@@ -294,3 +296,42 @@ def test_what_was_told_before_a_reader_came_is_not_lost_and_what_is_gone_later_i
     gone = Past(dict(sent.counts), ())
     assert follower.catch_up(gone) == []
     assert follower.lost == 2
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.sampled_from(range(5, 400))), max_size=60), st.integers(1, 60))
+def test_a_pulse_fits_into_its_row_and_has_the_keys_that_were_written_last(
+    writes: list[tuple[int, int]], longest: int
+):
+    """The oracle: all counts of the last seconds, the newest first, as long as they fit."""
+    sent = SentLog("run")
+    key_of = {at: f"engage/v1/evt/{at}/{'k' * (40 * length)}" for at, (_, length) in enumerate(writes)}
+    now = 0.0
+    last: dict[str, float] = {}
+    for at, (pause, _) in enumerate(writes):
+        now += pause / 20
+        key = key_of[at % longest]
+        write(sent, key, now)
+        last.pop(key, None)
+        last[key] = now
+
+    found = sent.recent(now)
+
+    recent = [key for key, at in reversed(last.items()) if now - at <= PULSE_FOR]
+    assert list(found) == recent[: len(found)]
+    assert {key: sent.counts[key] for key in found} == found
+    assert len(msgspec.msgpack.encode(("run", found))) <= SMALL
+    assert len(found) == len(recent) or len(msgspec.msgpack.encode(found)) > SMALL - 20_000
+
+
+def test_what_is_handed_out_of_a_key_fits_into_its_row_or_is_one_message():
+    sizes = [100, 3000, 60_000, 10, 65_536, 65_536, 1, 30_000, 30_000, 30_000]
+    key = keys.fault("there")
+    written = [Written(key, "e" * 255, bytes(size), Envelope("s", "c", 0.0, n)) for n, size in enumerate(sizes)]
+
+    parts = list(fitting(written, SMALL))
+
+    assert [one for part in parts for one in part] == written
+    for part in parts:
+        packed = msgspec.msgpack.encode([(one.key, one.encoding, one.payload, one.envelope) for one in part])
+        assert len(packed) <= SMALL + BESIDE
+    assert len(parts) < len(sizes)

@@ -8,6 +8,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -45,22 +46,33 @@ class Witness:
     def __init__(self, session: zenoh.Session) -> None:
         self.session: Any = session
         self.came: list[tuple[str, str, int]] = []
+        self.news = asyncio.Event()
         self._loop = asyncio.get_running_loop()
 
     def hear(self, what: str) -> Any:
         def note(item: Any) -> None:
             size = len(item.payload.to_bytes()) if item.payload else 0
             came = (what, str(item.key_expr), size)
-            self._loop.call_soon_threadsafe(self.came.append, came)
+            self._loop.call_soon_threadsafe(self._take, came)
             if what == "query":
                 item.drop()
 
         return zenoh.handlers.Callback(note, indirect=False)
 
+    def _take(self, came: tuple[str, str, int]) -> None:
+        self.came.append(came)
+        self.news.set()
+
+    async def next(self, patience: float) -> None:
+        """Wait for news, for some seconds at most: what Zenoh does with time, it does in real time."""
+        self.news.clear()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self.news.wait(), patience)
+
     async def wait(self, holds: Callable[[], bool]) -> None:
         async with asyncio.timeout(PATIENCE):
-            while not holds():  # noqa: ASYNC110 - what comes is told by another thread
-                await asyncio.sleep(0.01)
+            while not holds():
+                await self.next(0.05)
 
 
 @pytest_asyncio.fixture
@@ -87,7 +99,7 @@ async def test_each_row_is_passed_on_at_its_size_and_dropped_with_one_byte_more(
     sender.put("begun", b"")
     while not witness.came:
         sender.put("begun", b"")
-        await asyncio.sleep(0.02)
+        await witness.next(0.02)
     witness.came.clear()
 
     for number, key in enumerate(all_keys):
@@ -152,7 +164,7 @@ async def test_what_is_in_no_row_has_the_greatest_bound_and_never_closes_the_lin
     witness.session.declare_subscriber("**", witness.hear("put"))
     while not witness.came:
         sender.put("begun", b"")
-        await asyncio.sleep(0.02)
+        await witness.next(0.02)
 
     for size in (LARGEST + BESIDE, LARGEST + BESIDE + 1, MOST_IN_PARTS, 2 * MOST_IN_PARTS, 30_000_000):
         sender.put("elsewhere", bytes(size), congestion_control=BLOCK)
@@ -192,20 +204,21 @@ async def test_a_router_passes_on_pulses_of_a_holder_at_their_rate_and_no_more()
     endpoint = free_endpoint()
     router = open_router((), [endpoint], {"downsampling": paced((alice, bob))})
     loud, quiet, witness = plain(endpoint), plain(endpoint), Witness(plain(endpoint))
+    spaced = Witness(quiet)  # which hears nothing
     try:
         witness.session.declare_subscriber(keys.ANY_PULSE, witness.hear("put"))
         pulses = {who.name: keys.own(f"{who.mark}{'2' * 24}", "pulse") for who in (alice, bob)}
         while not witness.came:
             quiet.put(pulses["bob"], b"")
-            await asyncio.sleep(0.02)
-        await asyncio.sleep(2 / MOST_PULSES)
+            await witness.next(0.02)
+        await spaced.next(2 / MOST_PULSES)
         witness.came.clear()
         began = time.perf_counter()
         for at in range(4):
             for _ in range(500):
                 loud.put(pulses["alice"], b"1", congestion_control=BLOCK)
             quiet.put(pulses["bob"], bytes(at), congestion_control=BLOCK)
-            await asyncio.sleep(2 / MOST_PULSES)
+            await spaced.next(2 / MOST_PULSES)
         loud.put("engage/v1/state/over", b"", congestion_control=BLOCK)
         took = time.perf_counter() - began
         await witness.wait(lambda: ("put", pulses["bob"], 3) in witness.came)

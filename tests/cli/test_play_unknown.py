@@ -56,7 +56,7 @@ def test_what_a_service_that_died_was_doing_is_told_as_unknown(engage: Engage, t
     result = engage(*PLAY, file)
 
     assert result.code == 3
-    assert f"{mortal} is gone" in result.err
+    assert f"{mortal} has not been seen for" in result.err
     (told,) = map(json.loads, result.out.splitlines())
     assert told["status"] == "unknown"
     # What had been said is known from the voice, if generation lives to tell it.

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from engage_hri.services.commandline.process import UNREADY
 from engage_hri.services.commandline.roster import NAMES, ROBOT
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
@@ -253,7 +254,7 @@ async def test_a_second_one_of_a_robot_is_refused_and_the_first_goes_on(endpoint
             told = [(await process.communicate())[1].decode() for process in second]
             _, err = await play.communicate()
 
-        assert [process.returncode for process in second] == [2, 2]
+        assert [process.returncode for process in second] == [2, UNREADY]
         assert told[0].startswith("up: robot 'only' has this on the bus already (stop what runs there")
         assert told[1].startswith("realizer: robot 'only' has this on the bus already (stop what runs there")
         assert [text.count("\n") for text in told] == [1, 1]
@@ -380,7 +381,7 @@ async def test_of_two_services_of_one_name_that_are_started_at_once_exactly_one_
         loser, winner = sorted(twins, key=lambda twin: twin.returncode is None)
         _, err = await loser.communicate()
 
-        assert loser.returncode == 2
+        assert loser.returncode == UNREADY
         assert b"has this on the bus " in err
         assert winner.returncode is None
     finally:

@@ -122,7 +122,8 @@ async def test_refused_input_raises_with_the_robots_fault(hub: MemoryHub) -> Non
         with pytest.raises(InputRefused) as refusal:
             await robot.perform(HELLO)
 
-    assert refusal.value.fault == Fault(reason="no object 'hexagon'", where="hello: ref-1", line=7)
+    reason = "no object 'hexagon'"
+    assert refusal.value.fault == Fault(reason=reason, where="hello: ref-1", line=7, service="generation")
 
 
 async def test_a_failure_while_running_raises_with_what_was_done(hub: MemoryHub) -> None:

@@ -211,7 +211,7 @@ async def test_a_fragment_in_line_that_the_realizer_refuses_has_failed(hub: Memo
         outcome = await second.outcome
 
         assert isinstance(outcome, FragmentOutcome)
-        assert (outcome.status, outcome.fault) == ("failed", Fault(reason="a deadlock"))
+        assert (outcome.status, outcome.fault) == ("failed", Fault(reason="a deadlock", service="realizer"))
 
 
 async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -> None:
@@ -298,7 +298,7 @@ async def test_a_block_that_fails_ends_the_turn_but_not_the_service(hub: MemoryH
         await good.outcome
 
         assert isinstance(outcome, FragmentOutcome)
-        assert (outcome.status, outcome.fault) == ("failed", Fault(reason="the arm is stuck"))
+        assert (outcome.status, outcome.fault) == ("failed", Fault(reason="the arm is stuck", service="realizer"))
         assert [each.signal.signal for each in partners.signals] == ["aborted"]
 
 

@@ -151,7 +151,7 @@ async def test_a_fragment_without_words_of_which_nothing_was_performed_fails_and
         block = await partners.fragment_block("a")
         await partners.fragment_block("b")
         gone = tuple(each.id for each in block.behaviors)
-        fault = Fault(reason="no behavior of it came to its end")
+        fault = Fault(reason="no behavior of it came to its end", service="realizer")
         partners.end(partners.request("a"), "failed", dropped=gone, reasons=("tired",) * len(gone), fault=fault)
         partners.end(partners.request("b"))
         outcomes = [await each.outcome for each in pending]

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from tests.lab import verdict
 from tests.lab.lab import Lab, Process, laboratory, missing
-from tests.lab.verdict import Motion, Span
+from tests.lab.verdict import PERSON, Injury, Motion, Span
 
 LAYOUT: dict[int, dict[int, tuple[str, ...]]] = {
     3: {1: ("router", "control"), 2: ("realizer", "generation", "recognition"), 3: ("simulation", "collaboration")},
@@ -32,7 +32,7 @@ LAYOUT: dict[int, dict[int, tuple[str, ...]]] = {
     },
 }  # fmt: skip
 """Processes of each machine, by the number of machines."""
-KINDS = ("kill", "freeze", "cut", "reboot", "router")
+KINDS = ("kill", "freeze", "cut", "reboot", "router", "clock")
 CALM = "calm"
 """No fault: play goes on for a while."""
 HELD_WITHIN = 0.5 + 0.1
@@ -45,6 +45,8 @@ AFTERMATH = 2.0
 HUNG_AFTER = 40.0
 """Calm seconds after which a request without an end is hung: more than the longest behavior, event or patience."""
 LONG = 60.0
+ENDS_WITHIN = 8.0
+"""Seconds after everything is back in which an end still comes of the fault: the longest grace, and another."""
 SETTINGS = (
     "--set", "recognition.gaze_resolution=table", "--set", "simulation.human=appendix-b",
     "--set", "collaboration.placement=4", "--set", "collaboration.arrival=1",
@@ -88,12 +90,15 @@ class Stage:
         self.events: list[dict[str, Any]] = []
         self.plays = 0
         self.faults: list[Span] = []
+        self.injuries: list[Injury] = []
         self._folder = folder
         self._read: dict[Path, int] = {}
         self._ready: dict[str, asyncio.Event] = {}
         self._readers: set[asyncio.Task[None]] = set()
         self.stood_still: list[tuple[float, float]] = []
         """Times for which the host itself stood still, as one of many on a large machine may. They prove nothing."""
+        self.slow: list[tuple[float, float]] = []
+        """Times in which it stood still for long enough that processes may miss one another."""
         self._watch = asyncio.create_task(self._watch_host(), name="host")
 
     @property
@@ -136,19 +141,41 @@ class Stage:
                     ready.set()
         await process.wait()
 
-    async def signal(self, name: str, number: signal.Signals) -> None:
+    async def signal(self, name: str, number: signal.Signals, *, its_child: bool = False) -> None:
         process = self.processes[name]
         if process.returncode is None:
-            await self.lab.machines[self.machine_of(name)].kill(process, number)
+            await self.lab.machines[self.machine_of(name)].kill(process, number, its_child=its_child)
+
+    def injured(self, fault: Broken) -> frozenset[str]:
+        """Whom a fault hits: those that the others miss, and the router if they miss that."""
+        match fault.kind:
+            case "kill" | "freeze":
+                hit = frozenset((fault.what,))
+            case "reboot" | "clock":
+                hit = frozenset(self.layout[int(fault.what.partition("+")[0])])
+            case "router":
+                hit = frozenset(("router",))
+            case "cut" if fault.what.startswith("1-"):  # all that there is goes over the router on machine 1
+                hit = frozenset((*self.layout[int(fault.what[2:])], "router"))
+            case _:
+                hit = frozenset()
+        return hit | {PERSON} if hit & {"simulation", "router"} else hit  # of whom the simulation tells
 
     async def revive(self) -> float | None:
         """Start what has ended by itself; the tangram begins anew when it has come to its end."""
         ended = [name for name, process in self.processes.items() if process.returncode is not None]
+        if not ended:
+            return None
+        began = time.monotonic()
         if "collaboration" in ended:
             self.plays += 1
             await self.signal("simulation", signal.SIGKILL)
             ended = sorted({*ended, "simulation"}, reverse=True)
-        return await self.start(*ended) if ended else None
+        over = await self.start(*ended)
+        self.injuries.append(
+            Injury("kill", frozenset((*ended, PERSON)), began - 2.0, over)
+        )  # it may have ended for a while
+        return over
 
     # -- records ---------------------------------------------------------------------------------------------------
 
@@ -199,6 +226,8 @@ class Stage:
         while True:
             before = time.monotonic()
             await asyncio.sleep(0.2)
+            if time.monotonic() - before > HELD_WITHIN:
+                self.slow.append((before, time.monotonic()))
             if time.monotonic() - before > STANDSTILL:
                 self.stood_still.append((before - 1.0, time.monotonic() + LONG))
 
@@ -228,10 +257,13 @@ def draw(chance: random.Random, stage: Stage, kinds: Sequence[str]) -> Broken:
             return Broken(kind, f"{one}-{other}", seconds, stops)
         case "calm":
             return Broken(kind, "play", 30.0, False)
-        case "reboot":
+        case "reboot" | "clock":
             number = chance.choice([each for each in stage.layout if each != 1])
-            return Broken(kind, str(number), chance.choice([0.5, 2.0]), number == realizer)
+            ahead = f"+{chance.choice([0, 3, 1000, 86400])}" if kind == "clock" else ""
+            return Broken(kind, f"{number}{ahead}", chance.choice([0.5, 2.0]), number == realizer)
         case _:
+            if chance.random() < 0.5:
+                return Broken("router", "frozen", chance.choice([0.3, 1.0, 2.0, 4.0]), True)
             return Broken("router", "killed", chance.choice([0.3, 1.0, 3.0, 6.0]), True)
 
 
@@ -241,6 +273,11 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
     began = time.monotonic()
     heal: Callable[[], Awaitable[Any]]
     match fault.kind:
+        case "router" if fault.what == "frozen":
+            await stage.signal("router", signal.SIGSTOP, its_child=True)
+
+            async def heal() -> None:
+                await stage.signal("router", signal.SIGCONT, its_child=True)
         case "kill" | "router":
             name = "router" if fault.kind == "router" else fault.what
             await stage.signal(name, signal.SIGKILL)
@@ -263,8 +300,10 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
             async def heal() -> None:
                 await stage.lab.heal(one, other)
         case _:
-            machine = stage.lab.machines[int(fault.what)]
+            number, _, ahead = fault.what.partition("+")
+            machine = stage.lab.machines[int(number)]
             await machine.crash()
+            machine.ahead = int(ahead) if ahead else machine.ahead
 
             async def heal() -> None:
                 await machine.boot()
@@ -273,7 +312,8 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
     await asyncio.sleep(fault.seconds)
     over = time.monotonic()
     await heal()
-    healed = time.monotonic() if fault.kind in ("kill", "router", "reboot") else over
+    begins_anew = fault.kind in ("kill", "reboot", "clock") or fault.what == "killed"
+    healed = time.monotonic() if begins_anew else over
     yield Span(began, healed)
 
 
@@ -293,6 +333,12 @@ async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
         # Who was frozen or cut off learns late that others have missed it: what counts is the last time.
         is_back = await stage.until(lambda: stage.back_since() is not None, 20.0)
         back = max(0.0, (stage.back_since() or span.healed) - span.healed) if is_back else None
+    if fault.kind != CALM:
+        stage.injuries.append(
+            Injury(
+                fault.kind, stage.injured(fault), span.began, span.healed + (BACK_WITHIN if back is None else back)
+            )
+        )
     words = stage.words_since(span.healed)
     wrong = []
     stage.faults.append(span)
@@ -335,6 +381,14 @@ async def play(
         stage.read()
         lost = verdict.unanswered(stage.events, stage.living(), time.monotonic() - max(settle, HUNG_AFTER) / 2)
         wrong += [f"lost: {each}" for each in lost]
+        slow = [(since - 1.0, to + ENDS_WITHIN) for since, to in stage.slow]
+        # What the host itself did is in no log of ours: ends that may come of it are not judged.
+        judged = [each for each in stage.events if not any(since <= each["t"] <= to for since, to in slow)]
+        wrong += [f"untrue: {each}" for each in verdict.untrue(judged, stage.injuries, ENDS_WITHIN)]
+        if len(stage.slow):
+            print(
+                f"the host stood still {len(stage.slow)} times; {len(stage.events) - len(judged)} events not judged"
+            )
         wrong += [f"doubled: {each}" for each in verdict.doubled(stage.events)]
         wrong += [f"spoken twice: {each}" for each in verdict.spoken_twice(stage.events, "collaboration")]
         stage.close()
@@ -344,13 +398,18 @@ async def play(
         if run.broken.kind != CALM
     ]
     wrong += [
-        f"held without a fault: {each}" for each in verdict.groundless(stage.events, [*faults, *stage.stood_still])
+        f"held without a fault: {each}"
+        for each in verdict.groundless(stage.events, [*faults, *stage.stood_still, *slow])
     ]
+    ends = [each for each in judged if each["what"] == "told" and verdict.is_not_done(each)]
+    causes = Counter(f"{each['cause'] or 'itself'} of {each['blamed'] or each['speaker']}" for each in ends)
     told = Counter(each["told"].split(":")[0] for each in stage.events if _is_fragment(each))
-    spans = [{"fault": str(run.broken), "began": run.span.began, "healed": run.span.healed} for run in results]
-    (folder / "faults.json").write_text(json.dumps(spans))
+    (folder / "faults.json").write_text(
+        json.dumps([{**each._asdict(), "injured": sorted(each.injured)} for each in stage.injuries])
+    )
     print(f"\n{len(results)} faults, seed {seed}, {machines} machines; {stage.plays} tangrams came to their end")
     print(f"fragments told to the manager: {dict(told)}")
+    print(f"causes of {len(ends)} ends that were not done, to whoever had asked: {dict(causes.most_common())}")
     for name, values in (
         ("held after", [run.motion.held for run in results if run.broken.stops]),
         ("last word after", [run.motion.quiet for run in results if run.broken.stops and run.motion.held]),
@@ -382,7 +441,7 @@ def main() -> int:
     parser.add_argument("--kinds", nargs="+", choices=(*KINDS, CALM), default=KINDS)
     parser.add_argument("--folder", type=Path, help="where records are kept; a new one unless given")
     options = parser.parse_args()
-    if why := missing():
+    if why := missing(*(("time",) if "clock" in options.kinds else ())):
         print(why, file=sys.stderr)
         return 3
     folder = options.folder or Path(tempfile.mkdtemp(prefix="faults-"))

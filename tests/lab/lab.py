@@ -87,14 +87,24 @@ class Machine:
         inside = ("nsenter", "--target", str(self._init), "--net", "--mount", "--uts", "--pid")
         inside += ("--time",) if self.ahead else ()
         process = await asyncio.create_subprocess_exec(
-            *inside, *command, env=os.environ | PATHS | dict(env or {}), start_new_session=True, **files
-        )
+            *inside, *command, env=os.environ | PATHS | {"LAB_AHEAD": str(self.ahead)} | dict(env or {}),
+            start_new_session=True, **files
+        )  # fmt: skip
         self.processes.append(process)
         return process
 
-    async def kill(self, process: Process, number: signal.Signals = signal.SIGKILL) -> None:
-        """Send a signal to a process of this machine; if it is to be killed, wait until it is."""
-        os.kill(_child_of(process.pid), number)  # the process itself only stands for it on the host
+    async def kill(
+        self, process: Process, number: signal.Signals = signal.SIGKILL, *, its_child: bool = False
+    ) -> None:
+        """Send a signal to a process of this machine; if it is to be killed, wait until it is.
+
+        its_child: send it to the one child of that process instead, which it watches over.
+        """
+        meant = _child_of(process.pid)  # the process itself only stands for it on the host
+        if its_child:
+            os.kill(_child_of(meant), number)
+            return
+        os.kill(meant, number)
         if number in (signal.SIGKILL, signal.SIGCONT):
             self._go_on(process)
         if number == signal.SIGKILL:

@@ -1,7 +1,7 @@
 """A command of ours that writes down what it tells, asks and sees: `python -m tests.lab.recorded FILE ARGUMENT...`.
 
 What a process says on a network that is cut may be lost; its record is not. Each line of FILE is one event, with the
-seconds of the monotonic clock, which all machines of a laboratory share.
+seconds of the host's monotonic clock: by so many seconds as `LAB_AHEAD` says, that of the machine is ahead of it.
 """
 
 import json
@@ -12,6 +12,7 @@ from typing import Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body import BehaviorOutcome, RobotState, WordSpoken
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.requests import Accepted, Outcome, Refused
@@ -19,6 +20,7 @@ from engage_hri.services.bus.zenoh.hub import ZenohHub
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.requests.ends import Pending, Requester
 
+AHEAD = float(os.environ.get("LAB_AHEAD", "0"))
 STILL = 0.02
 """Radians a second below which a joint counts as still."""
 
@@ -33,7 +35,7 @@ class Record:
         self._moves = False
 
     def __call__(self, what: str, **fields: object) -> None:
-        line = {"t": time.monotonic(), "process": self._process, "what": what, **fields}
+        line = {"t": time.monotonic() - AHEAD, "process": self._process, "what": what, **fields}
         os.write(self._file, json.dumps(line).encode() + b"\n")
 
     def message(self, key: str, message: object) -> None:
@@ -48,12 +50,11 @@ class Record:
                 self._motion(message)
             case Accepted() | Refused() | Outcome():
                 status = getattr(message, "status", type(message).__name__)
-                fault = getattr(message, "fault", None)
                 whose = (message.requester, message.life, message.kind, message.id)
                 label = f"{message.block}:{message.behavior}" if isinstance(message, BehaviorOutcome) else ""
                 label = message.fragment if isinstance(message, FragmentOutcome) else label
                 self("answer", server=keys.server_of(key), whose="|".join(whose), status=status, label=label,
-                     reason=str(fault) if fault else "")  # fmt: skip
+                     **_why(getattr(message, "fault", None)))  # fmt: skip
 
     def _motion(self, state: RobotState) -> None:
         before, self._state = self._state, state
@@ -64,6 +65,13 @@ class Record:
         if (moves := fastest > STILL) != self._moves:
             self._moves = moves
             self("moves" if moves else "still", since=before.at.seconds)
+
+
+def _why(fault: Fault | None) -> dict[str, str]:
+    """What a fault says: `reason`, and of what kind it is, and who reports it."""
+    if fault is None:
+        return {"reason": "", "cause": "", "blamed": "", "speaker": ""}
+    return {"reason": str(fault), "cause": fault.cause, "blamed": fault.whose, "speaker": fault.service}
 
 
 def tap(record: Record) -> None:
@@ -85,7 +93,7 @@ def tap(record: Record) -> None:
                 if not future.cancelled():
                     error = future.exception()
                     told = f"{type(error).__name__}: {error}" if error else getattr(future.result(), "status", "")
-                    record("told", whose=whose, told=told)
+                    record("told", whose=whose, told=told, **_why(getattr(error or future.result(), "fault", None)))
 
             pending.outcome.add_done_callback(told)
         return pending

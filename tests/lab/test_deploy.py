@@ -68,13 +68,40 @@ def test_the_image_gets_what_the_package_is_made_of_and_nothing_else() -> None:
 
 def test_every_service_has_its_place_in_every_recipe() -> None:
     hand = {words[1] for _, words in by_hand() if words[0] == "run"}
-    compose = yaml.safe_load((FILES / "compose.yaml").read_text())["services"]
+    for file in ("compose.yaml", "compose.open.yaml"):
+        compose = yaml.safe_load((FILES / file).read_text())["services"]
+        assert hand == {name for name in compose if name != "router"}
+        assert all(each["command"][:2] == ["run", name] for name, each in compose.items() if name != "router")
 
-    assert hand == {name for name in compose if name != "router"}
-    assert all(each["command"][:2] == ["run", name] for name, each in compose.items() if name != "router")
+
+def test_containers_have_keys_unless_the_file_is_called_open_and_that_one_listens_on_loopback_only() -> None:
+    with_keys, without = (
+        yaml.safe_load((FILES / file).read_text())["services"] for file in ("compose.yaml", "compose.open.yaml")
+    )
+
+    for name, each in with_keys.items():
+        assert each["environment"]["ENGAGE_BUS_CONNECT"].startswith("tls/"), name
+        (mounted,) = each["volumes"]
+        assert mounted.endswith(f"/{name}:/keys:ro")
+    assert with_keys["router"]["command"][2].startswith("tls/")
+    assert [each["ports"] for each in without.values() if "ports" in each] == [["127.0.0.1:7447:7447"]]
+    assert not any("volumes" in each for each in without.values())
 
 
-@pytest.mark.parametrize("file", ["compose.yaml", "compose.keys.yaml"])
+def test_the_image_runs_on_the_quick_loop_as_a_user_of_its_own() -> None:
+    lines = [line.split(" ", 1) for line in (FILES / "Dockerfile").read_text().splitlines() if line[0] != "#"]
+
+    users = [rest for word, rest in lines if word == "USER"]
+    made = next(rest for word, rest in lines if word == "RUN" and rest.startswith("useradd"))
+    installed = next(rest for word, rest in lines if word == "RUN" and "pip install" in rest)
+    assert users == ["10001"]
+    assert f"--uid {users[0]}" in made
+    assert '"/source[speed]"' in installed
+    assert lines.index(["USER", "10001"]) > lines.index(["RUN", installed])
+    assert f"chown -R {users[0]} keys" in (DOCS / "deploy.md").read_text()
+
+
+@pytest.mark.parametrize("file", ["compose.yaml", "compose.open.yaml"])
 def test_the_compose_files_keep_to_the_specification(file: str) -> None:
     checker = jsonschema.Draft7Validator(json.loads(SCHEMA.read_text()))
     compose = yaml.safe_load((FILES / file).read_text())
@@ -113,7 +140,7 @@ def test_systemd_finds_nothing_wrong_with_the_units(unit: str, more: str, tmp_pa
 def test_the_units_and_containers_name_variables_that_are_read() -> None:
     from engage_hri.services.bus.config import PREFIX, BusConfig, environment
 
-    texts = [(FILES / each).read_text() for each in ("bus.env", "bus-keys.env", "compose.yaml", "compose.keys.yaml")]
+    texts = [(FILES / each).read_text() for each in ("bus.env", "bus-keys.env", "compose.yaml", "compose.open.yaml")]
     names = {name for text in texts for name in re.findall(r"\b(ENGAGE_BUS_\w+)", text)}
 
     assert names == {"ENGAGE_BUS_ROBOT", "ENGAGE_BUS_CONNECT", "ENGAGE_BUS_KEYS"}
@@ -135,23 +162,21 @@ class Container(NamedTuple):
     environment: dict[str, str]
 
 
-def containers(variables: dict[str, str], *files: str) -> dict[str, Container]:
-    """The containers of compose files, one over the other. A folder that is mounted stands for the place where it is.
+def containers(file: str, variables: dict[str, str]) -> dict[str, Container]:
+    """The containers of a compose file. A folder that is mounted stands for the place where it is.
 
-    variables: those that the files take from their environment.
+    variables: those that the file takes from its environment.
     """
 
     def filled(match: re.Match[str]) -> str:
         return variables.get(match["name"]) or match["default"] or ""
 
     found: dict[str, Container] = {}
-    for file in files:
-        text = re.sub(r"\$\{(?P<name>\w+)(?::[-?](?P<default>[^}]*))?\}", filled, (FILES / file).read_text())
-        for name, its in yaml.safe_load(text)["services"].items():
-            before = found.get(name, Container([], {}))
-            mounted = {there: here for here, there, *_ in (each.split(":") for each in its.get("volumes", ()))}
-            environment = {key: mounted.get(value, value) for key, value in its["environment"].items()}
-            found[name] = Container(its.get("command", before.command), before.environment | environment)
+    text = re.sub(r"\$\{(?P<name>\w+)(?::[-?](?P<default>[^}]*))?\}", filled, (FILES / file).read_text())
+    for name, its in yaml.safe_load(text)["services"].items():
+        mounted = {there: here for here, there, *_ in (each.split(":") for each in its.get("volumes", ()))}
+        environment = {key: mounted.get(value, value) for key, value in its["environment"].items()}
+        found[name] = Container(its["command"], environment)
     return found
 
 
@@ -165,7 +190,7 @@ async def test_what_the_containers_of_a_robot_with_keys_run_is_a_robot_with_keys
     block.write_text(FRAGMENT)
     variables = {"ENGAGE_KEYS": str(ring), "ENGAGE_ROUTER": host}
     async with AsyncExitStack() as stack:
-        for name, container in containers(variables, "compose.yaml", "compose.keys.yaml").items():
+        for name, container in containers("compose.yaml", variables).items():
             words = [each.replace("0.0.0.0:7447", f"{host}:{port}") for each in container.command]
             itself = {key: value.replace(":7447", f":{port}") for key, value in container.environment.items()}
             process = await stack.enter_async_context(started(*words, **itself))

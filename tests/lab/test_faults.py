@@ -8,7 +8,7 @@ import pytest
 from tests.lab import verdict
 from tests.lab.faults import play
 from tests.lab.lab import missing
-from tests.lab.verdict import Span
+from tests.lab.verdict import Injury, Span
 
 BODY = "body"
 
@@ -105,3 +105,44 @@ def test_who_sees_whom_and_since_when() -> None:
 
     assert verdict.sees(seen, "a") == {"y": 3.0}
     assert verdict.sees([*seen, event(4.0, "sees", "a", name="x")], "a") == {"y": 3.0, "x": 4.0}
+
+
+def end(t: float, cause: str, blamed: str, reason: str = "it ended", status: str = "interrupted") -> dict[str, Any]:
+    why = {"reason": reason, "cause": cause, "blamed": blamed, "speaker": "generation" if reason else ""}
+    return event(t, "answer", service="generation", whose="x", status=status, **why)
+
+
+@pytest.mark.parametrize(
+    ("injury", "true", "untrue"),
+    [
+        (
+            ("router", "router"),
+            [("unlinked", "router"), ("gone", "human")],
+            [("gone", "manager"), ("silent", "router")],
+        ),
+        (("kill", "control"), [("restarted", "control"), ("gone", "control")], [("gone", "realizer"), ("", "")]),
+        (("freeze", "realizer"), [("frozen", "realizer"), ("unrenewed", "realizer")], [("restarted", "realizer")]),
+        (("cut", "realizer"), [("gone", "realizer"), ("unlinked", "router")], [("gone", "control")]),
+    ],
+)
+def test_a_cause_that_was_not_in_force_or_not_theirs_is_found(
+    injury: tuple[str, str], true: list[tuple[str, str]], untrue: list[tuple[str, str]]
+) -> None:
+    kind, who = injury
+    hit = frozenset((who, "human")) if kind == "router" else frozenset((who, "router") if kind == "cut" else (who,))
+    injuries = [Injury(kind, hit, 10.0, 12.0)]
+
+    for cause, blamed in true:
+        assert verdict.untrue([end(13.0, cause, blamed)], injuries, 8.0) == []
+        assert len(verdict.untrue([end(9.0, cause, blamed)], injuries, 8.0)) == 1
+        assert len(verdict.untrue([end(21.0, cause, blamed)], injuries, 8.0)) == 1
+    for cause, blamed in untrue:
+        assert len(verdict.untrue([end(13.0, cause, blamed)], injuries, 8.0)) == 1
+
+
+def test_an_end_without_a_reason_is_found_and_one_that_somebody_asked_for_must_say_who() -> None:
+    assert len(verdict.untrue([end(1.0, "", "", reason="")], [], 8.0)) == 1
+    assert len(verdict.untrue([end(1.0, "cancelled", "")], [], 8.0)) == 1
+    assert (
+        verdict.untrue([end(1.0, "cancelled", "me"), end(1.0, "", ""), end(1.0, "", "", "", "done")], [], 8.0) == []
+    )

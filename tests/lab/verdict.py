@@ -29,6 +29,81 @@ class Motion(NamedTuple):
     still: Seconds | None
 
 
+PERSON = "human"
+"""The person of whom the simulation tells."""
+
+
+class Injury(NamedTuple):
+    """What a fault did to whom. kind: of faults.py. far: participants behind a cut, if it is one.
+
+    injured: participants that it hit, as others see them; also "router". began, over: when all was whole again.
+    """
+
+    kind: str
+    injured: frozenset[str]
+    began: Seconds
+    over: Seconds
+
+
+TRUE_CAUSES: Mapping[str, frozenset[str]] = {
+    "kill": frozenset(("restarted", "gone", "silent", "unrenewed", "forgotten", "late")),
+    "freeze": frozenset(("frozen", "gone", "silent", "unrenewed", "late")),
+    "cut": frozenset(("gone", "silent", "unrenewed", "late", "unlinked")),
+    "reboot": frozenset(("restarted", "gone", "silent", "unrenewed", "forgotten", "late")),
+    "clock": frozenset(("restarted", "gone", "silent", "unrenewed", "forgotten", "late")),
+    "router": frozenset(("unlinked",)),
+}
+"""What can truly be said of a service, or of the router, after each kind of fault."""
+CONTENT = {
+    "the world has no ": ("simulation", "control"), "the world does not know ": ("simulation",),
+    "$.turn_status: ": ("collaboration", "generation"), " of this id goes on": ("collaboration",),
+}  # fmt: skip
+"""Refusals of what was asked, by their words, and who must have been hit: else it would not ask for that."""
+REMEMBERED: Seconds = 20.0
+"""Seconds after everything is whole again in which something is refused for what was before, as an open turn is."""
+BY_SOMEBODY = frozenset(("cancelled", "replaced", "closed"))
+"""Causes that are deeds of a participant, not of a machine."""
+NOT_DONE = ("failed", "interrupted", "unknown", "refused", "lapsed", "aborted", "taken_over", "Refused")
+"""Ends other than done. To who had asked, one is told as an exception, too: `RunFailed: ...`."""
+
+
+def untrue(events: Iterable[Event], injuries: Sequence[Injury], after: Seconds) -> list[str]:
+    """Ends other than done, of whatever request and as whoever knows them, that give no true cause.
+
+    after: seconds after everything is whole again in which an end still comes of a fault.
+    """
+    return [
+        f"{each.get('status') or each.get('told')} of {each['whose']} at {each['t']:.2f} in {each['service']}: {why}"
+        for each in events
+        if each["what"] in ("answer", "told") and is_not_done(each) and (why := _flaw(each, injuries, after))
+    ]
+
+
+def is_not_done(end: Event) -> bool:
+    how = end.get("status") or end.get("told") or ""
+    return how in NOT_DONE or ": " in how
+
+
+def _flaw(end: Event, injuries: Sequence[Injury], after: Seconds) -> str:
+    cause, blamed = end["cause"], end["blamed"]
+    if not end["reason"] or not end["speaker"]:
+        return f"names no cause ({end['reason'] or 'nothing is said'}), or nobody who says it"
+    if cause in BY_SOMEBODY:
+        return "" if blamed else f"{cause}, but not by whom"
+    now = [each for each in injuries if each.injured and each.began <= end["t"] <= each.over + after]
+    if not cause:  # nothing has happened, it says: the service itself refused, or could not
+        before = [each for each in injuries if each.began <= end["t"] <= each.over + REMEMBERED]
+        hit = {name for words, names in CONTENT.items() if words in end["reason"] for name in names}
+        if not now or any(hit & each.injured for each in before):
+            return ""
+        return f"no cause, while {', '.join(each.kind for each in now)}: {end['reason']}"
+    is_unseen = blamed == PERSON and cause == "gone"  # and nobody can know more of a person
+    if any(blamed in each.injured and (is_unseen or cause in TRUE_CAUSES[each.kind]) for each in now):
+        return ""
+    known = "; ".join(f"{each.kind} of {', '.join(sorted(each.injured))}" for each in now) or "nothing"
+    return f"{cause} of {blamed}, says {end['speaker']}, but what happened was {known}: {end['reason']}"
+
+
 def spoken_twice(events: Iterable[Event], manager: str) -> list[str]:
     """Words that were said more than once for one life of the manager. A new one asks for all of it anew."""
     said, life = Counter[tuple[str, str, str, int]](), ""

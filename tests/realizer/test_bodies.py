@@ -217,7 +217,10 @@ async def test_a_body_that_dies_costs_one_warning_and_what_it_was_heard_to_say_i
 
     assert body.warnings() == [("b", "EXECUTION_FAILURE")]
     outcome = body.outcomes["b"]
-    assert (outcome.status, outcome.fault and outcome.fault.reason) == ("failed", "control is gone")
+    assert (outcome.status, outcome.fault and (outcome.fault.cause, outcome.fault.whose)) == (
+        "failed",
+        ("gone", "control"),
+    )
     assert [(each.text, each.complete) for each in outcome.spoken] == [("one two", False)]
     assert body.homes == [("right_arm", "voice")]  # as soon as it is back
 

@@ -101,7 +101,10 @@ async def test_a_body_that_dies_fails_the_block() -> None:
         outcome = await pending.outcome
 
     assert isinstance(outcome, BlockOutcome)
-    assert (outcome.status, outcome.fault and outcome.fault.reason) == ("failed", "control is gone")
+    assert (outcome.status, outcome.fault and (outcome.fault.cause, outcome.fault.whose)) == (
+        "failed",
+        ("gone", "control"),
+    )
 
 
 async def test_a_body_that_never_ends_what_is_aborted_does_not_keep_the_block() -> None:

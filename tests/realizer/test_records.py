@@ -181,7 +181,7 @@ def test_a_block_has_failed_if_it_had_behaviors_and_each_was_dropped(
     for status in ("done", "interrupted", "failed"):
         fault = None if status != "failed" else Fault(reason="broken")
         raw = BlockOutcome(id="r", block="b", status=status, fault=fault)
-        found = completed(raw, example, said, lost, interrupted)
+        found = completed(raw, example, said, lost, interrupted, Fault(reason=""))
         assert (found.spoken, found.dropped) == (said, tuple(dropped))
         assert found.reasons == tuple(lost[id] for id in dropped)
         assert found.interrupted == tuple(id for id in lost if id in interrupted)

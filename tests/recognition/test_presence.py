@@ -49,7 +49,8 @@ def test_requests_to_somebody_who_has_gone_are_refused_until_the_return():
     log.found(HUMAN, 4.0)
     log.requests_event("mutual_facial_gaze", 5.0)
 
-    assert [effect.fault.reason for effect in log.effects if isinstance(effect, Refused)] == ["'human' has gone"]
+    refused = [effect.fault.reason for effect in log.effects if isinstance(effect, Refused)]
+    assert refused == ["'human' is not seen any more"]
     assert log.states("mfg-1") == ["started"]
 
 

@@ -142,7 +142,7 @@ def test_statistics_of_all() -> None:
 
 def test_a_fault() -> None:
     assert line(Fault(reason="bad", where="here")) == (
-        '{"type":"fault","reason":"bad","where":"here","line":0,"advice":"","service":""}'
+        '{"type":"fault","reason":"bad","where":"here","line":0,"advice":"","service":"","cause":"","whose":""}'
     )
 
 

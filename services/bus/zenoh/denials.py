@@ -24,17 +24,23 @@ MOST = 200
 WILD = 4
 """Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
 Keys of ours have one."""
+MOST_LINKS = 4096
+"""Number of links of which it is known whose they are."""
 PIPE = 2**20
 """Bytes of the log that may wait for the loop; beyond, the router waits."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
 _THREAD = re.compile(r"ThreadId\((\d+)\)")
+_THREAD_OF = re.compile(rb"ThreadId\((\d+)\)")
 _CHECKED = re.compile(
     r"(?P<cached>Using cached result: )?(?P<zid>[0-9a-f]+)(?: on \S*?CertCommonName\((?P<name>.*?)\)\S*)?"
     r" is (?P<verdict>un)?authorized to (?P<what>[A-Z][A-Za-z/ ]*) \((?P<flow>ingress|egress)\) on (?P<key>\S+)"
 )
+_WHO = re.compile(rb" ([0-9a-f]+) (?:on|is) ")
+_AFTER = b"interceptor"
+"""What stands in a line after its time and thread, and before what is said."""
 _CACHING = re.compile(r"ACL \((?P<flow>ingress|egress)\): caching permissions for `(?P<key>.*?)`")
 _LAST_CACHED = "Declare Liveliness Subscriber"
-_ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
+_ACCEPTED = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. .*Common Name: (?P<name>.*)\.$")
 _NOBODY = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
 _TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
@@ -61,19 +67,25 @@ class Denials:
         self._count: Counter[str] = Counter()
         self._kinds: Counter[str] = Counter()
         """Number of different refusals, by what they are about."""
-        self._before: dict[bytes, bytes] = {}
-        """Last line of each thread."""
+        self._news: dict[str, str] = {}
+        """Text of each refusal, by what it counts as."""
+        self._kind_of: dict[bytes, str] = {}
+        """What lines count as that were told, without their time and thread."""
+        self._zids: frozenset[bytes] = frozenset()
+        """Processes that have a name."""
+        self._before = b""
+        """The last line."""
+        self.names: dict[str, str] = {}
+        """Common names by the address at the other end of a link; of the links that were accepted last."""
 
     def feed(self, line: bytes) -> None:
         """Take a line of the log."""
-        begin = line.find(b"ThreadId(")
-        on = line[begin : line.find(b")", begin)]
+        before, self._before = self._before, line
         if line.endswith(_DROPPED):
-            self._drop(self._before.pop(on, b""))
+            if b" is authorized to " in before:
+                self._drop(before, line)
             return
-        if on in self._before or len(self._before) < MOST:  # a key may have line ends, and say anything
-            self._before[on] = line
-        if b"Using cached result" in line and b"unauthorized" not in line:
+        if not self._caching and b"caching permissions" not in line and self._is_known(line):
             return  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
         if (level := _LEVEL.match(text)) is None:
@@ -81,14 +93,18 @@ class Denials:
         found = _THREAD.search(text)
         thread = found[1] if found else ""
         if (checked := _CHECKED.search(text)) is not None:
-            self._check(thread, checked)
+            self._check(thread, checked, line)
         elif (caching := _CACHING.search(text)) is not None:
             self._caching[thread] = (caching["flow"], caching["key"])
         elif (many := _TOO_MANY.search(text)) is not None:
             who = next((name for zid, name in self._names.items() if zid.startswith(many["zid"])), "somebody")
-            self._say(f"dropped: {who} sends more on {many['key']} than may come in a second", f"of what {who} does")
+            news = f"dropped: {who} sends more on {many['key']} than may come in a second"
+            self._remember(line, self._say(news, f"of what {who} does"))
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
+            if len(self.names) >= MOST_LINKS:
+                del self.names[next(iter(self.names))]
+            self.names[accepted["address"]] = accepted["name"]
         elif (nobody := _NOBODY.search(text)) is not None:
             name = self._accepted.get(thread, "somebody")
             self._know(nobody["zid"], name)
@@ -97,15 +113,37 @@ class Denials:
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
 
-    def _drop(self, before: bytes) -> None:
-        """Tell what was dropped though a rule allows it: it is too large. before: what was said of it."""
+    def _remember(self, line: bytes, kind: str) -> None:
+        if len(self._kind_of) < MOST:
+            self._kind_of[line[line.find(_AFTER) :]] = kind
+
+    def _is_known(self, line: bytes) -> bool:
+        """True for a line that says nothing new; one that was told before is counted. Quick, for there are many.
+
+        New is an allowance of a process without a name yet, or of a costly key.
+        """
+        if b" is authorized to " in line:
+            said = _WHO.search(line)
+            return said is not None and said[1] in self._zids and line.count(b"$*") <= WILD
+        if (kind := self._kind_of.get(line[line.find(_AFTER) :])) is None:
+            return False
+        self._told_again(kind)
+        return True
+
+    def _drop(self, before: bytes, line: bytes) -> None:
+        """Tell what was dropped though a rule allows it: it is too large. before: what was said of it on that thread.
+
+        Threads write as they come. So one of many may be missed, which is told the next time.
+        """
+        if _THREAD_OF.findall(before)[:1] != _THREAD_OF.findall(line)[:1]:
+            return
         checked = _CHECKED.search(_COLOR.sub(b"", before).decode(errors="replace"))
         if checked is not None and not checked["verdict"] and checked["flow"] == "ingress":
             who = self._names.get(checked["zid"], f"process {checked['zid']}")
             what = f"{checked['what'].lower()} on {checked['key']}"
             self._say(f"dropped: {who} sends a {what} that is larger than may be sent", f"of what {who} does")
 
-    def _check(self, thread: str, checked: re.Match[str]) -> None:
+    def _check(self, thread: str, checked: re.Match[str], line: bytes) -> None:
         if checked["name"]:
             self._know(checked["zid"], checked["name"])
         who = self._names.get(checked["zid"], f"process {checked['zid']}")
@@ -119,15 +157,20 @@ class Denials:
                 return
         # What is kept from somebody is nothing that they did; and the end of what never began is no news.
         if checked["verdict"] and checked["flow"] == "ingress" and not checked["what"].startswith("Undeclare"):
-            self._say(f"denied: {who} may not {checked['what'].lower()} {checked['key']}", f"of what {who} does")
+            news = f"denied: {who} may not {checked['what'].lower()} {checked['key']}"
+            self._remember(line, self._say(news, f"of what {who} does"))
 
     def _know(self, zid: str, name: str) -> None:
         if zid not in self._names and len(self._names) >= MOST:
             self._names.pop(next(iter(self._names)))
         self._names[zid] = name
+        self._zids = frozenset(each.encode() for each in self._names)
 
-    def _say(self, news: str, part: str = "") -> None:
-        """Tell it, if it is new, or has come ten times as often. part: what one flood of news shall not hide."""
+    def _say(self, news: str, part: str = "") -> str:
+        """Tell it, if it is new, or has come ten times as often; returns as what it counts.
+
+        part: what one flood of news shall not hide.
+        """
         news = printable(news)
         # The time in a reason makes every refusal of an expired certificate another one.
         kind = re.sub(r"\d+", "0", news) if news.startswith("refused") else news
@@ -136,16 +179,21 @@ class Denials:
                 kind = news = f"more {part or 'that comes'} is refused than can be told"
             else:
                 self._kinds[part] += 1
+        self._news[kind] = news
+        self._told_again(kind)
+        return kind
+
+    def _told_again(self, kind: str) -> None:
         self._count[kind] += 1
         times = self._count[kind]
         if times == 1:
-            self._tell(news)
+            self._tell(self._news[kind])
         elif str(times).rstrip("0") == "1":
-            self._tell(f"{news} ({times} times)")
+            self._tell(f"{self._news[kind]} ({times} times)")
 
 
 @contextmanager
-def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
+def telling_denials(tell: Callable[[str], None]) -> Iterator[Denials]:
     """Tell what is refused while the body of `with` runs; Zenoh sessions are opened in it. Once in a process.
 
     Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. tell: waits for no reader.
@@ -179,7 +227,7 @@ def telling_denials(tell: Callable[[str], None]) -> Iterator[None]:
     sys.stdout = open(kept, "w", closefd=False)  # noqa: SIM115 - closed below
     loop.add_reader(coming, read)
     try:
-        yield
+        yield denials
     finally:
         loop.remove_reader(coming)
         os.dup2(kept, 1)

@@ -11,7 +11,7 @@ last key was dropped: so they know that all has come, and that there is nothing 
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from math import isnan
@@ -23,18 +23,16 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.limits import LONGEST_KEY, MEDIUM, most
+from engage_hri.schemas.limits import MEDIUM, most
 from engage_hri.schemas.messages import decode, in_form
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing, Past, SentLog, Written
+from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing, Past, SentLog, Written, fitting
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
 BATCH = 32
 """Number of replies in one go: a question for everything must not hold up the loop."""
 PATTERNS = 64
 """Number of patterns in a question for the past. Each key that there is gets compared with each."""
-ABOUT = LONGEST_KEY + 512
-"""Bytes, or more than there are, that a message in such an answer has besides its payload."""
 CATCH_UP: Seconds = 1.0
 """Time that a process has to hand out its past."""
 
@@ -146,7 +144,7 @@ class History:
         for one in past.written:
             parts.setdefault(one.key, []).append(one)
         for key, whole in parts.items():
-            for part in _fitting(whole, most(key)):
+            for part in fitting(whole, most(key)):
                 query.reply(key, pack([(key, one.encoding, one.payload, one.envelope) for one in part]))
         query.reply(keys.own(self._sent.run, "counts"), pack((past.counts, past.dropped)))
         finish(query)
@@ -184,20 +182,6 @@ class History:
             self._loop.call_soon(self._answer, query, waiting, form)
         else:
             finish(query)
-
-
-def _fitting(written: Sequence[Written], limit: int) -> Iterator[list[Written]]:
-    """Divide messages of one key into parts that can be sent: each has `limit` bytes, or one message."""
-    part: list[Written] = []
-    size = 0
-    for one in written:
-        weight = len(one.payload) + ABOUT
-        if part and size + weight > limit:
-            yield part
-            part, size = [], 0
-        part.append(one)
-        size += weight
-    yield part
 
 
 def _is_in(expressions: Sequence[zenoh.KeyExpr], key: str) -> bool:

@@ -18,7 +18,7 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady
 from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
@@ -192,7 +192,7 @@ class ZenohHub(Hub):
             if not await self.peers.change(deadline):
                 reason = f"robot {self.robot!r} has {'this' if len(taken) == 1 else 'these'} on the bus already"
                 advice = "stop what runs there, or give this one another --robot or another endpoint"
-                raise InputRefused(Fault(reason=reason, where=", ".join(taken), advice=advice))
+                raise NotReady(Fault(reason=reason, where=", ".join(taken), advice=advice))
 
     def forget(self, name: str) -> None:
         self._buses.pop(name, None)

@@ -18,13 +18,13 @@ order across keys. Sync points and outcomes live on different keys and must not 
 """
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.limits import SMALL
+from engage_hri.schemas.limits import LONGEST_KEY, SMALL
 from engage_hri.schemas.units import Seconds
 
 KEPT = 4096
@@ -33,6 +33,8 @@ KEPT_BYTES = 16 * 1024 * 1024
 """Bytes of these messages, of all together; the last is kept whatever its size."""
 STATES_KEPT = 1024
 """Number of states of which a subscription knows when the newest value was sent."""
+ABOUT = LONGEST_KEY + 512
+"""Bytes, or more than there are, that a message in such an answer has besides its payload."""
 COUNT = 16
 """Bytes that a count takes at most beside its key. Those of a pulse, and what is around them, have to fit in it."""
 PULSE_FOR: Seconds = 3.0
@@ -328,6 +330,20 @@ class NewestStates:
         if len(self._newest) > STATES_KEPT:
             del self._newest[next(iter(self._newest))]
         return not is_overtaken
+
+
+def fitting(written: Sequence[Written], limit: int) -> Iterator[list[Written]]:
+    """Divide messages of one key into parts that can be sent: each has `limit` bytes, or one message."""
+    part: list[Written] = []
+    size = 0
+    for one in written:
+        weight = len(one.payload) + ABOUT
+        if part and size + weight > limit:
+            yield part
+            part, size = [], 0
+        part.append(one)
+        size += weight
+    yield part
 
 
 def may_skip(key: str) -> bool:

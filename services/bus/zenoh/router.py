@@ -1,7 +1,7 @@
 """A router: a process that belongs to no robot, and passes on what the processes of all machines send one another."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import ExitStack, asynccontextmanager, closing
 from typing import Any
 
@@ -56,19 +56,22 @@ async def routing(
     """
     with ExitStack() as stack:
         more: dict[str, object] = {}
+        names: Mapping[str, str] = {}
         if keys_of_router is not None:
             holders = keys_of_router.holders()
             more = {**encrypted(keys_of_router), "access_control": access_control(holders)}
             more["downsampling"] = paced(holders)
-            stack.enter_context(telling_denials(tell))
+            names = stack.enter_context(telling_denials(tell)).names
             own = keys_of_router.holder
             stack.enter_context(closing(Expiry(own.common_name, own.until, LOG.warning)))
-        async with _passing_on(open_router(connect, listen, more), tell) as router:
+        async with _passing_on(open_router(connect, listen, more), tell, names) as router:
             yield router
 
 
 @asynccontextmanager
-async def _passing_on(session: zenoh.Session, tell: Callable[[str], None]) -> AsyncIterator[Routing]:
+async def _passing_on(
+    session: zenoh.Session, tell: Callable[[str], None], names: Mapping[str, str]
+) -> AsyncIterator[Routing]:
     bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
 
     def changed(sample: zenoh.Sample) -> None:
@@ -81,7 +84,7 @@ async def _passing_on(session: zenoh.Session, tell: Callable[[str], None]) -> As
     watching = session.liveliness().declare_subscriber(
         f"*/{keys.ANY_TOKEN}", bridge.on_loop(changed), history=True
     )  # fmt: skip
-    listening = Listening(session, tell)
+    listening = Listening(names, tell)
     try:
         yield Routing(session, bridge)
     finally:

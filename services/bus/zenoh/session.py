@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.config import ADVICE, is_endpoint
+from engage_hri.services.bus.config import ADVICE, is_encrypted, is_endpoint, is_on_this_machine
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.sizes import bounded
@@ -28,6 +28,10 @@ PEER_AFAR = (
     "a client of a router finds all (`engage router`)"
 )
 """Warning: Zenoh does not dial again whom it has met through others."""
+OPEN_TO_ALL = (
+    "open to all: whoever reaches %s can drive the robot;"
+    " make keys (`engage keys init`), unless the network is yours alone"
+)
 LEASE_MS = 2000
 """Time in which a silent link counts as alive: with shorter ones peers seem to go and come on cuts of 0.4 s."""
 STALL_US = 200_000
@@ -77,6 +81,8 @@ def open_session(
     not of this machine.
     """
     _check(*connect, *listen)
+    if afar := [each for each in listen if not is_encrypted(each) and not is_on_this_machine(each)]:
+        LOG.warning(OPEN_TO_ALL, ", ".join(afar))
     if rendezvous is not None:
         try:
             session = zenoh.open(_config(robot, connect, (*listen, LOOPBACK, rendezvous), mode))

@@ -1,4 +1,4 @@
-"""What Zenoh drops where it comes in, before Python sees it: too large a message, or too many. Pure.
+"""Bounds that Zenoh keeps where a message comes in, before Python sees it. Pure.
 
 Zenoh compares with the smallest limit of all expressions that include a message's key. So each row of the table has
 its own here, and what is in no row the greatest.

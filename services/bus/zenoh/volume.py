@@ -1,6 +1,7 @@
-"""Who sends a lot: bytes that came in by each link of a router, from the kernel.
+"""Bytes that each link brings to a router, from the kernel, and who is loud.
 
-Zenoh drops a message that is too large before it is whole, and says nothing of it.
+Zenoh drops a message that is too large before it is whole, and says nothing of it; nor does it count. The router does
+not close the link of one who is loud (docs/decisions/0111-a-flood-is-told-and-not-cut.md).
 """
 
 import asyncio
@@ -8,74 +9,102 @@ import os
 import socket
 import struct
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import suppress
+from typing import NamedTuple
 
-import zenoh
-
+from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
 
-LOOK: Seconds = 2.0
+LOOK: Seconds = 1.0
 """Time between two looks at the links."""
-LOUD = 16 * 1024 * 1024
-"""Bytes in a second from which on it is told whose they are. A process may hand out that much at once, when it is
-asked for its past; nobody of ours goes on with it for two seconds."""
-_BYTES_RECEIVED = 128
-"""Place of `tcpi_bytes_received` in the kernel's `struct tcp_info`."""
+EXCUSED = 4
+"""Bytes that a holder may send besides for each that it gets: who is asked much has to answer."""
+_COUNTS = 120
+"""Place of `tcpi_bytes_acked` and `tcpi_bytes_received` in the kernel's `struct tcp_info`."""
+
+
+class Volume(NamedTuple):
+    """Bytes that a link has brought since it opened, and that it has carried away."""
+
+    brought: int
+    taken: int = 0
 
 
 class Volumes:
-    """Bytes of each link, looked at now and then. Pure: time is an argument."""
+    """Tells when a link begins to be loud. Pure: time is an argument."""
 
-    def __init__(self) -> None:
-        self._before: Mapping[str, int] = {}
-        self._at: Seconds = 0.0
+    def __init__(self, now: Seconds) -> None:
+        self._at = now
+        self._before: Mapping[str, Volume] = {}
         self._loud: frozenset[str] = frozenset()
 
-    def look(self, received: Mapping[str, int], names: Mapping[str, str], now: Seconds) -> list[str]:
-        """Take how many bytes each link has brought so far; returns a line for each that begins to be loud.
+    def look(self, volumes: Mapping[str, Volume], names: Mapping[str, str], now: Seconds) -> list[str]:
+        """Take the volumes of all links; returns the lines to tell.
 
-        names: of who is at the other end, by link.
+        names: common names of the other ends, by link.
         """
-        span, before = now - self._at, self._before
-        came = {link: total - before.get(link, 0) for link, total in received.items()}
-        loud = frozenset(link for link, size in came.items() if size > LOUD * span)
-        new, self._loud, self._before, self._at = loud - self._loud, loud, received, now
-        return [f"loud: {names.get(link, link)} has sent {came[link] / 1e6:.0f} MB in {span:.1f} s" for link in new]
+        span, self._at = max(now - self._at, LOOK), now
+        speeds = {link: self._came(link, volume) / span for link, volume in volumes.items()}
+        self._before = volumes
+        loud = frozenset(link for link, speed in speeds.items() if speed > _bound(names.get(link, "")))
+        begun, self._loud = loud - self._loud, loud
+        return [f"loud: {names.get(link, link)} sends {speeds[link] / 1e6:.1f} MB a second" for link in sorted(begun)]
+
+    def _came(self, link: str, volume: Volume) -> int:
+        before = self._before.get(link, Volume(0))
+        return volume.brought - before.brought - EXCUSED * (volume.taken - before.taken)
+
+
+def _bound(name: str) -> int:
+    return LOUD.get(name.split("/")[1], LOUD_ROBOT) if name else LOUD_ROBOT
 
 
 class Listening:
-    """Looks at the links of a session, and tells who is loud, until it is closed."""
+    """Looks at the links of this process, and tells who is loud, until it is closed."""
 
-    def __init__(self, session: zenoh.Session, tell: Callable[[str], None]) -> None:
-        self._session = session
+    def __init__(self, names: Mapping[str, str], tell: Callable[[str], None]) -> None:
+        """names: common names by the address at the other end of a link."""
+        self._names = names
         self._tell = tell
         self._loop = asyncio.get_running_loop()
-        self._volumes = Volumes()
-        self._look()
+        self._volumes = Volumes(self._loop.time())
+        self._timer = self._loop.call_later(LOOK, self._look)
 
     def close(self) -> None:
         self._timer.cancel()
 
     def _look(self) -> None:
-        received = dict(_received())
-        names = {_place(str(link.dst)): link.auth_identifier or str(link.dst) for link in self._session.info.links()}
-        for line in self._volumes.look(received, names, self._loop.time()):
+        for line in self._volumes.look(volumes(), self._names, self._loop.time()):
             self._tell(line)
         self._timer = self._loop.call_later(LOOK, self._look)
 
 
-def _place(endpoint: str) -> str:
-    return endpoint.partition("/")[2]
+def volumes() -> dict[str, Volume]:
+    """Volume of each TCP link of this process, by its other end. Nothing where no kernel tells."""
+    found = {}
+    for where, link in _links():
+        with suppress(OSError, AttributeError, struct.error):
+            told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _COUNTS + 16)
+            taken, brought = struct.unpack_from("QQ", told, _COUNTS)
+            found[where] = Volume(brought, taken)
+    return found
 
 
-def _received() -> Iterator[tuple[str, int]]:
-    """Other end and bytes received of each TCP socket of this process. Nothing where the kernel does not tell."""
-    with suppress(OSError):
-        for number in map(int, os.listdir("/proc/self/fd")):
-            with suppress(OSError, ValueError, struct.error):
-                if os.readlink(f"/proc/self/fd/{number}").startswith("socket:"):
-                    with closing(socket.socket(fileno=os.dup(number))) as link:
-                        host, port = link.getpeername()[:2]
-                        told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _BYTES_RECEIVED + 8)
-                        where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-                        yield where, struct.unpack_from("Q", told, _BYTES_RECEIVED)[0]
+def _links() -> Iterator[tuple[str, socket.socket]]:
+    """The sockets of this process that have another end, and where that is. Zenoh's stay Zenoh's."""
+    try:
+        numbers = [int(each) for each in os.listdir("/proc/self/fd")]
+    except OSError:
+        return
+    for number in numbers:
+        try:
+            link = socket.socket(fileno=number)
+        except OSError:
+            continue
+        try:
+            host, port = link.getpeername()[:2]
+            yield f"[{host}]:{port}" if ":" in host else f"{host}:{port}", link
+        except (OSError, ValueError):
+            continue
+        finally:
+            link.detach()

@@ -8,6 +8,7 @@ from collections.abc import Collection
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
@@ -96,6 +97,8 @@ class TurnPolicy:
         """The turn that the next fragment would continue."""
         self._speaker = ""
         """The client that has begun the open turn: nobody else goes on with it, or ends it."""
+        self._broken_off: Fault | None = None
+        """Why the turn before was aborted; None: it was not."""
         self._live: dict[str, TurnPlan] = {}
         """Fragments accepted and not ended, in order."""
         self._begun: dict[str, bool] = {}
@@ -143,7 +146,11 @@ class TurnPolicy:
         if status in ("middle", "end"):
             if self._open is None:
                 advice = "begin a turn with 'beginning' or 'full'"
-                raise _illegal(fragment, "turn_status", f"{status!r} with no turn open", advice)
+                error = _illegal(fragment, "turn_status", f"{status!r} with no turn open", advice)
+                if requester == self._speaker and (why := self._broken_off) is not None:
+                    reason = f"{error.fault.reason} any more: {why.reason}"
+                    error = InputRefused(replace(error.fault, reason=reason, cause=why.cause, whose=why.whose))
+                raise error
             turn = self._open.turn
             if requester != self._speaker:
                 reason = f"turn {turn} is spoken by {self._speaker}, not by {requester}"
@@ -164,7 +171,7 @@ class TurnPolicy:
         self._live[fragment.id] = plan
         self._delay_target = fragment.delay_target if fragment.delay else ""
         if status == "beginning":
-            self._open, self._speaker = plan, requester
+            self._open, self._speaker, self._broken_off = plan, requester, None
         elif status == "end":
             self._open = None
         self._silent_since = None
@@ -293,7 +300,7 @@ class TurnPolicy:
         """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
         if (left := self._left_at) is not None and now >= left[1]:
             gone = left[0].addressee
-            return self._abort(left[0], Fault(reason=f"{gone} has left", cause="closed", whose=gone))
+            return self._abort(left[0], Fault(reason=f"{gone} has left", cause="gone", whose=gone))
         if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
             assert self._open is not None
             silence = f"silence for {self._config.turn_silence:g} s"
@@ -307,6 +314,7 @@ class TurnPolicy:
         return None
 
     def _abort(self, plan: TurnPlan, why: Fault) -> Aborted:
+        self._broken_off = why
         if self._open is not None and self._open.turn == plan.turn:
             self._open = None
             self._silent_since = None

@@ -295,12 +295,14 @@ class Session:
             known = ", ".join(sorted(self.persons)) or "nobody"
             return Fault(reason=f"unknown actor {event.responder!r}", where=where, advice=f"known: {known}")
         if not person.presence.here:
-            return Fault(reason=f"{event.responder!r} has gone", where=where)
+            reason = f"{event.responder!r} is not seen any more"
+            return Fault(reason=reason, where=where, cause="gone", whose=event.responder)
         if event.kind == "directed_gaze" and not event.objects:
             return Fault(reason="directed gaze without objects", where=where)
         unknown = [name for name in event.objects if not self.scene.knows(name)]
         if event.turn and event.turn in self._aborted_turns:
-            return Fault(reason=f"turn {event.turn!r} has been cut off", where=where)
+            reason = f"turn {event.turn!r} has been cut off"  # nobody but generation says so
+            return Fault(reason=reason, where=where, cause="cancelled", whose="generation")
         if unknown:
             return Fault(reason=f"unknown object {', '.join(map(repr, unknown))}", where=where)
         if event.limit is not None and not event.limit > 0:
