@@ -135,7 +135,8 @@ def _within(one: Any) -> Iterator[tuple[str, object]]:
     if isinstance(one, types.ModuleType):
         if _is_ours(one.__name__):
             variables = vars(one).items()
-            yield from ((f".{name}", each) for name, each in variables if not isinstance(each, types.ModuleType))
+            own = ((name, each) for name, each in variables if not name.startswith("__"))  # no loader: it is pytest
+            yield from ((f".{name}", each) for name, each in own if not isinstance(each, types.ModuleType))
     elif isinstance(one, type):
         yield from ((f".{name}", each) for name, each in vars(one).items() if isinstance(each, CONTAINERS))
     elif isinstance(one, dict):
