@@ -371,6 +371,8 @@ async def test_a_question_with_more_counts_than_it_can_have_gets_all_that_is_kep
     told: list[list[int]] = []
     ended = asyncio.Event()
 
+    await far.peers.round_trip(near.run, PATIENCE)  # by then it is known that the other answers
+
     history: History = far._history
     history.ask(
         ["engage/v1/evt/**"], near.run, Missing(seen, is_new=False),
