@@ -26,12 +26,17 @@ Service = Callable[[Bus, Ready], Coroutine[Any, Any, None]]
 """Coroutine function with its configuration bound already (`functools.partial(realize, config=...)`)."""
 
 
-async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
-    """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+def check_name(hub: Hub, name: str) -> None:
+    """Raise InputRefused if the keys of this process are somebody else's."""
     called = hub.called(name)
     if called != name:
         reason = f"the keys are those of {called.removesuffix(f'-{name}')!r}, not of {name!r}"
         raise InputRefused(Fault(reason=reason, where=name, advice="give it the folder of its own keys"))
+
+
+async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
+    """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+    check_name(hub, name)
     await hub.wait_until_free(name)
     bus = hub.join(name)
     joined = bus.stamp()
