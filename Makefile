@@ -36,7 +36,6 @@ mutants: build/mutants/seconds.json
 
 # Which test file runs which line: about as long as the tests, once. To make it anew when much has changed: rm -r build/mutants
 build/mutants/seconds.json: | $(READY)
-	@$(PIP) -e '.[coverage]'
 	@COVERAGE_PROCESS_START=$(CURDIR)/tests/mutants/coverage.toml $(BIN)/pytest -p tests.mutants.contexts -n auto \
 		--dist loadfile --no-loadscope-reorder --hypothesis-profile=map --ignore tests/lab --ignore tests/docs \
 		--ignore tests/test_wheel.py --ignore tests/control/reachy_mini/test_mockup.py || test -s $@
@@ -51,7 +50,6 @@ style: $(READY)
 
 # Twice as long as the tests alone. The tracer does not see what Zenoh calls on threads of its own (services/bus/zenoh).
 coverage: $(READY)
-	@$(PIP) -e '.[coverage]'
 	@$(BIN)/coverage erase
 	@$(BIN)/coverage run -m pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=long $(ARGS)
 	@$(BIN)/coverage combine -q

@@ -61,7 +61,10 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
 
     def at(self, where: str, line: int = 0) -> "Fault":
-        """Make the same fault, told of something that it has ended: `where`, and its line; 0: the same line."""
+        """Make the same fault, told of something that it has ended.
+
+        where: its place. line: the line of it; 0: this fault's line.
+        """
         return replace(self, where=where, line=line or self.line)
 
     def following(self, reason: str, where: str) -> "Fault":

@@ -5,13 +5,15 @@ from typing import Literal
 
 from msgspec import Struct
 
+from engage_hri.schemas import access, keys
 from engage_hri.schemas.status import ClockOffset, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.doctor.facts import Facts
 
 HERE = "here"
 """Name of the row of this process."""
-Sees = Literal["itself", "yes", "no", "unknown"]
+Sees = Literal["itself", "yes", "no", "needless", "unknown"]
+"""needless: it does not see it, and has no need to."""
 
 
 class Cell(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -42,10 +44,18 @@ def _cells(facts: Facts) -> Iterator[Cell]:
             elif viewer.status is None:
                 sees = "unknown"
             else:
-                sees = "yes" if other.name in viewer.status.bus.peers else "no"
+                hidden: Sees = "no" if _needs(viewer.name, other.name) else "needless"
+                sees = "yes" if other.name in viewer.status.bus.peers else hidden
                 if sees == "yes" and (clock := clock_of(viewer.status, other.status)) is not None:
                     trip = clock.trip
             yield Cell(viewer=viewer.name, other=other.name, sees=sees, trip=trip)
+
+
+def _needs(viewer: str, other: str) -> bool:
+    """True if one participant has to see another: everybody sees the robot, and services see their clients."""
+    part = keys.part_of(access.PARTICIPANTS.get(other, "manager"))
+    heard = access.rows(access.PARTICIPANTS.get(viewer, "manager"), "subscribes")
+    return part == "robot" or keys.alive("*", part) in heard
 
 
 def clock_of(viewer: Status, other: Status | None) -> ClockOffset | None:

@@ -82,6 +82,8 @@ def _cell(cell: Cell, with_trips: bool) -> Text:
     match cell.sees:
         case "itself":
             return Text("·", style="dim")
+        case "needless":
+            return Text("-", style="dim")
         case "no":
             return Text("NO" if with_trips else "N", style=STYLES["wrong"])
         case "unknown":

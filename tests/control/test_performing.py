@@ -134,7 +134,9 @@ async def test_what_goes_on_after_an_abort_is_broken_off_and_then_given_up(step:
 async def test_an_end_after_an_abort_is_an_abort():
     outcome, points, _ = await told_by(Scripted(GOOD[0], partial(asyncio.sleep, 2.0)), abort=True)
 
-    assert (outcome.status, outcome.fault, points) == ("aborted", None, ["start"])
+    assert (outcome.status, points) == ("aborted", ["start"])
+    assert outcome.fault is not None
+    assert (outcome.fault.cause, outcome.fault.whose) == ("cancelled", "realizer")
 
 
 SPEECH = Speech(id="look", text="one two")
