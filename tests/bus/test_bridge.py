@@ -37,7 +37,7 @@ async def test_a_message_that_waits_for_the_loop_keeps_nothing_of_zenohs_buffers
 
     speaker.publish(key, state(1))
     queue, deadline = here.bridge._streams if key == keys.NET else here.bridge._ordered, loop.time() + PATIENCE
-    while not (waiting := [one for _, item in tuple(queue) for one in arrived(item)]):
+    while not (waiting := [one for _, item, *_ in tuple(queue) for one in arrived(item)]):
         assert loop.time() < deadline
 
     assert [each.key for each in waiting] == [key]
