@@ -70,7 +70,8 @@ async def plain(endpoint: str) -> None:
     session: Any = await open_client("others", [endpoint])
     run, name = str(session.zid()), f"client-{str(session.zid())[:8]}"
     tokens = [
-        session.liveliness().declare_token(keys.own(run, subject)) for subject in (f"process/{run}", f"alive/{name}")
+        session.liveliness().declare_token(keys.own(run, subject))
+        for subject in (f"alive/client/{name}/{run}", "log/commands")
     ]
     for token in tokens:
         token.undeclare()
@@ -88,7 +89,7 @@ async def listen(endpoint: str) -> None:
     """Serve as the process that only listens for tokens."""
     session: Any = await open_client("others", [endpoint])
     session.liveliness().declare_subscriber(
-        keys.ANY_TOKEN, zenoh.handlers.Callback(lambda sample: None, indirect=False)
+        keys.ANY_OWN, zenoh.handlers.Callback(lambda sample: None, indirect=False)
     )
     print("stands", file=sys.stderr, flush=True)
     await asyncio.get_running_loop().create_future()

@@ -124,7 +124,8 @@ def follow(session: zenoh.Session, robot: str, actor: str, kind: str) -> None:
     # Subscribe first and ask then: what happens in between comes twice, and never not at all.
     session.declare_subscriber(events, samples.put)
     session.declare_subscriber(f"{recognition.format('state')}/statistics/{actor}", samples.put)
-    session.liveliness().declare_subscriber(f"{robot}/engage/v1/@bus/*/alive/recognition", samples.put, history=True)
+    token = f"{robot}/engage/v1/@bus/*/alive/robot/recognition/*"
+    session.liveliness().declare_subscriber(token, samples.put, history=True)
 
     changes = Changes(tell_event, kind)
     standing: dict[str, News] = {}  # the newest statistics of each person
@@ -142,7 +143,7 @@ def follow(session: zenoh.Session, robot: str, actor: str, kind: str) -> None:
             else:
                 changes.hear(news(sample))
             continue
-        life = key.split("/")[-3][:8]  # .../@bus/<run>/alive/recognition
+        life = key.split("/")[-5][:8]  # .../@bus/<run>/alive/robot/recognition/<clock>
         if sample.kind == zenoh.SampleKind.DELETE:
             changes.went(life, time.monotonic())
             continue

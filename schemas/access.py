@@ -67,10 +67,12 @@ SERVED = {
 WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.UTTERANCE,
     keys.ANY_CONNECTION_EVENT, keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS,
-    keys.STUDY_CONDITION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.ANY_ALIVE,
+    keys.STUDY_CONDITION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
+_ASKING = (keys.ANY_ROBOT_ALIVE, keys.ANY_CLIENT_ALIVE)
+"""Presence of those whom a service has to know: all who may ask it for something."""
 _OWN_FAULT = keys.fault(OWN)
 _OWN_SETTINGS = keys.settings(OWN)
 _OWN_ONGOING = keys.perceived_ongoing(OWN, "*")
@@ -95,20 +97,21 @@ def _service(name: str, *published: str, heard: tuple[str, ...], served: tuple[s
     yield Row(name, "publishes", _OWN_FAULT, _RARELY)
     yield Row(name, "publishes", _OWN_SETTINGS)
     yield from (Row(name, "publishes", each) for each in published)
-    yield from (Row(name, "subscribes", each) for each in (keys.commands(name), keys.ANY_ALIVE, *heard))
+    yield from (Row(name, "subscribes", each) for each in (keys.commands(name), *_ASKING, *heard))
     yield from (Row(name, "serves", each) for each in (keys.status(OWN), *served))
     yield Row(name, "asks", ANY_STATUS, "asked by a service that waits for another, to say why")
 
 
-def _watches(role: str, why: str = "") -> Iterator[Row]:
-    yield from (Row(role, "subscribes", each, why) for each in WATCHED)
+def _watches(role: str, presence: str, why: str = "") -> Iterator[Row]:
+    """presence: expression for the participants that it has to know."""
+    yield from (Row(role, "subscribes", each, why) for each in (*WATCHED, presence))
     yield Row(role, "publishes", _OWN_FAULT, _RARELY)
     yield Row(role, "asks", ANY_STATUS, "asked by a program that waits for a service, to say why")
     yield Row(role, "asks", keys.DESCRIBE, "for programs that suit what they ask for to the body")
 
 
-def _manages(role: str, *more: str, why: str = "") -> Iterator[Row]:
-    yield from _watches(role, why)
+def _manages(role: str, presence: str, *more: str, why: str = "") -> Iterator[Row]:
+    yield from _watches(role, presence, why)
     yield from (Row(role, "subscribes", each, why) for each in (keys.TURN_CLOSED, keys.WORLD))
     yield from _commands(role, "fragment", "inhibit", "block", *more, why=why)
     yield Row(role, "serves", keys.status(OWN), why)
@@ -155,26 +158,29 @@ TABLE: tuple[Row, ...] = (
     Row("perception", "publishes", _OWN_SETTINGS),
     *(
         Row("perception", "subscribes", key)
-        for key in (keys.ANY_ALIVE, keys.WORLD, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION,
+        for key in (keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION,
                     keys.ANY_CONNECTION_EVENT, keys.ROBOT_MOTION, keys.ROBOT_SEEN, keys.BODY_FAULTS)
     ),
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
-    *_manages("manager"),
+    *_manages("manager", keys.ANY_ROBOT_ALIVE),
+    Row("manager", "subscribes", keys.alive(OWN, "client"), "for a service: is there one of its name?"),
     Row("manager", "publishes", _OWN_SETTINGS),
     *(Row("manager", "subscribes", key) for key in (keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING)),
-    *_watches("observer"),
+    *_watches("observer", keys.ANY_ALIVE),
     *_looks("observer", keys.WORLD),
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
     *(
         Row("observer", "subscribes", key, "recorded by `engage record`")
         for key in (keys.TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS)
     ),
-    *_watches("operator", "what an operator sees"),
+    *_watches("operator", keys.ANY_ALIVE, "what an operator sees"),
     *_looks("operator", keys.WORLD),
     *_commands("operator", "robot", "faults", "condition"),
     Row("operator", "publishes", keys.command(keys.BLOCK, "operator", OWN), "holds, continues and stops one block"),
-    *_manages("wizard", "robot", "faults", "condition", why="drives the robot by hand, in `engage console`"),
+    *_manages(
+        "wizard", keys.ANY_ALIVE, "robot", "faults", "condition", why="drives the robot by hand, in `engage console`"
+    ),
     *_looks("wizard"),
     *(
         Row("wizard", "publishes", key, "says what perception does not see; visitors of `engage console` are people")

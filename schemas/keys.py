@@ -79,7 +79,10 @@ ANY_PERCEIVED_ONGOING = f"{PREFIX}/state/perception/ongoing_actions/*/*"
 ANY_OPEN_EVENTS = f"{PREFIX}/state/recognition/open_events/*"
 ANY_STATISTICS = f"{PREFIX}/state/recognition/statistics/*"
 ANY_SETTINGS = f"{PREFIX}/state/*/settings"
-ANY_ALIVE = f"{PREFIX}/alive/*"
+ANY_ALIVE = f"{PREFIX}/alive/*/*"
+ANY_ROBOT_ALIVE = f"{PREFIX}/alive/robot/*"
+"""Presence of all whom everybody hears: what a client needs to know."""
+ANY_CLIENT_ALIVE = f"{PREFIX}/alive/client/*"
 EVERYTHING = f"{PREFIX}/**"
 
 
@@ -88,20 +91,40 @@ def of_class(kind: KeyClass) -> str:
     return f"{PREFIX}/{kind}/**"
 
 
-KEPT_CLASSES: tuple[KeyClass, ...] = ("state", "evt", "cmd")
-"""Classes of which a late subscriber gets what was published before."""
+Flow = Literal["commands", "news"]
+"""Messages of which a late subscriber gets what was published before go two ways: commands to a server, and news
+from where it happens to whoever wants it. Processes ask one another by flow. So clients, which send commands and hear
+news, have nothing to do with one another."""
+FLOWS: dict[Flow, tuple[KeyClass, ...]] = {"commands": ("cmd",), "news": ("state", "evt")}
+"""Classes of each flow. The other classes have no past."""
 
 
-def has_past(pattern: str) -> bool:
-    """Tell whether the pattern may include keys of a class in `KEPT_CLASSES`."""
+def flow_of(key: str) -> Flow:
+    """Flow of a key of a class that has a past."""
+    return "commands" if key_class(key) == "cmd" else "news"
+
+
+@lru_cache(4096)
+def flows(pattern: str) -> tuple[Flow, ...]:
+    """Flows of which the pattern may include keys."""
     name = pattern.split("/")[2:3]
-    return name in (["*"], ["**"]) or (bool(name) and name[0] in KEPT_CLASSES)
+    return tuple(flow for flow, kinds in FLOWS.items() if name in (["*"], ["**"]) or {*name} & {*kinds})
 
 
 SERVICES = ("generation", "realizer", "recognition", "control")
 """Services that make up a robot."""
 ROLES = ("manager", *SERVICES, "perception", "observer", "operator", "wizard")
 """Roles of participants. What each may do is in schemas/access.py."""
+Part = Literal["robot", "client", "observer"]
+"""Part of a participant, in the key of its presence. `robot`: everybody hears it. `client`: it asks for something,
+and the robot has to know when it goes. `observer`: it only listens, and nobody depends on it."""
+
+
+def part_of(role: str) -> Part:
+    """Part of the participants with this role. A wizard says what people do, as perception does."""
+    if role in (*SERVICES, "perception", "wizard"):
+        return "robot"
+    return "observer" if role == "observer" else "client"
 
 
 def commands(server: str) -> str:
@@ -224,8 +247,9 @@ def voice_activity(actor: str) -> str:
     return f"{PREFIX}/stream/perception/voice/{actor}"
 
 
-def alive(participant: str) -> str:
-    return f"{PREFIX}/alive/{participant}"
+def alive(participant: str, part: Part = "robot") -> str:
+    """Key of the presence of a participant."""
+    return f"{PREFIX}/alive/{part}/{participant}"
 
 
 def is_presence(key: str) -> bool:
@@ -233,20 +257,32 @@ def is_presence(key: str) -> bool:
     return key.startswith(f"{PREFIX}/alive/")
 
 
+def presence(pattern: str) -> str:
+    """Expression for the presence of all whom the pattern includes; empty if it includes nobody's."""
+    chunks = pattern.split("/")
+    if chunks[2:3] == ["alive"] and len(chunks) == 5 and "**" not in chunks:
+        return pattern
+    return ANY_ALIVE if chunks[2:3] in (["alive"], ["*"], ["**"]) else ""
+
+
 # Keys of the bus itself. No wildcard includes a chunk that begins with `@`, so no subscriber gets these by accident.
-ANY_TOKEN = f"{PREFIX}/@bus/*/**"
+ANY_OWN = f"{PREFIX}/@bus/*/**"
 ANY_PROTOCOL = "engage/*/@bus/*/**"
 """Tokens of processes of every version of the protocol."""
-ANY_PULSE = f"{PREFIX}/@bus/*/pulse"
-ANY_FLUSH = f"{PREFIX}/@bus/*/flush"
 
 
 def own(run: str, subject: str) -> str:
     """Key of the process with id `run`.
 
-    subject: `process/<clock>`, `log`, `alive/<name>`, `at/<endpoint>`, `pulse`, `past`, `counts`, `clock` or `flush`.
+    subject: of a token `alive/<part>/<name>/<clock>`, `log/<flow>` or `at/<protocol>/<address>`; else `pulse/<flow>`,
+    `flush/<flow>`, `past`, `counts` or `clock`.
     """
     return f"{PREFIX}/@bus/{run}/{subject}"
+
+
+def tokens(presence: str) -> str:
+    """Expression for the tokens of all participants in an expression for their presence (`alive`)."""
+    return f"{PREFIX}/@bus/*/{presence.removeprefix(f'{PREFIX}/')}/*"
 
 
 def run_of(key: str) -> str:
@@ -278,6 +314,11 @@ def matches(pattern: str, key: str) -> bool:
 def first(patterns: Iterable[str], key: str) -> str | None:
     """Find the first of the key expressions that includes `key`; None: none does."""
     return next((pattern for pattern in patterns if matches(pattern, key)), None)
+
+
+def includes(pattern: str, narrower: str) -> bool:
+    """Tell whether `pattern` includes all that another expression without `**` includes."""
+    return _matches(pattern.split("/"), ["x" if each == "*" else each for each in narrower.split("/")])
 
 
 def _matches(pattern: list[str], key: list[str]) -> bool:

@@ -17,6 +17,7 @@ from typing import Any, Self
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import PARTICIPANTS
 from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
@@ -45,7 +46,8 @@ class Bus(ABC):
     """One participant's view of the bus.
 
     robot: the namespace. name: the participant's; appears as `Received.source` and on its liveliness token.
-    role: its part among the others, one of `keys.ROLES`; stands in the keys of its commands.
+    role: what it does among the others, one of `keys.ROLES`; stands in the keys of its commands. part: follows from
+    it; stands in the key of its presence.
     clock: the clock that `now` reads, the same for all processes that can compare their times directly.
     run: the participant's life. failures: number of errors here that were contained.
     log: the log of what happens here (`services/bus/journal.py`).
@@ -55,11 +57,12 @@ class Bus(ABC):
         """life_numbers: numbers that no former participant of this name in this run has used."""
         self.robot = robot
         self.name = name
-        self.role = role
+        self.role = role or PARTICIPANTS.get(name, "manager")
+        self.part = keys.part_of(self.role)
         self.clock = clock
         self.run = run
         self.failures = 0
-        self.log = journal.logger(name, role)
+        self.log = journal.logger(name, self.role)
         self._life_numbers = life_numbers
         self._loop = asyncio.get_running_loop()
         self._gone = False
@@ -284,8 +287,11 @@ class Hub(ABC):
     robot: str
 
     @abstractmethod
-    def join(self, name: str, role: str = "manager") -> Bus:
-        """Add a participant; returns its view of the bus. Names are unique on a robot's bus."""
+    def join(self, name: str, role: str = "") -> Bus:
+        """Add a participant; returns its view of the bus. Names are unique on a robot's bus.
+
+        role: empty: that of the service of this name, or a manager's.
+        """
 
     def called(self, name: str) -> str:
         """Name that a participant gets who asks for this one. Keys may give another."""

@@ -65,7 +65,7 @@ class MemoryHub(Hub):
         self._askers: list[asyncio.Future[None]] = []
         self._cut: set[str] = set()
 
-    def join(self, name: str, role: str = "manager") -> "MemoryBus":
+    def join(self, name: str, role: str = "") -> "MemoryBus":
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
         self._lives += 1
@@ -164,7 +164,7 @@ class MemoryHub(Hub):
         """Offer a late subscriber the participants, then the past in order; returns its last number."""
         now = self._loop.time()
         for bus in self._buses.values():
-            if bus.is_alive and reader.wants(key := keys.alive(bus.name)):
+            if bus.is_alive and reader.wants(key := keys.alive(bus.name, bus.part)):
                 message = PeerAlive(participant=bus.name, run=bus.run)
                 if isinstance(reader, Tap):
                     reader.offer(_presence(key, message, bus.name, now))
@@ -184,9 +184,9 @@ class MemoryHub(Hub):
     def alive(self) -> tuple[str, ...]:
         return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
 
-    def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
+    def announce(self, name: str, message: PeerAlive | PeerGone, part: keys.Part = "robot") -> None:
         journal.note_presence(message)
-        key, now = keys.alive(name), self._loop.time()
+        key, now = keys.alive(name, part), self._loop.time()
         for bus in list(self._buses.values()):
             bus.deliver(Received(key, message, name, now), self.sent + 1)
             bus.show(_presence(key, message, name, now), self.sent + 1)
@@ -336,7 +336,7 @@ class MemoryBus(Bus):
     def declare_alive(self) -> None:
         if not self.is_alive and not self._gone:
             self.is_alive = True
-            self._hub.announce(self.name, PeerAlive(participant=self.name, run=self.run))
+            self._hub.announce(self.name, PeerAlive(participant=self.name, run=self.run), self.part)
 
     async def leave(self) -> None:
         readers: list[Subscription | Tap] = [*self._subscriptions, *self._taps]
@@ -355,4 +355,4 @@ class MemoryBus(Bus):
         self._hub.forget(self.name)
         if self.is_alive:
             self.is_alive = False
-            self._hub.announce(self.name, PeerGone(participant=self.name))
+            self._hub.announce(self.name, PeerGone(participant=self.name), self.part)

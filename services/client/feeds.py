@@ -133,7 +133,7 @@ class ActionFeed(DerivedFeed[ActionEvent]):
     """
 
     def __init__(self, bus: Bus) -> None:
-        super().__init__(bus, (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ALIVE))
+        super().__init__(bus, (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ROBOT_ALIVE))
         self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
 
     @property

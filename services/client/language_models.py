@@ -210,7 +210,7 @@ class _Speaking:
     async def watched(self) -> AsyncIterator[None]:
         """Read no more as soon as the turn is over, though no fragment is: somebody spoke while no piece came."""
         kinds = (TurnClosed, PeerAlive, PeerGone)
-        with self._robot._feed(kinds, keys.TURN_CLOSED, keys.ANY_ALIVE) as news:
+        with self._robot._feed(kinds, keys.TURN_CLOSED, keys.ANY_ROBOT_ALIVE) as news:
             watching = asyncio.create_task(self._watch(news), name=f"turn {self.id}")
             try:
                 yield

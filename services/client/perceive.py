@@ -76,7 +76,7 @@ async def perceive(
         bus = hub.join(name or f"perceive-{uuid.uuid4().hex[:8]}", role="perception")
         stack.push_async_callback(bus.leave)
         told = PerceivedPerson(person, bus)
-        inbox = stack.enter_context(bus.subscribe(bus_keys.ANY_ALIVE, bus_keys.WORLD))
+        inbox = stack.enter_context(bus.subscribe(bus_keys.ANY_ROBOT_ALIVE, bus_keys.WORLD))
         bus.declare_alive()
         await _robot_there(bus, inbox, told, timeout)
         if position is None and told._entity(person) is None:

@@ -149,7 +149,7 @@ class Robot(Hearing):
 
     async def _answered(self, pending: Pending, timeout: Seconds | None) -> FragmentOutcome:
         fragment = pending.request.fragment  # type: ignore[attr-defined]
-        with self._feed((TurnClosed, PeerGone), keys.TURN_CLOSED, keys.ANY_ALIVE) as news:
+        with self._feed((TurnClosed, PeerGone), keys.TURN_CLOSED, keys.ANY_ROBOT_ALIVE) as news:
             outcome = await self._performed(pending, timeout)
             events = {event.id for event in outcome.events}
             deadline = self.now() + ANSWER_PATIENCE + (fragment.within or 0.0)

@@ -89,7 +89,7 @@ def _told(recording: Recording, times: Times) -> Iterator[Told]:
     """The messages that count, as people are to hear them: what a killed program told is over with it."""
     heard = Heard(recording.robot, recording.clock, times.at, times.told)
     for received, _ in messages(recording):
-        if keys.first(COUNTED, received.key) is not None:
+        if keys.is_presence(received.key) or keys.first(COUNTED, received.key) is not None:
             came = max(0.0, received.at - recording.began)
             yield from (Told(*one) for one in heard.advance(came))
             taken = heard.take(structs.replace(received, at=came), came)

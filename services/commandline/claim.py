@@ -17,6 +17,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
+from engage_hri.services.runtime.service import check_name
 
 PATIENCE: Seconds = 4.0
 """Time for which a killed `engage up` may still seem to be there."""
@@ -98,7 +99,11 @@ class Claiming:
 
 @asynccontextmanager
 async def claiming(hub: Hub, id: str = "") -> AsyncIterator[Claiming]:
-    """Claim a robot while the body of `async with` runs. id: decides between two that are starting; empty: random."""
+    """Claim a robot while the body of `async with` runs. id: decides between two that are starting; empty: random.
+
+    Raises InputRefused if the keys are not those of `up`.
+    """
+    check_name(hub, "up")
     id = id or uuid.uuid4().hex[:8]
     starting, up = hub.join(f"up-starting-{id}"), hub.join(f"up-{id}")
     try:

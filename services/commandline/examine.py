@@ -99,6 +99,7 @@ def _itself() -> ProcessFacts:
 async def _look_around(hub: ZenohHub, facts: Facts, endpoints: tuple[str, ...]) -> Facts:
     """Add what can be learned on the bus."""
     bus = hub.join(unique_name("doctor"), "observer")
+    hub.peers.see(keys.ANY_ALIVE)
     with suppress(TimeoutError):
         async with asyncio.timeout(COME):
             await hub.peers.wait_for_quiet(QUIET)

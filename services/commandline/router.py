@@ -2,10 +2,13 @@
 
 import asyncio
 import os
+import re
 import sys
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from secrets import token_hex
 from select import PIPE_BUF, select
 from typing import Annotated
 
@@ -20,6 +23,8 @@ from engage_hri.services.commandline.process import FAILED, run_until_signal, un
 from engage_hri.services.commandline.watched import EVERY, SIGN, watched
 from engage_hri.services.runtime.configuration import bus_config
 
+FILES = 8192
+"""Files that a router may have open, for links, and more of them that are about to open."""
 ZENOH_THREADS = "(rx: (worker_threads: 32))"
 """Threads of Zenoh that receive; it has two. One is busy for up to 10 s with closing the link of a machine that was
 cut off, and while all are, the router hears nobody, of no robot."""
@@ -43,7 +48,14 @@ class Options:
             show_default="open to all",
         ),
     ] = None  # fmt: skip
-    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
+    robot_listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Where the robot's services connect: a router of their own, joined to this one."
+            " Whoever fills this one takes no place of theirs. May be repeated.",
+        ),
+    ] = None  # fmt: skip
+    attended: Annotated[str, typer.Option("--attended", hidden=True)] = ""
 
 
 def main(options: Options) -> int:
@@ -52,7 +64,35 @@ def main(options: Options) -> int:
     if options.attended:
         os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)  # read when the first session opens
         return run_until_signal(_route(options, keys))
-    return run_until_signal(watched(_command(options), "the router", _teller(), LOG.warning))
+    return run_until_signal(_watch(options))
+
+
+async def _watch(options: Options) -> int:
+    """Watch over the router, or the robot's and that of all others. Returns the exit code of one that refuses."""
+    from engage_hri.services.bus.zenoh.denials import Denials
+
+    connect = options.connect or []
+    commands = {"the router": _command(options, options.listen, connect)}
+    if options.robot_listen:
+        near = [_from_here(endpoint) for endpoint in options.robot_listen]
+        commands = {
+            "the robot's router": _command(options, options.robot_listen, connect),
+            "the router of all others": _command(options, options.listen, near),
+        }
+    tell, mark = _teller(), token_hex()
+    watching = [
+        asyncio.create_task(
+            watched([*each, "--attended", mark], name, tell, LOG.warning, mark.encode(), Denials(tell).feed)
+        )
+        for name, each in commands.items()
+    ]
+    try:
+        done, _ = await asyncio.wait(watching, return_when=asyncio.FIRST_COMPLETED)
+        return done.pop().result()
+    finally:
+        for each in watching:
+            each.cancel()
+        await asyncio.wait(watching)
 
 
 def _keys(options: Options) -> Keys | None:
@@ -64,49 +104,71 @@ def _keys(options: Options) -> Keys | None:
     if own.holder.role != ROUTER:
         reason = f"these are the keys of {own.holder.common_name}, not of a router"
         raise InputRefused(Fault(reason=reason, where=str(own.folder)))
-    if plain := [each for each in (*options.listen, *(options.connect or ())) if not is_encrypted(each)]:
+    endpoints = (*options.listen, *(options.robot_listen or ()), *(options.connect or ()))
+    if plain := [each for each in endpoints if not is_encrypted(each)]:
         raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=str(own.folder), advice="tls/HOST:PORT"))
     return own
 
 
-def _command(options: Options) -> list[str]:
-    """Make the command line of the router's process."""
+def _from_here(endpoint: str) -> str:
+    """Endpoint at which this machine reaches what listens at one for all machines."""
+    return re.sub(r"/(?:0\.0\.0\.0|\[::\]):", "/localhost:", endpoint)
+
+
+def _command(options: Options, listen: list[str], connect: list[str]) -> list[str]:
+    """Make the command line of a router's process."""
     return [
-        *(sys.executable, "-P", "-m", "engage_hri", "router", "--attended"),
-        *(part for endpoint in options.listen for part in ("--listen", endpoint)),
-        *(part for endpoint in options.connect or () for part in ("--connect", endpoint)),
+        *(sys.executable, "-P", "-m", "engage_hri", "router"),
+        *(part for endpoint in listen for part in ("--listen", endpoint)),
+        *(part for endpoint in connect for part in ("--connect", endpoint)),
         *(("--keys", str(options.keys)) if options.keys else ()),
     ]
 
 
-def _teller() -> Callable[[str], None]:
+def _teller(mark: str = "") -> Callable[[str], None]:
+    """mark: for whoever watches over this process. Others write to its output, too, and what they like."""
     out = Patient("standard output", _without_waiting, LOG.warning)
 
     def tell(line: str) -> None:
-        out.write(f"{line}\n")
+        out.write(f"{mark}{line}\n")
 
     return tell
 
 
 def _without_waiting(data: bytes) -> int | None:
     """Write to standard output if its reader takes it: one who stops reading must not stop the router."""
-    # That of Python at this moment: with keys Zenoh's log goes where it went at first.
     output = beneath(sys.stdout)
     return output.write(data[:PIPE_BUF]) if select([], [output.fileno()], [], 0)[1] else None
 
 
 async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
+    from engage_hri.services.bus.zenoh.session import MOST_SESSIONS
 
-    tell = _teller()
+    tell = _teller(options.attended)
+
+    def sign() -> None:
+        """Show a sign of life, in whatever thread: past what the loop has to write."""
+        _without_waiting(f"{options.attended}{SIGN}\n".encode())
+
+    _let_in_many()
     async with (
-        routing(options.listen, options.connect or (), tell, keys) as router,
+        routing(options.listen, options.connect or (), tell, keys, sign) as router,
         asyncio.TaskGroup() as group,
     ):
-        complain(f"router is ready at {', '.join(options.listen)}")
+        complain(f"router is ready at {', '.join(options.listen)} (at most {MOST_SESSIONS} links)")
         group.create_task(_show(router.works, lambda: tell(SIGN)), name="signs of life")
         await until_closed()
         os._exit(FAILED)  # Who watched over it was killed, and may be started again at the same endpoints.
+
+
+def _let_in_many() -> None:
+    """Let this process have as many open files as it may: each link is one, and many systems begin with 1024."""
+    with suppress(ImportError, OSError, ValueError):
+        from resource import RLIMIT_NOFILE, getrlimit, setrlimit
+
+        soft, hard = getrlimit(RLIMIT_NOFILE)
+        setrlimit(RLIMIT_NOFILE, (max(soft, min(FILES, hard) if hard >= 0 else FILES), hard))
 
 
 async def _show(works: Callable[[], Awaitable[None]], sign: Callable[[], None]) -> None:

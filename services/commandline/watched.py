@@ -20,18 +20,26 @@ BRIEF: Seconds = 2.0
 PAUSE: Seconds = 0.5
 
 
-async def watched(command: Sequence[str], name: str, tell: Callable[[str], None], warn: Callable[[str], None]) -> int:
+async def watched(
+    command: Sequence[str],
+    name: str,
+    tell: Callable[[str], None],
+    warn: Callable[[str], None],
+    mark: bytes = b"",
+    other: Callable[[bytes], bool] = lambda line: False,
+) -> int:
     """Run a process until cancelled, and again whenever it hangs or ends. Returns the exit code of one that refuses.
 
     One that ends by itself before its first sign refuses to run: it has said why. name: of the process, for people.
-    tell: gets the lines of its standard output. warn: gets what became of it.
+    tell: gets the lines of its standard output that begin with `mark`. other: gets all that do not, and says of each
+    whether it is a sign of life. warn: gets what became of it.
     """
     loop = asyncio.get_running_loop()
     with without_threads():
         while True:
             began = loop.time()
             async with spawned(_end, *command) as process:
-                has_shown, is_silent = await _listen(process, tell)
+                has_shown, is_silent = await _listen(process, tell, mark, other)
                 if is_silent:
                     await killed(process)
                 code = await process.wait()
@@ -46,23 +54,31 @@ async def watched(command: Sequence[str], name: str, tell: Callable[[str], None]
                 await asyncio.sleep(PAUSE)
 
 
-async def _listen(process: Process, tell: Callable[[str], None]) -> tuple[bool, bool]:
+async def _listen(
+    process: Process, tell: Callable[[str], None], mark: bytes, other: Callable[[bytes], bool]
+) -> tuple[bool, bool]:
     """Pass on the lines until they end. Returns whether there was a sign of life, and whether it fell silent."""
     assert process.stdout is not None
-    has_shown = False
+    loop = asyncio.get_running_loop()
+    has_shown, deadline = False, loop.time() + BEGINNING
     while True:
         try:
-            async with asyncio.timeout(SILENCE if has_shown else BEGINNING):
+            async with asyncio.timeout_at(deadline):
                 raw = await process.stdout.readline()
         except TimeoutError:
             return has_shown, True
         except ValueError:
-            raw = b"(a line too long to show)\n"
+            raw = mark + b"(a line too long to show)\n"
         if not raw:
             return has_shown, False
-        line = raw.decode(errors="replace").rstrip("\n")
+        if not raw.startswith(mark) and not other(raw):
+            continue
+        deadline = loop.time() + (SILENCE if has_shown else BEGINNING)
+        if not raw.startswith(mark):
+            continue
+        line = raw.removeprefix(mark).decode(errors="replace").rstrip("\n")
         if line == SIGN:
-            has_shown = True
+            has_shown, deadline = True, loop.time() + SILENCE
         else:
             tell(line)
 

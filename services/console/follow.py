@@ -36,7 +36,7 @@ FOLLOWED = (
     keys.STUDY_CONDITION,
     keys.ANY_REQUEST_STATE,
     keys.ANY_FAULT,
-    keys.ANY_ALIVE,
+    keys.ANY_ROBOT_ALIVE,
 )
 """Expressions for all messages that people want to see. Presence ends the events of a dead recognition."""
 

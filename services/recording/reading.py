@@ -464,7 +464,8 @@ def _is_in_table(key: str) -> bool:
     except ValueError:
         return False
     chunks = key.split("/")
-    return all(map(keys.is_chunk, chunks)) and (len(chunks) == 4 if kind == "alive" else len(chunks) > 4)
+    # Presence has four chunks in recordings from before the part of a participant stood in its key.
+    return all(map(keys.is_chunk, chunks)) and (len(chunks) in (4, 5) if kind == "alive" else len(chunks) > 4)
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, bytes]]:

@@ -8,6 +8,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterable
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import PARTICIPANTS
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
@@ -96,7 +97,7 @@ class Stage:
         name = name or NAME
         if name not in self._buses:
             assert self._hub is not None
-            self._buses[name] = self._hub.join(name, name if name in keys.ROLES else "manager")
+            self._buses[name] = self._hub.join(name, PARTICIPANTS.get(name, "perception"))
             self._own.add(self._buses[name].run)
         return self._buses[name]
 
@@ -140,7 +141,7 @@ async def replay(stage: Stage, player: Player, controls: "asyncio.Queue[Control]
 async def _play(stage: Stage, player: Player, controls: "asyncio.Queue[Control]", begin: Seconds) -> Seconds | None:
     """Play from a time on, until the end, or until it is to go to another time, which is returned."""
     playing = asyncio.create_task(_say_what_is_due(stage, player, controls, begin), name="playing")
-    with stage.bus.subscribe(keys.ANY_ALIVE) as presence:
+    with stage.bus.subscribe(keys.ANY_ROBOT_ALIVE) as presence:
         watching = asyncio.create_task(_watch(stage, presence), name="live robot")
         try:
             await asyncio.wait((playing, watching), return_when=asyncio.FIRST_COMPLETED)

@@ -67,7 +67,7 @@ class Requester:
     A request to a server that has not come yet waits for it. Raises ValueError if the bus' name can't be in a key.
     """
 
-    PATTERNS = (keys.ANY_REQUEST_STATE, keys.ANY_ALIVE)
+    PATTERNS = (keys.ANY_REQUEST_STATE, keys.ANY_ROBOT_ALIVE)
 
     def __init__(self, bus: Bus, patience: Patience | None = None) -> None:
         keys.chunk(bus.name)
@@ -250,8 +250,8 @@ class RequestDesk:
         self._late_for: Seconds | None = None
 
     @staticmethod
-    def patterns(server: str) -> tuple[str, str]:
-        return (keys.commands(server), keys.ANY_ALIVE)
+    def patterns(server: str) -> tuple[str, ...]:
+        return (keys.commands(server), keys.ANY_ROBOT_ALIVE, keys.ANY_CLIENT_ALIVE)
 
     def is_live(self, name: str) -> bool:
         return self._serving.is_live(name)

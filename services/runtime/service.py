@@ -26,14 +26,19 @@ Service = Callable[[Bus, Ready], Coroutine[Any, Any, None]]
 """Coroutine function with its configuration bound already (`functools.partial(realize, config=...)`)."""
 
 
-async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
-    """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+def check_name(hub: Hub, name: str) -> None:
+    """Raise InputRefused if the keys of this process are somebody else's."""
     called = hub.called(name)
     if called != name:
         reason = f"the keys are those of {called.removesuffix(f'-{name}')!r}, not of {name!r}"
         raise InputRefused(Fault(reason=reason, where=name, advice="give it the folder of its own keys"))
+
+
+async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: None) -> None:
+    """Run one service on the hub until it is cancelled or fails. Raises InputRefused if another one is there."""
+    check_name(hub, name)
     await hub.wait_until_free(name)
-    bus = hub.join(name, role=name if name in keys.ROLES else "manager")
+    bus = hub.join(name)
     joined = bus.stamp()
     since: Stamp | None = None
 
@@ -63,7 +68,7 @@ async def _while_alone(bus: Bus, work: Coroutine[Any, Any, None]) -> None:
     One that starts while another is there is refused before it begins. So two of one name have started at once, or
     without seeing one another, as behind a cut. Neither knows who was first; the one of the lesser run stays.
     """
-    with bus.subscribe(keys.ANY_ALIVE) as presence:
+    with bus.subscribe(keys.alive(bus.name, bus.part)) as presence:
         serving = asyncio.ensure_future(work)
         watching = asyncio.create_task(_rival(bus, presence), name=f"rivals of {bus.name}")
         try:

@@ -35,8 +35,8 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
     cameras = Cameras(person, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
     perceived, shared = PerceivedActions(bus), SharedWorld(bus.name)
     with bus.subscribe(
-        keys.ANY_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT, keys.ROBOT_SEEN,
-        keys.BODY_FAULTS, keys.WORLD,
+        keys.ANY_ROBOT_ALIVE, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ANY_CONNECTION_EVENT,
+        keys.ROBOT_SEEN, keys.BODY_FAULTS, keys.WORLD,
         *([keys.ROBOT_MOTION] if config.perception == "raw" else []),
     ) as inbox:  # fmt: skip
         bus.publish(keys.WORLD, _whole(cameras.world(bus.now()), shared, bus.now()))

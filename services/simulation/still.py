@@ -46,7 +46,7 @@ async def show_world(bus: Bus, ready: Ready, world: World, *, is_attentive: bool
     is_attentive: the first person follows the robot's gaze and answers it; else all just sit there.
     """
     patterns = (keys.ROBOT_ACTION, keys.SYNC_POINT, keys.FEEDBACK, keys.BODY_FAULTS) if is_attentive else ()
-    with bus.subscribe(*patterns, keys.WORLD, keys.ANY_ALIVE) as inbox:
+    with bus.subscribe(*patterns, keys.WORLD, keys.ANY_ROBOT_ALIVE) as inbox:
         ready()
         shared = SharedWorld(bus.name)
 

@@ -24,11 +24,10 @@ class SpyHub(MemoryHub):
         self.flows = flows
         self.roles = {**PARTICIPANTS, **roles}
 
-    def join(self, name: str, role: str = "manager") -> MemoryBus:
-        bus = super().join(name, role)
+    def join(self, name: str, role: str = "") -> MemoryBus:
+        bus = super().join(name, self.roles.get(name, role))
         if (known := self.roles.get(name)) is None:
             return bus
-        bus.role = known
         note, flows = Flow, self.flows
         send, subscribe, query, answer = bus._send, bus.subscribe, bus.query, bus.answer
 

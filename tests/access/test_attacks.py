@@ -164,7 +164,7 @@ def play_history(robot: Fortress, role: str, holder: str, key: str, payload: byt
         query.drop()
 
     session.declare_queryable(keys.own(run, "past"), zenoh.handlers.Callback(tell, indirect=False))
-    shown = ("process/boot-0", "log", f"alive/{holder}")
+    shown = (f"alive/{keys.part_of(role)}/{holder}/boot-0", "log/news")
     tokens = [session.liveliness().declare_token(keys.own(run, each)) for each in shown]
     robot.router.expect(f"denied: robot/{role}/{holder} may not reply robot/{key}")
     for token in tokens:
@@ -213,9 +213,9 @@ def test_a_manager_in_anothers_name(robot: Fortress) -> None:
     mark = Holder(robot="robot", role="manager", name="bob").mark
     bob = robot.session("bob", id=f"{mark}{'2' * 24}")
     for run in (f"{mark}{'2' * 24}", run_of(robot, keys.SYNC_POINT)):
-        for name in ("alice", "control"):
-            bob.liveliness().declare_token(keys.own(run, f"alive/{name}"))
-            shown = f"robot/{keys.own(run, f'alive/{name}')}"
+        for name in ("client/alice", "robot/control"):
+            bob.liveliness().declare_token(keys.own(run, f"alive/{name}/boot-0"))
+            shown = f"robot/{keys.own(run, f'alive/{name}/boot-0')}"
             robot.router.expect("denied: robot/manager/bob may not", "liveliness token", shown)
 
 

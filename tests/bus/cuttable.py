@@ -38,7 +38,7 @@ class CuttableHub(MemoryHub):
                 self._apart.add(pair)
                 for one, other in self._ways(pair):
                     if other.is_alive:
-                        self._tell(one, PeerGone(participant=other.name), other.name)
+                        self._tell(one, PeerGone(participant=other.name), other.name, other.part)
 
     def join_up(self, *names: str) -> None:
         """Heal all links between these participants."""
@@ -49,7 +49,7 @@ class CuttableHub(MemoryHub):
                     if not self._tokens_first:
                         self._hand_out(other, one)
                     if other.is_alive:
-                        self._tell(one, PeerAlive(participant=other.name, run=other.run), other.name)
+                        self._tell(one, PeerAlive(participant=other.name, run=other.run), other.name, other.part)
                     if self._tokens_first:
                         self._hand_out(other, one)
 
@@ -57,8 +57,8 @@ class CuttableHub(MemoryHub):
         one, other = (self._buses.get(name) for name in sorted(pair))
         return [] if one is None or other is None else [(one, other), (other, one)]
 
-    def _tell(self, bus: MemoryBus, message: PeerAlive | PeerGone, name: str) -> None:
-        bus.deliver(Received(keys.alive(name), message, name, self._loop.time()), self.sent + 1)
+    def _tell(self, bus: MemoryBus, message: PeerAlive | PeerGone, name: str, part: keys.Part) -> None:
+        bus.deliver(Received(keys.alive(name, part), message, name, self._loop.time()), self.sent + 1)
 
     def _hand_out(self, sender: MemoryBus, receiver: MemoryBus) -> None:
         way = (sender.name, receiver.name)
@@ -80,10 +80,10 @@ class CuttableHub(MemoryHub):
     def _is_cut(self, one: str, other: str) -> bool:
         return frozenset((one, other)) in self._apart
 
-    def announce(self, name: str, message: PeerAlive | PeerGone) -> None:
+    def announce(self, name: str, message: PeerAlive | PeerGone, part: keys.Part = "robot") -> None:
         for bus in list(self._buses.values()):
             if not self._is_cut(name, bus.name):
-                self._tell(bus, message, name)
+                self._tell(bus, message, name, part)
 
     def replay(self, name: str, subscription: Subscription) -> int:
         self._new |= {(other, name) for other in self._buses if self._is_cut(name, other)}

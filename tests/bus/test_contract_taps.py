@@ -76,7 +76,7 @@ async def test_a_late_tap_gets_the_last_states_and_who_is_there(place: Place):
 
     token, last = await samples(here, tap, 2)
     assert decode(token.payload, token.encoding) == PeerAlive(participant="there", run=there.run)
-    assert (token.key, token.source) == (keys.alive("there"), "there")
+    assert (token.key, token.source) == (keys.alive("there", "client"), "there")
     assert (decode(last.payload, last.encoding), last.past) == (state(2), True)
 
 

@@ -49,7 +49,8 @@ class Wire:
             self.delivered += self.follower.take(written)
 
     def pulse(self) -> None:
-        self.follower.pulse(self.sent.recent(0.0))
+        for counts in self.sent.recent(0.0).values():
+            self.follower.pulse(counts)
 
     def ask(self) -> None:
         if self.follower.behind:
@@ -277,8 +278,8 @@ def test_the_pulse_tells_of_the_keys_written_lately():
     write(sent, keys.FEEDBACK, now=0.0)
     write(sent, keys.BLOCK, now=2.0)
 
-    assert sent.recent(2.5) == {keys.FEEDBACK: 1, keys.BLOCK: 1}
-    assert sent.recent(4.0) == {keys.BLOCK: 1}
+    assert sent.recent(2.5) == {"news": {keys.FEEDBACK: 1}, "commands": {keys.BLOCK: 1}}
+    assert sent.recent(4.0) == {"commands": {keys.BLOCK: 1}}
     assert sent.recent(6.0) == {}
 
 
@@ -314,7 +315,7 @@ def test_a_pulse_fits_into_its_row_and_has_the_keys_that_were_written_last(
         last.pop(key, None)
         last[key] = now
 
-    found = sent.recent(now)
+    found = sent.recent(now).get("news", {})
 
     recent = [key for key, at in reversed(last.items()) if now - at <= PULSE_FOR]
     assert list(found) == recent[: len(found)]

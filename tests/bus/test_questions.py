@@ -22,7 +22,7 @@ from engage_hri.services.bus.zenoh.readers import RUNS_KEPT, TRIES
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time
-Told = Callable[[str, Past], None]
+Told = Callable[[Past], None]
 Ended = Callable[[], None]
 
 
@@ -43,7 +43,8 @@ async def pair() -> AsyncIterator[tuple[ZenohHub, ZenohHub]]:
 
 async def publishing(here: ZenohHub, *others: ZenohHub) -> None:
     """Wait until it is known that these have published something."""
-    while here.peers.publishers != {other.run for other in others}:
+    here.peers.hear("news")
+    while here.peers.publishers.keys() != {other.run for other in others}:
         assert await here.peers.change(asyncio.get_running_loop().time() + PATIENCE)
 
 
@@ -78,7 +79,7 @@ async def test_a_process_that_never_answers_holds_up_nobody_for_ever(pair: tuple
     assert numbers(await messages(inbox)) == [1]
     asked = unanswered(here, 1000)
 
-    here.readers.publisher_came(there.run)
+    here.readers.publisher_came(there.run, "news")
     there.join("another").publish(keys.WORLD, state(2))
 
     assert numbers(await messages(inbox)) == [2]
@@ -96,17 +97,17 @@ async def test_who_comes_back_under_a_question_is_asked_once_more_after_it(pair:
         if len(asked) > 0:
             ask(patterns, run, missing, told, ended)
         else:
-            ask(patterns, run, missing, lambda run, past: waiting.put_nowait(told), lambda: None)
+            ask(patterns, run, missing, lambda past: waiting.put_nowait(told), lambda: None)
 
     assert numbers(await messages(inbox)) == [1]
     here._history.ask = ask_late  # type: ignore[method-assign]
-    here.readers.publisher_came(there.run)
-    here.readers.publisher_came(there.run)
+    here.readers.publisher_came(there.run, "news")
+    here.readers.publisher_came(there.run, "news")
     there.join("another").publish(keys.WORLD, state(2))
     told = await waiting.get()
 
     # The answer to the first question is from before the cut: it has nothing new.
-    told(there.run, Past({keys.WORLD: 1}, ()))
+    told(Past({keys.WORLD: 1}, ()))
 
     assert numbers(await messages(inbox)) == [2]
     assert len(asked) == 2
@@ -139,7 +140,7 @@ async def test_a_question_is_one_for_all_patterns_and_goes_to_no_other_process(m
     assert sorted(numbers(await messages(inbox, 2))) == [1, 2]
     assert sorted(asked) == sorted([there.run, other.run]), "who has published nothing was asked"
     asked.clear()
-    here.readers.publisher_came(there.run)
+    here.readers.publisher_came(there.run, "news")
     there._buses["there"].publish(keys.WORLD, state(3))
 
     assert numbers(await messages(inbox)) == [3]
@@ -153,11 +154,18 @@ async def test_processes_that_read_one_clock_do_not_ask_one_another_for_the_time
     robot, end = f"asked-{os.getpid()}", free_endpoint()
     here, there = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
     await acquainted(here, there)
+    asked.clear()
+    for each in (here, there):
+        each.join(each.run, "perception").declare_alive()
+    for each in (here, there):
+        while not each.peers.processes:
+            assert await each.peers.change(asyncio.get_running_loop().time() + PATIENCE)
     await here.peers.round_trip(there.run, PATIENCE)
     assert asked == [there.run]
 
     monkeypatch.setattr(hub, "own_clock", lambda *_: ("boot-elsewhere", lambda: 1000.0 + time.monotonic()))
     far = await open_hub(robot, connect=[end])
+    far.join("far", "perception").declare_alive()
     await far.peers.round_trip(here.run, PATIENCE)  # which is asked after the first question for the time
     await here.peers.round_trip(far.run, PATIENCE)
 
@@ -179,6 +187,7 @@ async def test_what_time_a_machine_has_says_one_of_its_processes_and_no_other(
         clock = ("boot-elsewhere", lambda ahead=ahead: ahead + time.monotonic())
         monkeypatch.setattr(hub, "own_clock", lambda *_, clock=clock: clock)
         each = hubs[name] = await open_hub(robot, connect=[end])
+        each.join(name, "perception").declare_alive()
         for _ in range(CLOCK_TRIPS + 1):  # each is asked after the last question for the time
             await each.peers.round_trip(here.run, PATIENCE)
             await here.peers.round_trip(each.run, PATIENCE)
@@ -198,7 +207,7 @@ async def test_processes_that_come_and_go_are_forgotten_but_none_that_is_there(p
     inbox = here.join("here").subscribe(keys.WORLD)
     assert numbers(await messages(inbox)) == [1]
     for number in range(2 * RUNS_KEPT):
-        here.readers.publisher_came(f"run-{number}")
+        here.readers.publisher_came(f"run-{number}", "news")
     [reader] = here.readers._readers
 
     assert len(reader.followers) == RUNS_KEPT

@@ -25,7 +25,9 @@ from engage_hri.services.bus.zenoh.sizes import MOST_IN_PARTS, bounded, paced
 from tests.bus.places import PATIENCE, free_endpoint
 
 BLOCK = zenoh.CongestionControl.BLOCK
-OF_THE_BUS = tuple(keys.own("e0001234", subject) for subject in ("pulse", "past", "counts", "clock", "flush"))
+OF_THE_BUS = tuple(
+    keys.own("e0001234", subject) for subject in ("pulse/news", "past", "counts", "clock", "flush/commands")
+)
 SENT = sorted({row.key.replace(OWN, "ann").replace("*", "ann") for row in access.TABLE if row.does != "subscribes"})
 
 
@@ -206,8 +208,8 @@ async def test_a_router_passes_on_pulses_of_a_holder_at_their_rate_and_no_more()
     loud, quiet, witness = plain(endpoint), plain(endpoint), Witness(plain(endpoint))
     spaced = Witness(quiet)  # which hears nothing
     try:
-        witness.session.declare_subscriber(keys.ANY_PULSE, witness.hear("put"))
-        pulses = {who.name: keys.own(f"{who.mark}{'2' * 24}", "pulse") for who in (alice, bob)}
+        witness.session.declare_subscriber(keys.own("*", "pulse/news"), witness.hear("put"))
+        pulses = {who.name: keys.own(f"{who.mark}{'2' * 24}", "pulse/news") for who in (alice, bob)}
         while not witness.came:
             quiet.put(pulses["bob"], b"")
             await witness.next(0.02)

@@ -22,7 +22,7 @@ async def test_who_came_and_went_is_forgotten_by_who_watches(hub: MemoryHub) -> 
             here, gone = await subscription.next(), await subscription.next()
             assert here is not None
             assert gone is not None
-            assert here.key == gone.key == keys.alive(name)
+            assert here.key == gone.key == keys.alive(name, "client")
 
     for number in range(100):
         await visit(f"first-{number}")

@@ -32,7 +32,7 @@ async def test_it_performs_what_is_played_in_one_process_and_ends_with_ctrl_c(tm
                 out, err = await process.communicate()
             told.append((process.returncode, out.decode() + err.decode()))
 
-        assert [code for code, _ in told] == [0, 2, 2]
+        assert [code for code, _ in told] == [0, 2, 75]
         assert "block hello: done" in told[0][1]
         assert all("robot 'one' has this on the bus already" in text for _, text in told[1:])
         assert children(up.pid) == []
@@ -79,7 +79,7 @@ async def test_the_keys_of_one_holder_are_not_those_of_the_services(tmp_path: Pa
         await stopped(router)
 
     assert up.returncode == 2
-    assert "control: the keys are those of 'alice', not of 'control'" in err.decode()
+    assert "up: the keys are those of 'alice', not of 'up'" in err.decode()
 
 
 async def lives(bus: Bus, ready: Ready, *, seconds: float, fails: bool = False) -> None:

@@ -162,3 +162,19 @@ async def test_a_router_goes_with_who_watches_over_it_and_its_place_is_free() ->
     assert (third.returncode, out, err.count(b"\n")) == (3, b"", 1)
     assert await stopped(second, signal.SIGTERM) == 0
     await first.communicate()
+
+
+async def test_the_robots_services_have_a_router_of_their_own_and_all_others_see_them_through_it() -> None:
+    people, services = free_endpoint(), free_endpoint()
+    router = await start("router", "--listen", people, "--robot-listen", services)
+    try:
+        for _ in range(2):
+            await line(router, "router is ready")
+        service = await start("run", "recognition", "--mode", "client", "--connect", services)
+        await line(service, "recognition is ready")
+        for _ in range(2):
+            await line(router, "robot: recognition is here", log=False)
+    finally:
+        codes = [await stopped(process) for process in (service, router)]
+
+    assert codes == [0, 0]

@@ -11,7 +11,6 @@ from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.tangram import ending
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.recording.service import Recorder, opened, record
 from engage_hri.services.runtime.service import Service, running
@@ -38,15 +37,13 @@ async def tangram(
     path: Path, config: Config, *sinks: Sink, more: Mapping[str, Service] = MappingProxyType({})
 ) -> list[Received]:
     """The whole task, recorded. more: further participants. Returns what a subscription got of it."""
-    finished = asyncio.Event()
     live: list[Received] = []
     async with MemoryHub(config.robot) as hub:
         services = {name: roster.service(name, config) for name in roster.NAMES}
-        services["collaboration"] = ending(services["collaboration"], finished)
         services |= more
         inbox = hub.join("viewer").subscribe(keys.EVERYTHING, capacity=10**6)
-        async with recording_to(path, hub), following(hub.join("console"), sinks), running(hub, services):
-            await finished.wait()
+        async with recording_to(path, hub), following(hub.join("console"), sinks), running(hub, services) as over:
+            await over.wait()
             while len(inbox):
                 received = await inbox.next()
                 assert received is not None

@@ -79,7 +79,7 @@ async def test_a_late_recorder_has_the_states_and_who_is_there(tmp_path: Path) -
             await asyncio.sleep(0.1)
 
     token, state = all_of(read(tmp_path / "a.mcap"))[:2]
-    assert (token.key, token.source) == (keys.alive("there"), "there")
+    assert (token.key, token.source) == (keys.alive("there", "client"), "there")
     assert token.encoding.endswith("PeerAlive/1")
     assert (state.key, state.past, state.life) == (keys.HEAD_OWNER, True, there.run)
 
@@ -182,7 +182,7 @@ async def test_presence_is_kept_though_it_is_never_sent(tmp_path: Path) -> None:
 
     recording = read(tmp_path / "a.mcap")
     told = [one for number in range(len(recording)) if (one := recording.received(number)) is not None]
-    came, gone = [one for one in told if one.key == keys.alive("there")]
+    came, gone = [one for one in told if one.key == keys.alive("there", "client")]
     assert came.message == PeerAlive(participant="there", run=there.run)
     assert gone.at - came.at == pytest.approx(1.0, abs=1e-9)
 

@@ -48,11 +48,11 @@ def test_every_key_is_in_the_table() -> None:
         if name.isupper() and isinstance(value, str) and value.startswith(keys.PREFIX) and not name.startswith("ANY_")
     }
     makers = (
-        keys.cancel, keys.keep_alive, keys.request_state, keys.fault, keys.statistics, keys.status, keys.alive,
+        keys.cancel, keys.keep_alive, keys.request_state, keys.fault, keys.statistics, keys.status,
         keys.head_pose, keys.voice_activity, keys.open_events, keys.settings,
     )  # fmt: skip
     made = {make("x").replace("*/*", "x/x") for make in makers}
-    made |= {keys.connection_event("x", "x"), keys.perceived_ongoing("x", "x")}
+    made |= {keys.connection_event("x", "x"), keys.perceived_ongoing("x", "x"), keys.alive("x", "x")}  # type: ignore[arg-type]
 
     assert table == (constants | made) - {keys.PREFIX, keys.EVERYTHING}
 
@@ -67,7 +67,7 @@ def test_every_key_is_in_the_table() -> None:
         f"The role is one of {', '.join(f'`{role}`' for role in keys.ROLES)};",
         f"JSON where programs of others read most: {', '.join(f'`{kind.__name__}`' for kind in OUTWARD[:-1])} and"
         f" `{OUTWARD[-1].__name__}`",
-        f"`<robot>/{keys.own('<run>', 'alive/<name>')}`",
+        f"`<robot>/{keys.own('<run>', 'alive/<part>/<name>/<clock>')}`",
         f"`<robot>/{keys.status('*')}?format=json`",
         f"`{ID}#PerformFragment`",
         *(f"`<robot>/{keys.of_class(kind)}`" for kind in ("state", "evt", "cmd")),

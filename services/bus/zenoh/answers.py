@@ -6,7 +6,6 @@ from typing import Any
 
 import zenoh
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.messages import Message, decode, in_form
 from engage_hri.services.bus.answering import MOST, Answering
@@ -18,12 +17,10 @@ from engage_hri.services.bus.zenoh.session import LoopBridge
 class Answers:
     """All that one participant answers."""
 
-    def __init__(self, bus: Bus, session: zenoh.Session, bridge: LoopBridge, run: str) -> None:
-        """run: the process."""
+    def __init__(self, bus: Bus, session: zenoh.Session, bridge: LoopBridge) -> None:
         self._bus = bus
         self._session = session
         self._bridge = bridge
-        self._run = run
         self._declared: list[Any] = []
         self.here = Answering(bus)
         """The same answers, for those who ask in this process."""
@@ -55,8 +52,6 @@ class Answers:
             finish(query)
 
         self._declared.append(self._session.declare_queryable(key, self._bridge.questions(reply)))
-        # A participant that asked too early learns from this token that it may ask again.
-        self._declared.append(self._session.liveliness().declare_token(keys.own(self._run, f"answers/{key}")))
 
     async def _later(self, query: zenoh.Query, key: str, told: Coroutine[Any, Any, Message], form: str) -> None:
         try:

@@ -2,18 +2,13 @@
 or too many ones.
 
 Zenoh tells both only in its log, which it writes to the standard output of the process, each message that is allowed
-among them. So the log goes through a pipe here, and the loop picks out what was refused.
+among them. Who watches over the router reads that, and picks out what was refused. The router itself must not: while
+its loop waits for Zenoh, Zenoh may wait for whoever reads the log.
 """
 
-import asyncio
-import os
 import re
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-
-import zenoh
+from collections.abc import Callable
 
 from engage_hri.schemas.utf8 import printable
 
@@ -24,10 +19,6 @@ MOST = 200
 WILD = 4
 """Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
 Keys of ours have one."""
-MOST_LINKS = 4096
-"""Number of links of which it is known whose they are."""
-PIPE = 2**20
-"""Bytes of the log that may wait for the loop; beyond, the router waits."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
 _THREAD = re.compile(r"ThreadId\((\d+)\)")
 _THREAD_OF = re.compile(rb"ThreadId\((\d+)\)")
@@ -75,26 +66,28 @@ class Denials:
         """Processes that have a name."""
         self._before = b""
         """The last line."""
-        self.names: dict[str, str] = {}
-        """Common names by the address at the other end of a link; of the links that were accepted last."""
 
-    def feed(self, line: bytes) -> None:
-        """Take a line of the log."""
+    def feed(self, line: bytes) -> bool:
+        """Take a line of the log. Returns whether it shows that the router takes in something new.
+
+        It does not while its tables are held; what others send one another may pass all the same.
+        """
         before, self._before = self._before, line
         if line.endswith(_DROPPED):
             if b" is authorized to " in before:
                 self._drop(before, line)
-            return
+            return False
         if not self._caching and b"caching permissions" not in line and self._is_known(line):
-            return  # by far the most
+            return False  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
         if (level := _LEVEL.match(text)) is None:
-            return  # the rest of a line: a key may have line ends
+            return False  # the rest of a line: a key may have line ends
+        caching = _CACHING.search(text)
         found = _THREAD.search(text)
         thread = found[1] if found else ""
         if (checked := _CHECKED.search(text)) is not None:
             self._check(thread, checked, line)
-        elif (caching := _CACHING.search(text)) is not None:
+        elif caching is not None:
             self._caching[thread] = (caching["flow"], caching["key"])
         elif (many := _TOO_MANY.search(text)) is not None:
             who = next((name for zid, name in self._names.items() if zid.startswith(many["zid"])), "somebody")
@@ -102,9 +95,6 @@ class Denials:
             self._remember(line, self._say(news, f"of what {who} does"))
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
-            if len(self.names) >= MOST_LINKS:
-                del self.names[next(iter(self.names))]
-            self.names[accepted["address"]] = accepted["name"]
         elif (nobody := _NOBODY.search(text)) is not None:
             name = self._accepted.get(thread, "somebody")
             self._know(nobody["zid"], name)
@@ -112,6 +102,7 @@ class Denials:
         elif level["level"] in ("WARN", "ERROR"):
             refused = _REFUSED.search(text)
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
+        return caching is not None
 
     def _remember(self, line: bytes, kind: str) -> None:
         if len(self._kind_of) < MOST:
@@ -190,50 +181,3 @@ class Denials:
             self._tell(self._news[kind])
         elif str(times).rstrip("0") == "1":
             self._tell(f"{self._news[kind]} ({times} times)")
-
-
-@contextmanager
-def telling_denials(tell: Callable[[str], None]) -> Iterator[Denials]:
-    """Tell what is refused while the body of `with` runs; Zenoh sessions are opened in it. Once in a process.
-
-    Standard output is Zenoh's meanwhile; Python's `sys.stdout` goes where it went before. tell: waits for no reader.
-    """
-    loop, rest = asyncio.get_running_loop(), b""
-    coming, going = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-    os.set_blocking(going, True)
-    with suppress(ImportError, OSError):
-        from fcntl import F_SETPIPE_SZ, fcntl
-
-        fcntl(going, F_SETPIPE_SZ, PIPE)
-
-    def read() -> None:
-        nonlocal rest
-        with suppress(BlockingIOError):
-            *lines, rest = (rest + os.read(coming, PIPE)).split(b"\n")
-            for line in lines:
-                denials.feed(line)
-
-    before, kept = sys.stdout, os.dup(1)
-    before.flush()
-    denials = Denials(tell)
-    levels = os.environ.get("RUST_LOG")
-    os.environ["RUST_LOG"] = LEVELS
-    zenoh.init_log_from_env_or(LEVELS)
-    if levels is None:
-        del os.environ["RUST_LOG"]
-    else:
-        os.environ["RUST_LOG"] = levels
-    os.dup2(going, 1)
-    sys.stdout = open(kept, "w", closefd=False)  # noqa: SIM115 - closed below
-    loop.add_reader(coming, read)
-    try:
-        yield denials
-    finally:
-        loop.remove_reader(coming)
-        os.dup2(kept, 1)
-        read()
-        with suppress(OSError):
-            sys.stdout.close()
-        sys.stdout = before
-        for each in (kept, coming, going):
-            os.close(each)

@@ -4,7 +4,7 @@ A `session.get` of all states (`keys.of_class`) brings them as they were publish
 timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=json`; `age=SECONDS`, how far back
 commands and events go; `run=RUN`, to ask only that process.
 
-Our own processes ask `@bus/<run>/past`, of one process or of all (`*`), once for all their patterns. They get what is
+Our own processes ask `@bus/<run>/past`, each process by itself, once for all their patterns. They get what is
 missing of a key in one reply, under that key, and at the end one with the `Counts` of all these keys, and when the
 last key was dropped: so they know that all has come, and that there is nothing else.
 """
@@ -63,18 +63,22 @@ class History:
         self._bridge = bridge
         self._sent = sent
         self._open = True
-        self._declared: tuple[Any, ...] = tuple(
-            session.declare_queryable(keys.of_class(kind), bridge.questions(partial(self._asked, kind)))
-            for kind in keys.KEPT_CLASSES
-        )
+        self._begun: set[keys.Flow] = set()
+        self._declared: list[Any] = []
 
-    def begin(self) -> None:
-        """Show that this process has a past from now on, and be asked for it: watchers never have one."""
-        past, log = (keys.own(self._sent.run, subject) for subject in ("past", "log"))
-        self._declared += (
-            self._session.declare_queryable(past, self._bridge.questions(self._missing_asked)),
-            self._session.liveliness().declare_token(log),
-        )
+    def begin(self, flow: keys.Flow) -> None:
+        """Show that this process has a past of this flow from now on, and be asked for it: observers hardly do."""
+        if flow in self._begun:
+            return
+        if not self._begun:
+            self._serve(keys.own(self._sent.run, "past"), self._missing_asked)
+        for kind in keys.FLOWS[flow]:
+            self._serve(keys.of_class(kind), partial(self._asked, kind))
+        self._begun.add(flow)
+        self._declared.append(self._session.liveliness().declare_token(keys.own(self._sent.run, f"log/{flow}")))
+
+    def _serve(self, key: str, asked: Callable[[zenoh.Query], None]) -> None:
+        self._declared.append(self._session.declare_queryable(key, self._bridge.questions(asked)))
 
     def close(self) -> None:
         self._open = False
@@ -88,33 +92,32 @@ class History:
         patterns: Sequence[str],
         run: str,
         missing: Missing,
-        told: Callable[[str, Past], None],
+        told: Callable[[Past], None],
         ended: Callable[[], None],
     ) -> None:
-        """Ask for what is missing on these keys. run: of the process that is asked; empty: all processes.
+        """Ask a process for what is missing on these keys.
 
-        Calls `told` with each process that has answered in full, and its answer; then `ended`. Both on the loop.
+        Calls `told` with its answer, if that is complete, and then `ended`. Both on the loop.
         """
-        answers: dict[str, list[Written]] = {}
+        parts: list[Written] = []
 
         def replied(reply: zenoh.Reply) -> None:
-            if reply.ok is None or reply.replier_id is None:
-                return
             # Zenoh says who answers: no process can answer for another.
-            replier = str(reply.replier_id.zid)
+            if reply.ok is None or reply.replier_id is None or str(reply.replier_id.zid) != run:
+                return
             with suppress(*BAD):  # counts as no answer
-                if (key := str(reply.ok.key_expr)) == keys.own(replier, "counts"):
+                if (key := str(reply.ok.key_expr)) == keys.own(run, "counts"):
                     counts, dropped = _ends.decode(reply.ok.payload.to_bytes())
-                    told(replier, Past(counts, tuple(answers.pop(replier, ())), dropped))
+                    told(Past(counts, tuple(parts), dropped))
                 else:
                     part = _parts.decode(reply.ok.payload.to_bytes())
-                    answers.setdefault(replier, []).extend(one for one in part if one.key == key)
+                    parts.extend(one for one in part if one.key == key)
 
         question = pack(_Question(tuple(patterns), missing))
         if len(question) > MEDIUM:  # all that is kept comes then, and what was there before is known by its count
             question = pack(_Question(tuple(patterns), msgspec.structs.replace(missing, seen={})))
         self._session.get(
-            keys.own(run or "*", "past"),
+            keys.own(run, "past"),
             self._bridge.on_loop(replied, lambda _: ended()),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,

@@ -144,8 +144,8 @@ class ZenohHub(Hub):
             session, self.bridge, self._sent, self.clocks, self._logs, places,
             access.rank if rights is not None else None,
         )  # fmt: skip
-        for name, run in {(bus.name, bus.run) for hub in self.process for bus in hub.shown}:
-            self.peers.names.setdefault(name, set()).add(run)
+        for bus in (each for hub in self.process for each in hub.shown):
+            self.peers.participants.setdefault((bus.part, bus.name), set()).add(bus.run)
         self._history = History(session, self.bridge, self._sent)
         trusts = rights.trusts if rights else None
         self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, self._logs, trusts)
@@ -177,7 +177,7 @@ class ZenohHub(Hub):
     def called(self, name: str) -> str:
         return name if self.rights is None else self.rights.called(name)
 
-    def join(self, name: str, role: str = "manager") -> "ZenohBus":
+    def join(self, name: str, role: str = "") -> "ZenohBus":
         name, role = self.called(name), role if self.rights is None else self.rights.holder.role
         if name in self._buses:
             raise ValueError(f"participant {name!r} is on the bus already")
@@ -186,9 +186,11 @@ class ZenohHub(Hub):
         return bus
 
     async def wait_until_free(self, *names: str) -> None:
+        for name in names:
+            self.peers.see(keys.alive(name, keys.part_of(access.PARTICIPANTS.get(name, ""))))
         await self.peers.wait_for_quiet(QUIET)
         deadline = self._loop.time() + VACANCY
-        while taken := sorted(set(names) & set(self.peers.names)):
+        while taken := sorted(set(names) & self.peers.names.keys()):
             if not await self.peers.change(deadline):
                 reason = f"robot {self.robot!r} has {'this' if len(taken) == 1 else 'these'} on the bus already"
                 advice = "stop what runs there, or give this one another --robot or another endpoint"
@@ -202,15 +204,10 @@ class ZenohHub(Hub):
         """Participants that show their token."""
         return [bus for bus in self._buses.values() if bus.is_shown]
 
-    def note(self, name: str, there: bool) -> None:
+    def note(self, bus: "ZenohBus", there: bool) -> None:
         """Note in all of this process that a participant of this session has come or gone."""
         for hub in self.process:
-            hub.peers.note(name, self.run, there)
-
-    def answers_changed(self) -> None:
-        """Let the questions of this process look for their server again."""
-        for hub in self.process:
-            hub.peers.wake_watchers()
+            hub.peers.note(bus.part, bus.name, self.run, there)
 
     def server(self, key: str) -> Answering | None:
         """The answers of the participant in this process that serves the key, if there is one."""
@@ -258,8 +255,7 @@ class ZenohHub(Hub):
         payload, encoding = published(key, message)
         stamp = self.session.new_timestamp()
         if ordered:
-            if not self._sent.number:
-                self._history.begin()
+            self._history.begin(keys.flow_of(key))
             written = self._sent.write(key, encoding, payload, bus.name, self.clocks.own, now, stamp)
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
@@ -287,7 +283,9 @@ class ZenohHub(Hub):
         recent = self._sent.recent(self._loop.time())
         self._pulse = self._loop.call_later(NEXT_PULSE, self._send_pulse) if recent else None
         if recent:
-            self._publishers.of(keys.own(self.run, "pulse"), True).put(pack(recent), encoding="application/msgpack")
+            for flow, counts in recent.items():
+                pulse = self._publishers.of(keys.own(self.run, f"pulse/{flow}"), True)
+                pulse.put(pack(counts), encoding="application/msgpack")
 
 
 class ZenohBus(Bus):
@@ -297,7 +295,7 @@ class ZenohBus(Bus):
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
         self._subscriptions: list[Subscription | Tap] = []
-        self.answers = Answers(self, hub.session, hub.bridge, hub.run)
+        self.answers = Answers(self, hub.session, hub.bridge)
         self._overflowed = 0
         self._token: Any = None
 
@@ -356,21 +354,29 @@ class ZenohBus(Bus):
             self._hub.rights.check(self.name, "asks", key)
         deadline = self._loop.time() + timeout
         payload, encoding = in_form(key, message, "msgpack")
-        while self._loop.time() < deadline:
-            known = self._hub.peers.changes
-            if (server := self._hub.server(key)) is not None:
-                if (told := await server.ask(key, message, deadline, partial(_sendable, key))) is not None:
-                    return told
-                continue
-            reply = await self._ask(key, payload, encoding, deadline)
-            if reply is not None and reply.ok is not None:
-                return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
-            if reply is not None and reply.err is not None:
-                raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
-            # There is no server, or it died meanwhile: wait until a process comes or goes.
-            if not await self._hub.peers.change(deadline, since=known):
-                break
+        told = await self._try(key, message, payload, encoding, deadline)
+        if told is None:
+            # There is no server, or it died meanwhile.
+            async with self._hub.peers.served(key) as came:
+                while told is None and self._loop.time() < deadline:
+                    await came(deadline, ASK_AGAIN)
+                    told = await self._try(key, message, payload, encoding, deadline)
+        if told is not None:
+            return told
         raise self.unanswered(key, timeout)
+
+    async def _try(
+        self, key: str, message: Message, payload: bytes, encoding: str, deadline: Seconds
+    ) -> Message | None:
+        """Ask the server of this process, or any other; None if none has answered. Raises InputRefused."""
+        if (server := self._hub.server(key)) is not None:
+            return await server.ask(key, message, deadline, partial(_sendable, key))
+        reply = await self._ask(key, payload, encoding, deadline)
+        if reply is not None and reply.ok is not None:
+            return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+        if reply is not None and reply.err is not None:
+            raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
+        return None
 
     async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
         """Ask until the first answer; None once every try has ended without one.
@@ -404,13 +410,12 @@ class ZenohBus(Bus):
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         self.answers.serve(key, answer, empty)
-        self._hub.answers_changed()
 
     def declare_alive(self) -> None:
         if self._token is None and not self._gone:
-            token = keys.own(self._hub.run, f"alive/{self.name}")
+            token = keys.own(self._hub.run, f"alive/{self.part}/{self.name}/{self.clock}")
             self._token = self._hub.session.liveliness().declare_token(token)
-            self._hub.note(self.name, True)
+            self._hub.note(self, True)
 
     @property
     def is_shown(self) -> bool:
@@ -426,7 +431,7 @@ class ZenohBus(Bus):
         self.answers.close()
         if self._token is not None:
             self._token.undeclare()
-            self._hub.note(self.name, False)
+            self._hub.note(self, False)
         self._hub.forget(self.name)
 
 

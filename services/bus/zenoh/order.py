@@ -180,15 +180,15 @@ class SentLog:
         # Who has seen more than there was took a forged state for the last one.
         return one.envelope.nth > seen or (is_state and seen > self.counts[one.key])
 
-    def recent(self, now: Seconds) -> Counts:
-        """Counts of the keys written in the last `PULSE_FOR`: of the last ones, as many as a pulse can have."""
-        found: Counts = {}
+    def recent(self, now: Seconds) -> dict[keys.Flow, Counts]:
+        """Counts of the keys written in the last `PULSE_FOR`, by flow: the last ones, as many as a pulse can have."""
+        found: dict[keys.Flow, Counts] = {}
         size = 0
         for key, at in reversed(self._written_at.items()):
             size += len(key.encode()) + COUNT
             if now - at > PULSE_FOR or size > SMALL - COUNT:
                 break
-            found[key] = self.counts[key]
+            found.setdefault(keys.flow_of(key), {})[key] = self.counts[key]
         return found
 
 

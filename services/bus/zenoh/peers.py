@@ -1,10 +1,15 @@
-"""Peers on the bus, and the questions of processes to one another: for the time, and for a flush."""
+"""Peers on the bus, and the questions of processes to one another: for the time, and for a flush.
+
+A process gets the tokens of those whom it needs to know, and of nobody else: of the robot's participants, of those
+whose presence its own participants subscribe to, and of processes with a past of the flows that they read. Zenoh
+selects by the key. If all got all tokens, those of N clients would cost the router N times N.
+"""
 
 import asyncio
 import re
-from collections.abc import Callable, Collection, Sequence
-from contextlib import suppress
-from typing import Any
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
+from contextlib import asynccontextmanager, suppress
+from typing import Any, TypeVar
 
 import msgspec
 import zenoh
@@ -14,7 +19,7 @@ from engage_hri.schemas.status import Reachable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
 from engage_hri.services.bus.zenoh.history import BAD, finish, pack
-from engage_hri.services.bus.zenoh.order import SentLog
+from engage_hri.services.bus.zenoh.order import Counts, SentLog
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
 FLUSH: Seconds = 2.0
@@ -22,14 +27,16 @@ FLUSH: Seconds = 2.0
 CLOCK_TRIPS = 5
 CLOCK_TIMEOUT: Seconds = 1.0
 
+Key = TypeVar("Key")
+Item = TypeVar("Item")
 _instants = msgspec.msgpack.Decoder(Stamp)
 
 
 class Peers:
     """Liveliness and the questions between processes.
 
-    processes: runs of the processes that are there. publishers: of those that have a past to hand out. names:
-    participants, each with the runs that have it. changes: number of times that a peer has come or gone.
+    Of all that is in sight: participants: part and name of each, with the runs that have it. processes: runs of
+    their processes. publishers: runs that have a past to hand out, and its flows.
     """
 
     def __init__(
@@ -46,11 +53,11 @@ class Peers:
 
         rank: of the process with this run, by its keys: the lowest is believed what time its machine has.
         """
-        self.processes: set[str] = set()
-        self.publishers: set[str] = set()
-        self.names: dict[str, set[str]] = {}
-        self.changes = 0
-        self._places: dict[str, set[str]] = {sent.run: {_without_settings(place) for place in places}}
+        self.participants: dict[tuple[keys.Part, str], set[str]] = {}
+        self.processes: dict[str, set[str]] = {}
+        self.publishers: dict[str, set[keys.Flow]] = {}
+        own_places = {_without_settings(place) for place in places}
+        self._places: dict[str, set[str]] = {sent.run: own_places} if own_places else {}
         """For each process, where others may connect to it; of a client nothing."""
         self.clocks = clocks
         self._loop = asyncio.get_running_loop()
@@ -63,73 +70,104 @@ class Peers:
         self._own = own
         self._rank = rank or (lambda run: 0)
         self._measuring = self._loop.call_later(REFRESH, self._measure_clocks)
+        self._watched: dict[str, Any] = {}
+        """Subscribers to tokens, by the expression for them."""
         self._declared: tuple[Any, ...] = (
             session.declare_queryable(keys.own(sent.run, "clock"), bridge.questions(self._tell_time)),
         )
 
-    def stand(self, on_publisher: Callable[[str], None], on_participant: Callable[[str, str, bool], None]) -> None:
-        """Watch for the others, and show the own process' token, now that it can answer.
+    def stand(
+        self,
+        on_publisher: Callable[[str, keys.Flow], None],
+        on_participant: Callable[[keys.Part, str, str, bool], None],
+    ) -> None:
+        """Watch for the others, and show where the own process listens, now that it can answer.
 
-        on_publisher: called with the run of a process that has published for the first time, or come back.
-        on_participant: called with name and
-        run of a participant, and with True if it has come, False if it has gone.
+        on_publisher: called with the run of a process that has published on this flow for the first time, or come
+        back. on_participant: called with part, name and run of a participant, and with True if it has come, False if
+        it has gone.
         """
         self._on_publisher = on_publisher
         self._on_participant = on_participant
-        liveliness = self._session.liveliness()
-        handler = self._bridge.on_loop(self._token_changed)
-        self._declared += (
-            liveliness.declare_subscriber(keys.ANY_TOKEN, handler, history=True),
-            *(
-                liveliness.declare_token(keys.own(self._sent.run, f"at/{place}"))
-                for place in sorted(self._places[self._sent.run])
-            ),
-            liveliness.declare_token(keys.own(self._sent.run, f"process/{self.clocks.own}")),
-        )
+        self.see(keys.ANY_ROBOT_ALIVE)
+        if places := self._places.get(self._sent.run):
+            self._watch(keys.own("*", "at/*/*"))
+            token = self._session.liveliness().declare_token
+            self._declared += tuple(token(keys.own(self._sent.run, f"at/{place}")) for place in sorted(places))
+
+    def see(self, presence: str) -> None:
+        """Watch for the participants of this expression for their presence, from now on."""
+        self._watch(keys.tokens(presence))
+
+    def hear(self, flow: keys.Flow) -> None:
+        """Watch for processes with a past of this flow, from now on."""
+        self._watch(keys.own("*", f"log/{flow}"))
+
+    def _watch(self, tokens: str) -> None:
+        if not any(keys.includes(known, tokens) for known in self._watched):
+            handler = self._bridge.on_loop(self._token_changed)
+            self._watched[tokens] = self._session.liveliness().declare_subscriber(tokens, handler, history=True)
+
+    @property
+    def names(self) -> dict[str, set[str]]:
+        """Names of participants, each with the runs that have it."""
+        found: dict[str, set[str]] = {}
+        for (_, name), runs in self.participants.items():
+            found.setdefault(name, set()).update(runs)
+        return found
 
     async def wait_for_discovery(self, deadline: Seconds) -> None:
         """Wait until the first other process is known."""
-        while not self.processes and await self.change(deadline):
+        while not (self.processes or self.publishers) and await self.change(deadline):
             pass
 
     async def wait_for_quiet(self, pause: Seconds) -> None:
-        """Wait until no peer has come or gone for this long; returns at once without any other process."""
-        while self.processes and await self.change(self._loop.time() + pause):
+        """Wait until no peer has come or gone for this long; returns at once if there is no link to anybody."""
+        info: Any = self._session.info
+        while info.links() and await self.change(self._loop.time() + pause):
             pass
 
     def close(self) -> None:
         self._measuring.cancel()
-        for declared in reversed(self._declared):
+        for declared in (*self._watched.values(), *reversed(self._declared)):
             declared.undeclare()
 
     # -- liveliness ---------------------------------------------------------------------------------------------
 
     def _token_changed(self, sample: zenoh.Sample) -> None:
-        run, *subject = str(sample.key_expr).split("/")[3:]
+        chunks: list[Any] = str(sample.key_expr).split("/")[3:]
+        run, subject = chunks[0], chunks[1:]
         there = sample.kind == zenoh.SampleKind.PUT
         if run in self._own:
             return
-        if subject[:1] == ["process"] and len(subject) == 2:
-            if there:
-                self.processes.add(run)
-                self._clock_of[run] = subject[1]
-                if subject[1] != self.clocks.own and self._witness(subject[1]) == run:
-                    self.measure_clock(run)
-            else:
-                self.processes.discard(run)
-                self._clock_of.pop(run, None)
-        elif subject == ["log"]:
-            (self.publishers.add if there else self.publishers.discard)(run)
-            if there:
-                self._on_publisher(run)
-        elif subject[:1] == ["at"]:
-            places, place = self._places.setdefault(run, set()), "/".join(subject[1:])
-            (places.add if there else places.discard)(place)
-            if not places:
-                del self._places[run]
-        elif len(subject) == 2 and subject[0] == "alive":
-            self.note(subject[1], run, there)
-        self.wake_watchers()
+        match subject:
+            case ["alive", part, name, clock]:
+                _mark(self.processes, run, f"{part}/{name}", there)
+                if there:
+                    self._has_clock(run, clock)
+                self.note(part, name, run, there)
+            case ["log", flow]:
+                _mark(self.publishers, run, flow, there)
+                if there:
+                    self._on_publisher(run, flow)
+            case ["at", *place]:
+                _mark(self._places, run, "/".join(place), there)
+        if run not in self.processes and run not in self.publishers:
+            self._clock_of.pop(run, None)
+        self._wake_watchers()
+
+    def heard(self, run: str, clock: str, sent: Seconds) -> None:
+        """Take the time, by its clock, at which a process has sent what has just come."""
+        if clock != self.clocks.own:
+            if run in self.publishers:  # whose participants, and so its clock, need not be in sight
+                self._has_clock(run, clock)
+            self.clocks.heard(clock, sent, self._loop.time())
+
+    def _has_clock(self, run: str, clock: str) -> None:
+        if run not in self._clock_of:
+            self._clock_of[run] = clock
+            if clock != self.clocks.own and self._witness(clock) == run:
+                self.measure_clock(run)
 
     def _witness(self, clock: str) -> str:
         """The process that is asked for this clock: of those that say that they have it the first that came.
@@ -147,23 +185,15 @@ class Peers:
                 found.append(Reachable(name, tuple(sorted(places))))
         return tuple(found)
 
-    def note(self, name: str, run: str, there: bool) -> None:
+    def note(self, part: keys.Part, name: str, run: str, there: bool) -> None:
         """Note that a participant has come or gone; the hub does so for those of the own process."""
-        runs = self.names.setdefault(name, set())
-        if there and run not in runs:
-            runs.add(run)
-            self._on_participant(name, run, True)
-        elif not there and run in runs:
-            runs.discard(run)
-            if not runs:
-                self._on_participant(name, run, False)
-        if not runs:
-            del self.names[name]
+        was_there = run in self.participants.get((part, name), ())
+        _mark(self.participants, (part, name), run, there)
+        if there != was_there and (there or (part, name) not in self.participants):
+            self._on_participant(part, name, run, there)
 
-    async def change(self, deadline: Seconds, since: int | None = None) -> bool:
-        """Wait until a peer comes or goes; False at the deadline. since: return at once if `changes` is past it."""
-        if since is not None and self.changes > since:
-            return True
+    async def change(self, deadline: Seconds) -> bool:
+        """Wait until a peer comes or goes; False at the deadline."""
         watcher: asyncio.Future[None] = self._loop.create_future()
         self._watchers.append(watcher)
         timer = self._loop.call_at(deadline, _resolve, watcher)
@@ -175,9 +205,7 @@ class Peers:
             if watcher in self._watchers:
                 self._watchers.remove(watcher)
 
-    def wake_watchers(self) -> None:
-        """Let all who wait for a change look again."""
-        self.changes += 1
+    def _wake_watchers(self) -> None:
         for watcher in self._watchers:
             _resolve(watcher)
         self._watchers.clear()
@@ -251,18 +279,54 @@ class Peers:
         finish(query)
 
     async def flush(self) -> None:
-        """Wait until all known processes have the last messages: an exit right after a put loses most of them."""
+        """Wait until all who read it have the last messages: an exit right after a put loses most of them."""
         recent = self._sent.recent(self._loop.time())
-        if recent and self.processes:
-            done: asyncio.Future[None] = self._loop.create_future()
-            question = pack((self._sent.run, recent))
-            self.ask(keys.ANY_FLUSH, question, lambda reply: None, lambda _: _resolve(done), FLUSH)
-            await done
+        await asyncio.gather(*(self._flush(flow, counts) for flow, counts in recent.items()))
+
+    async def _flush(self, flow: keys.Flow, recent: Counts) -> None:
+        done: asyncio.Future[None] = self._loop.create_future()
+        question = pack((self._sent.run, recent))
+        self.ask(keys.own("*", f"flush/{flow}"), question, lambda reply: None, lambda _: _resolve(done), FLUSH)
+        await done
+
+    @asynccontextmanager
+    async def served(self, key: str) -> AsyncIterator[Callable[[Seconds, Seconds], Awaitable[None]]]:
+        """Watch for servers of a key. Gives what waits for one: until a deadline, or for a pause if one is there."""
+        came, is_there = asyncio.Event(), False
+
+        def changed(status: zenoh.MatchingStatus) -> None:
+            nonlocal is_there
+            if is_there := bool(status.matching):
+                came.set()
+
+        async def wait(deadline: Seconds, pause: Seconds) -> None:
+            with suppress(TimeoutError):
+                async with asyncio.timeout_at(min(deadline, self._loop.time() + pause) if is_there else deadline):
+                    await came.wait()
+            came.clear()
+
+        querier = self._session.declare_querier(key)
+        listener: Any = querier.declare_matching_listener(self._bridge.on_loop(changed))
+        try:
+            yield wait
+        finally:
+            listener.undeclare()
+            querier.undeclare()  # type: ignore[no-untyped-call]
 
 
 def _without_settings(endpoint: str) -> str:
     """The endpoint without what follows `?` or `#`, which cannot be in a key, or is of no use to others."""
     return re.split("[?#]", endpoint)[0]
+
+
+def _mark(sets: dict[Key, set[Item]], key: Key, item: Item, there: bool) -> None:
+    """Put the item into the set of this key, or take it out. An empty set is dropped."""
+    if there:
+        sets.setdefault(key, set()).add(item)
+    elif key in sets:
+        sets[key].discard(item)
+        if not sets[key]:
+            del sets[key]
 
 
 def _resolve(future: "asyncio.Future[None]") -> None:

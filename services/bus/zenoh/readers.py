@@ -1,8 +1,9 @@
 """Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Container, Mapping
 from functools import partial
+from itertools import chain
 from math import inf
 from typing import Any
 
@@ -51,17 +52,18 @@ RUNS_KEPT = 256
 class _Reader:
     """A subscription of the participant `bus`, with its follower of each process, by run.
 
-    kept: those of its patterns that have a past.
+    kept: those of its patterns that have a past. flows: of these.
     """
 
     def __init__(self, bus: Bus, subscription: Subscription | Tap) -> None:
         self.bus = bus
         self.subscription = subscription
-        self.kept = tuple(filter(keys.has_past, subscription.patterns))
+        self.kept = tuple(filter(keys.flows, subscription.patterns))
+        self.flows = frozenset(flow for pattern in self.kept for flow in keys.flows(pattern))
         self.followers: dict[str, Follower] = {}
         self.newest = NewestStates()
 
-    def follower(self, run: str, there: Collection[str], now: Seconds) -> Follower:
+    def follower(self, run: str, there: Container[str], now: Seconds) -> Follower:
         """The follower of a process, also of one that is new. there: processes that are not forgotten for it."""
         follower = self.followers.get(run)
         if follower is None:
@@ -102,12 +104,10 @@ class Readers:
         self._passing: set[str] = set()
         """Processes that pass on what others send, as of the last look."""
         self._looked_at: Seconds = -inf
-        self._flushing: list[tuple[str, zenoh.Query]] = []
+        self._flushing: list[tuple[str, keys.Flow, zenoh.Query]] = []
         self._decoded: tuple[Written, Message | None] | None = None
-        self._declared: tuple[Any, ...] = (
-            session.declare_queryable(keys.own(sent.run, "flush"), bridge.questions(self._flush_asked)),
-            session.declare_subscriber(keys.ANY_PULSE, bridge.samples(self._pulse_heard)),
-        )
+        self._flows: dict[keys.Flow, tuple[Any, ...]] = {}
+        """What is declared for each flow that a subscription has asked for."""
 
     def missed(self, bus: Bus) -> tuple[int, int]:
         """Gaps of one participant, and the number of its messages that were lost for good."""
@@ -116,7 +116,7 @@ class Readers:
 
     def close(self) -> None:
         self._readers.clear()
-        for declared in self._declared:
+        for declared in chain.from_iterable(self._flows.values()):
             declared.undeclare()
 
     def offer(self, written: Written, message: Message, run: str) -> None:
@@ -140,21 +140,42 @@ class Readers:
     def attach(self, bus: Bus, subscription: Subscription | Tap) -> None:
         reader = _Reader(bus, subscription)
         self._readers.append(reader)
-        for name, runs in self._peers.names.items():
+        for (part, name), runs in self._peers.participants.items():
             for run in sorted(runs):
-                self._offer_presence(reader, PeerAlive(participant=name, run=run))
+                self._offer_presence(reader, part, PeerAlive(participant=name, run=run))
         oldest = self._loop.time() - keys.HISTORY_MAX_AGE
         past = (log.past(subscription.wants, Missing(), oldest) for log in self._own.values())
         ours = [(written, run) for run, each in zip(self._own, past, strict=True) for written in each.written]
         for written, run in sorted(ours, key=lambda one: one[0].envelope.sent):
             self._deliver(reader, written, run, past=True)
         for pattern in subscription.patterns:
+            if presence := keys.presence(pattern):
+                self._peers.see(presence)
+            if keys.is_presence(pattern):  # on these keys nothing is published
+                continue
             if pattern not in self._carriers:
                 handler = self._bridge.samples(partial(self._sample_came, pattern))
                 carrier = self._session.declare_subscriber(pattern, handler, allowed_origin=zenoh.Locality.REMOTE)
                 self._carriers[pattern] = (carrier, [])
             self._carriers[pattern][1].append(reader)
-        self._ask(reader, {run: self._follower(reader, run) for run in self._peers.publishers})
+        for run, flows in self._peers.publishers.items():
+            if not flows.isdisjoint(reader.flows):
+                self._ask(reader, run, self._follower(reader, run))
+        for flow in reader.flows - self._flows.keys():
+            self._begin(flow)
+
+    def _begin(self, flow: keys.Flow) -> None:
+        """Follow those who publish on this flow, from the first subscription to it on."""
+        key, questions = (
+            keys.own(self._sent.run, f"flush/{flow}"),
+            self._bridge.questions(partial(self._flush_asked, flow)),
+        )
+        pulses = partial(self._pulse_heard, flow)
+        self._flows[flow] = (
+            self._session.declare_queryable(key, questions),
+            self._session.declare_subscriber(keys.own("*", f"pulse/{flow}"), self._bridge.samples(pulses)),
+        )
+        self._peers.hear(flow)
 
     def detach(self, subscription: Subscription | Tap) -> None:
         self._readers = [reader for reader in self._readers if reader.subscription is not subscription]
@@ -166,7 +187,7 @@ class Readers:
                 carrier.undeclare()
 
     def _follower(self, reader: _Reader, run: str) -> Follower:
-        return reader.follower(run, self._peers.processes, self._loop.time())
+        return reader.follower(run, self._peers.publishers, self._loop.time())
 
     def _sample_came(self, pattern: str, sample: Arrived) -> None:
         if not sample.is_put:
@@ -180,7 +201,7 @@ class Readers:
         written = Written(key, sample.encoding, sample.payload, envelope)
         if not self._is_trusted(written, run):
             return
-        self._peers.clocks.heard(envelope.clock, envelope.sent, self._loop.time())
+        self._peers.heard(run, envelope.clock, envelope.sent)
         for reader in tuple(self._carriers[pattern][1]) if pattern in self._carriers else ():
             # Only the first of overlapping patterns delivers, so that nothing comes twice.
             if reader.subscription.carrier(key) != pattern:
@@ -224,8 +245,8 @@ class Readers:
             return sample.sender
         stamped_by, now = sample.stamped_by, self._loop.time()
         if stamped_by not in self._passing and now - self._looked_at >= LOOK:
-            self._looked_at = now
-            self._passing = {*self._own, *self._peers.processes, *map(str, self._session.info.routers_zid())}
+            self._looked_at, info = now, self._session.info
+            self._passing = {*self._own, *map(str, info.routers_zid()), *map(str, info.peers_zid())}
         return "" if stamped_by in self._passing else stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
@@ -260,31 +281,30 @@ class Readers:
 
     def _catch_up(self, reader: _Reader, run: str, follower: Follower) -> None:
         if follower.behind and not follower.asking:
-            self._ask(reader, {run: follower})
+            self._ask(reader, run, follower)
 
-    def _ask(self, reader: _Reader, waiting: dict[str, Follower], tries: int = 1) -> None:
-        """Ask processes for what is missing: one, or all when a reader comes. waiting: followers, by run."""
-        missing = Missing()
-        for follower in waiting.values():
-            follower.asking, missing = True, follower.missing(self._loop.time())
+    def _ask(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
+        """Ask a process for what is missing."""
+        follower.asking, missing = True, follower.missing(self._loop.time())
+        is_answered = False
 
-        def told(run: str, past: Past | None) -> None:
-            if (follower := waiting.pop(run, None)) is not None:
+        def told(past: Past | None) -> None:
+            nonlocal is_answered
+            if not is_answered:
+                is_answered = True
                 self._told(reader, run, follower, past)
 
         def ended() -> None:
-            for run, follower in tuple(waiting.items()):
-                if run in self._peers.processes and tries < TRIES:
-                    # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
-                    self._ask(reader, {run: follower}, tries + 1)
-                else:
-                    told(run, None)
+            if not is_answered and run in self._peers.publishers and tries < TRIES:
+                # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
+                self._ask(reader, run, follower, tries + 1)
+            else:
+                told(None)
 
-        if reader.kept and waiting:
-            one = next(iter(waiting)) if len(waiting) == 1 else ""
-            self._history.ask(reader.kept, one, missing, told, ended)
+        if reader.kept:
+            self._history.ask(reader.kept, run, missing, told, ended)
         else:
-            ended()
+            told(None)
 
     def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
         follower.asking, known = False, follower.forged
@@ -304,63 +324,68 @@ class Readers:
             self._loop.call_later(UNANSWERED, self._ask_again, reader, run, follower)
 
     def _ask_again(self, reader: _Reader, run: str, follower: Follower) -> None:
-        if reader in self._readers and run in self._peers.processes and not follower.asking:
+        if reader in self._readers and run in self._peers.publishers and not follower.asking:
             follower.behind = True
             self._catch_up(reader, run, follower)
 
-    def publisher_came(self, run: str) -> None:
+    def publisher_came(self, run: str, flow: keys.Flow) -> None:
         for reader in self._readers:
+            if flow not in reader.flows:
+                continue
             follower = self._follower(reader, run)
             # The process may be back after a cut in which messages were lost, or the answer to a question.
             follower.again = follower.asking
             follower.behind = True
             self._catch_up(reader, run, follower)
 
-    def _pulse_heard(self, sample: Arrived) -> None:
+    def _pulse_heard(self, flow: keys.Flow, sample: Arrived) -> None:
         run = keys.run_of(sample.key)
         try:
             pulse = _pulses.decode(sample.payload)
         except BAD:
             self.refused += 1
         else:
-            self._compare(run, pulse)
+            self._compare(run, flow, pulse)
 
-    def _compare(self, run: str, pulse: Counts) -> None:
+    def _compare(self, run: str, flow: keys.Flow, pulse: Counts) -> None:
         if run in self._own:
             return
         for reader in self._readers:
+            if flow not in reader.flows:
+                continue
             follower = self._follower(reader, run)
             follower.pulse(pulse)
             self._catch_up(reader, run, follower)
 
-    def _flush_asked(self, query: zenoh.Query) -> None:
+    def _flush_asked(self, flow: keys.Flow, query: zenoh.Query) -> None:
         try:
             run, pulse = _flushes.decode(query.payload.to_bytes() if query.payload else b"")
         except BAD:  # no process of ours, for it asks all: an answer would be one of each of us
             finish(query)
             return
-        self._compare(run, pulse)
-        self._flushing.append((run, query))
+        self._compare(run, flow, pulse)
+        self._flushing.append((run, flow, query))
         self._answer_flushes()
 
     def _answer_flushes(self) -> None:
         waiting = []
-        for run, query in self._flushing:
-            if any(run in reader.followers and reader.followers[run].behind for reader in self._readers):
-                waiting.append((run, query))
+        for run, flow, query in self._flushing:
+            readers = (each for each in self._readers if flow in each.flows and run in each.followers)
+            if any(each.followers[run].behind for each in readers):
+                waiting.append((run, flow, query))
             else:
-                query.reply(keys.own(self._sent.run, "flush"), b"")
+                query.reply(keys.own(self._sent.run, f"flush/{flow}"), b"")
                 finish(query)
         self._flushing = waiting
 
-    def participant_changed(self, name: str, run: str, there: bool) -> None:
+    def participant_changed(self, part: keys.Part, name: str, run: str, there: bool) -> None:
         message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
         journal.note_presence(message, self.viewer)
         for reader in self._readers:
-            self._offer_presence(reader, message)
+            self._offer_presence(reader, part, message)
 
-    def _offer_presence(self, reader: _Reader, message: PeerAlive | PeerGone) -> None:
-        key = keys.alive(message.participant)
+    def _offer_presence(self, reader: _Reader, part: keys.Part, message: PeerAlive | PeerGone) -> None:
+        key = keys.alive(message.participant, part)
         if not reader.subscription.wants(key):
             return
         if isinstance(reader.subscription, Tap):

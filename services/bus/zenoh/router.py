@@ -1,26 +1,35 @@
 """A router: a process that belongs to no robot, and passes on what the processes of all machines send one another."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import ExitStack, asynccontextmanager, closing
+import os
+import socket
+import time
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from contextlib import ExitStack, asynccontextmanager, closing, suppress
 from typing import Any
 
 import zenoh
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import Holder
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
-from engage_hri.services.bus.zenoh.denials import telling_denials
+from engage_hri.services.bus.zenoh.crowd import Crowd, Link
+from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
 from engage_hri.services.bus.zenoh.sizes import paced
-from engage_hri.services.bus.zenoh.volume import Listening
+from engage_hri.services.bus.zenoh.volume import Listening, place, sockets
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""
+TOGETHER: Seconds = 0.1
+"""Time in which links that are to be ended are gathered: to find them all sockets are looked at."""
+SHOWN: Seconds = 1.0
+"""Time after which it is shown again that something is served."""
 
 
 class Routing:
@@ -45,50 +54,117 @@ class Routing:
 
 @asynccontextmanager
 async def routing(
-    listen: Sequence[str], connect: Sequence[str], tell: Callable[[str], None], keys_of_router: Keys | None = None
+    listen: Sequence[str],
+    connect: Sequence[str],
+    tell: Callable[[str], None],
+    keys_of_router: Keys | None = None,
+    served: Callable[[], None] = lambda: None,
 ) -> AsyncIterator[Routing]:
     """Route while the body of `async with` runs. Gives what tells whether it does.
 
     listen: endpoints at which others connect. connect: other routers. tell: called with a line for each participant
-    that comes or goes, and for what is refused; it waits for no reader. keys_of_router: the router lets in only those
-    that its keys name, and passes on only what the table of access allows them. Raises InputRefused when an endpoint
-    is misspelled, RunFailed when one is taken.
+    that comes or goes; it waits for no reader. served: called, in any thread, at most once
+    in `SHOWN` seconds, while tokens are served: in a rush of clients the router's own question waits behind theirs,
+    and yet it does not hang. keys_of_router: the router lets in only those that its keys name, and passes on only
+    what the table of access allows them. Raises InputRefused when an endpoint is misspelled, RunFailed when one is
+    taken.
     """
     with ExitStack() as stack:
         more: dict[str, object] = {}
-        names: Mapping[str, str] = {}
+        holders: Sequence[Holder] = ()
         if keys_of_router is not None:
             holders = keys_of_router.holders()
             more = {**encrypted(keys_of_router), "access_control": access_control(holders)}
             more["downsampling"] = paced(holders)
-            names = stack.enter_context(telling_denials(tell)).names
+            os.environ["RUST_LOG"] = LEVELS
+            zenoh.init_log_from_env_or(LEVELS)
             own = keys_of_router.holder
             stack.enter_context(closing(Expiry(own.common_name, own.until, LOG.warning)))
-        async with _passing_on(open_router(connect, listen, more), tell, names) as router:
-            yield router
+        session = open_router(connect, listen, more)
+        bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
+        door = Door(session, bridge, Crowd(holders), tell, served)
+        listening = Listening(door.names, tell)
+        try:
+            yield Routing(session, bridge)
+        finally:
+            listening.close()
+            bridge.close()
+            door.close()
+            session.close()  # type: ignore[no-untyped-call]
 
 
-@asynccontextmanager
-async def _passing_on(
-    session: zenoh.Session, tell: Callable[[str], None], names: Mapping[str, str]
-) -> AsyncIterator[Routing]:
-    bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
+class Door:
+    """Tells who comes and goes, and ends the links of those who take too much."""
 
-    def changed(sample: zenoh.Sample) -> None:
-        robot, _, rest = str(sample.key_expr).partition("/")
-        subject = rest.split("/")[4:]
-        if len(subject) == 2 and subject[0] == "alive":
-            there = "here" if sample.kind == zenoh.SampleKind.PUT else "gone"
-            tell(printable(f"{robot}: {subject[1]} is {there}"))
+    def __init__(
+        self,
+        session: zenoh.Session,
+        bridge: LoopBridge,
+        crowd: Crowd,
+        tell: Callable[[str], None],
+        served: Callable[[], None],
+    ) -> None:
+        """tell, served: see `routing`."""
+        self.names: dict[str, str] = {}
+        """Common names by the address at the other end of a link."""
+        self._crowd = crowd
+        self._tell = tell
+        self._served = served
+        self._served_at = 0.0
+        self._loop = asyncio.get_running_loop()
+        self._ending: set[Link] = set()
+        info: Any = session.info
+        token_changed = bridge.on_loop(self._token_changed, first=self._show)
+        self._declared: tuple[Any, ...] = (
+            info.declare_link_events_listener(bridge.on_loop(self._link_changed), history=True),
+            session.liveliness().declare_subscriber(f"*/{keys.ANY_OWN}", token_changed, history=True),
+        )
 
-    watching = session.liveliness().declare_subscriber(
-        f"*/{keys.ANY_TOKEN}", bridge.on_loop(changed), history=True
-    )  # fmt: skip
-    listening = Listening(names, tell)
-    try:
-        yield Routing(session, bridge)
-    finally:
-        listening.close()
-        bridge.close()
-        watching.undeclare()  # type: ignore[no-untyped-call]
-        session.close()  # type: ignore[no-untyped-call]
+    def close(self) -> None:
+        for declared in self._declared:
+            declared.undeclare()
+
+    def _show(self) -> None:
+        """Show that a token was served, in Zenoh's thread: the loop itself may wait for the router's tables."""
+        if (now := time.monotonic()) >= self._served_at + SHOWN:
+            self._served_at = now
+            self._served()
+
+    def _token_changed(self, sample: zenoh.Sample) -> None:
+        key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+        robot, _, token = key.partition("/")
+        run = keys.run_of(token)
+        match token.split("/")[4:]:
+            case ["alive", _, name, _]:
+                self._tell(printable(f"{robot}: {name} is {'here' if is_there else 'gone'}"))
+        if is_there:
+            self._keep_out(*self._crowd.shown(run, key, self._loop.time()))
+        else:
+            self._crowd.withdrawn(run, key)
+
+    def _link_changed(self, event: zenoh.LinkEvent) -> None:
+        zid, name, address = str(event.link.zid), event.link.auth_identifier or "", str(event.link.dst)
+        link = Link(zid, name, address)
+        if event.kind == zenoh.SampleKind.PUT:
+            if name:
+                self.names[place(address)] = name
+            self._keep_out(*self._crowd.came(link, self._loop.time()))
+        else:
+            self.names.pop(place(address), None)
+            self._crowd.went(link)
+
+    def _keep_out(self, line: str, links: Iterable[Link]) -> None:
+        if line:
+            self._tell(printable(line))
+        if links and not self._ending:
+            self._loop.call_later(TOGETHER, self._end)
+        self._ending.update(links)
+
+    def _end(self) -> None:
+        """End links: Zenoh cannot, so their sockets are shut down, which it takes for the other side's doing."""
+        ending = {place(link.address) for link in self._ending}
+        self._ending.clear()
+        for where, each in sockets():
+            if where in ending:
+                with suppress(OSError):  # it has ended by itself
+                    each.shutdown(socket.SHUT_RDWR)

@@ -14,11 +14,8 @@ EVERY_KIND = (
     "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",
     "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
 )  # fmt: skip
-ANYTHING = ("**", f"*/{keys.ANY_TOKEN}")
+ANYTHING = ("**", f"*/{keys.ANY_OWN}")
 """Expressions for all keys: no wildcard includes the `@` of the bus' own."""
-_ANY_PAST = tuple(map(keys.of_class, keys.KEPT_CLASSES))
-"""What all processes answer about what they have published. Each reply is checked under its own key, also one to a
-question on `@bus/<run>/past`."""
 
 
 def access_control(holders: Iterable[Holder]) -> dict[str, Any]:
@@ -57,26 +54,37 @@ def _grants(holder: Holder) -> Iterator[tuple[str, str, tuple[str, ...]]]:
         for does in ("publishes", "subscribes", "serves", "asks")
     )
     runs = f"{holder.mark}$*"
-    answered = tuple(keys.own(runs, subject) for subject in ("past", "counts", "clock", "flush"))
-    shown = (
-        keys.own(runs, "process/*"), keys.own(runs, "log"), keys.own(runs, "at/**"), keys.own(runs, "answers/**"),
-        *_named((keys.own(runs, f"alive/{OWN}"),), holder.name),
-    )  # fmt: skip
-    asked = tuple(keys.own("*", subject) for subject in ("past", "clock", "flush"))
-    yield "ingress", "put", (*publishes, keys.own(runs, "pulse"))
-    yield "ingress", "declare_subscriber", (*subscribes, keys.ANY_PULSE)
-    yield "ingress", "declare_queryable", (*serves, *answered, *_ANY_PAST)
+    told = tuple(dict.fromkeys(flow for key in publishes for flow in keys.flows(key)))
+    heard = tuple(dict.fromkeys(flow for key in subscribes for flow in keys.flows(key)))
+    # What a process answers about what it has published. Each reply is checked under its own key, also one to a
+    # question on `@bus/<run>/past`.
+    past = tuple(keys.of_class(kind) for flow in told for kind in keys.FLOWS[flow])
+    answered = tuple(
+        keys.own(runs, each) for each in ("past", "counts", "clock", *(f"flush/{flow}" for flow in heard))
+    )
+    asked = tuple(keys.own("*", each) for each in ("past", "clock", *(f"flush/{flow}" for flow in told)))
+    pulses = tuple(keys.own("*", f"pulse/{flow}") for flow in heard)
+    # Tokens have keys of fixed depth, with known words but for names, runs and clocks.
+    own = keys.tokens(keys.alive(OWN, keys.part_of(holder.role))).replace("/*/", f"/{runs}/", 1)
+    shown = (*_named((own,), holder.name), *(keys.own(runs, f"log/{flow}") for flow in told))
+    seen = tuple(
+        dict.fromkeys(keys.tokens(each) for each in (keys.ANY_ROBOT_ALIVE, *map(keys.presence, subscribes)) if each)
+    )
+    seen += tuple(keys.own("*", f"log/{flow}") for flow in heard)
+    yield "ingress", "put", (*publishes, *(keys.own(runs, f"pulse/{flow}") for flow in told))
+    yield "ingress", "declare_subscriber", (*subscribes, *pulses)
+    yield "ingress", "declare_queryable", (*serves, *answered, *past)
     yield "ingress", "reply", (*serves, *answered, *publishes)
     yield "ingress", "query", (*asks, *asked, *subscribes)
     yield "ingress", "liveliness_token", shown
-    yield "ingress", "declare_liveliness_subscriber", (keys.ANY_TOKEN,)
-    yield "ingress", "liveliness_query", (keys.ANY_TOKEN,)
-    yield "egress", "put", (*subscribes, keys.ANY_PULSE)
-    yield "egress", "declare_subscriber", (keys.EVERYTHING, keys.ANY_TOKEN)
-    yield "egress", "declare_queryable", (keys.EVERYTHING, keys.ANY_TOKEN)
-    yield "egress", "query", (*serves, access.ANY_STATUS, keys.ANY_TOKEN, *_ANY_PAST)
-    yield "egress", "reply", (*asks, *subscribes, keys.ANY_TOKEN)
-    yield "egress", "liveliness_token", (keys.ANY_TOKEN,)
+    yield "ingress", "declare_liveliness_subscriber", seen
+    yield "ingress", "liveliness_query", seen
+    yield "egress", "put", (*subscribes, *pulses)
+    yield "egress", "declare_subscriber", (keys.EVERYTHING, keys.ANY_OWN)
+    yield "egress", "declare_queryable", (keys.EVERYTHING, keys.ANY_OWN)
+    yield "egress", "query", (*serves, access.ANY_STATUS, keys.ANY_OWN, *past)
+    yield "egress", "reply", (*asks, *subscribes, keys.ANY_OWN)
+    yield "egress", "liveliness_token", seen
 
 
 def _named(rows: Iterable[str], name: str) -> Iterator[str]:

@@ -5,6 +5,8 @@ import json
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from random import uniform
 from secrets import token_hex
 from typing import Any
 
@@ -14,7 +16,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.config import ADVICE, is_encrypted, is_endpoint, is_on_this_machine
+from engage_hri.services.bus.config import ADVICE, ENDPOINT, is_encrypted, is_endpoint, is_on_this_machine
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.sizes import bounded
@@ -43,10 +45,19 @@ RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
 ROUTER_MS = 2000
 """Time that one try to reach a router may take, in which the loop stands still: nothing runs on it yet. Any link has
 this time to open."""
-TRY_AGAIN: Seconds = 0.25
+TRY_AGAIN: tuple[Seconds, Seconds] = (0.25, 4.0)
+"""First and longest pause before a router is called again: each is up to twice the one before, by chance. Else all
+whom a router has lost would come back at once, and again at once if that is too much for it."""
 TELL_AFTER: Seconds = 3.0
 """Time without a router after which it is told that there is none."""
 RETRY_MS = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+"""Pauses of a process with a link that broke. Each process has up to twice these, by chance."""
+MOST_SESSIONS = 4096
+"""Links that a router gives. Zenoh's default is 1000."""
+COMING = 1024
+"""Of these, how many may be about to open."""
+KNOCK: Seconds = 2.0
+"""Time that a connection has to open, when it is asked whether anybody is there."""
 BATCH = 256
 CROWD = 262_144
 """Number of messages waiting for the loop from which on even ordered ones are dropped (and asked for again)."""
@@ -108,6 +119,7 @@ async def open_client(robot: str, connect: Sequence[str], keys: Keys | None = No
     _check(*connect)
     loop = asyncio.get_running_loop()
     tell_at = loop.time() + TELL_AFTER
+    pause, longest = TRY_AGAIN
     more = {} if keys is None else {**encrypted(keys), "id": f"{keys.holder.mark}{token_hex(12)}"}
     while True:
         try:
@@ -115,12 +127,26 @@ async def open_client(robot: str, connect: Sequence[str], keys: Keys | None = No
         except zenoh.ZError:
             if loop.time() > tell_at:
                 tell_at = float("inf")
-                where = ", ".join(connect)
-                advice = "`engage router --listen ENDPOINT` starts one"
-                if keys is not None:
-                    advice += "; one that refuses our certificate says why in its log"
-                LOG.warning("no router answers at %s; waiting (%s)", where, advice)
-        await asyncio.sleep(TRY_AGAIN)
+                LOG.warning("%s; waiting (%s)", *await _why_no_link(connect, keys is not None))
+        await asyncio.sleep(pause * uniform(0.5, 1.0))
+        pause = min(2 * pause, longest)
+
+
+async def _why_no_link(connect: Sequence[str], with_keys: bool) -> tuple[str, str]:
+    """Say that no router gives a link, and what to do: Zenoh tells the same of one that is full and of none."""
+    for endpoint in connect:
+        match = ENDPOINT.fullmatch(endpoint)
+        assert match is not None, "they have been checked"
+        with suppress(OSError):  # a refused call, or none: TimeoutError is one
+            async with asyncio.timeout(KNOCK):
+                _, writer = await asyncio.open_connection(match["host"].strip("[]"), int(match["port"]))
+            writer.close()
+            other = "it refuses our certificate" if with_keys else "it lets in only who has keys"
+            return (
+                f"{endpoint} is open, but gives no link",
+                f"the router there is full, or {other}: its log says which",
+            )
+    return f"no router answers at {', '.join(connect)}", "`engage router --listen ENDPOINT` starts one"
 
 
 def open_router(connect: Sequence[str], listen: Sequence[str], more: Mapping[str, object] = {}) -> zenoh.Session:
@@ -128,7 +154,8 @@ def open_router(connect: Sequence[str], listen: Sequence[str], more: Mapping[str
 
     more: further settings of Zenoh.
     """
-    return open_session(None, connect, listen, None, "router", more)[0]
+    room = {"transport/unicast/max_sessions": MOST_SESSIONS, "transport/unicast/accept_pending": COMING}
+    return open_session(None, connect, listen, None, "router", {**room, **more})[0]
 
 
 def encrypted(keys: Keys) -> dict[str, object]:
@@ -166,7 +193,7 @@ def _config(
         # on an endpoint where nobody listens yet.
         "connect/exit_on_failure": mode == "client",
         "connect/timeout_ms": ROUTER_MS if mode == "client" else -1,
-        "connect/retry": RETRY_MS,
+        "connect/retry": RETRY_MS | {each: int(RETRY_MS[each] * uniform(1.0, 2.0)) for each in list(RETRY_MS)[:2]},
         "transport/unicast/open_timeout": ROUTER_MS,  # else close() waits 10 s, for one behind a cut
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": True,
@@ -248,15 +275,28 @@ class LoopBridge:
         self._woken_at = 0.0
         self._open = True
 
-    def on_loop(self, enter: Callable[[Any], None], end: Callable[[Any], None] | None = None) -> Any:
-        """Make a handler for tokens, or for replies: `enter` runs on the loop with each, `end` at last."""
+    def on_loop(
+        self,
+        enter: Callable[[Any], None],
+        end: Callable[[Any], None] | None = None,
+        first: Callable[[], None] | None = None,
+    ) -> Any:
+        """Make a handler for tokens, or for replies: `enter` runs on the loop with each, `end` at last.
+
+        first: called with each in Zenoh's thread. It must not wait.
+        """
+
+        def came(item: Any) -> None:
+            if first is not None:
+                first()
+            self._let_in(enter, item)
 
         def ended() -> None:
             if end is not None:
                 self._let_in(end, None)
 
         # indirect=False: else Zenoh starts a Python thread for each of these.
-        return zenoh.handlers.Callback(lambda item: self._let_in(enter, item), ended, indirect=False)
+        return zenoh.handlers.Callback(came, ended, indirect=False)
 
     def questions(self, enter: Callable[[zenoh.Query], None]) -> Any:
         """Make a handler for a queryable. A question that is dropped ends without an answer."""

@@ -13,7 +13,7 @@ from engage_hri.schemas.limits import BESIDE, LARGEST, MOST_PULSES, most
 
 MOST_IN_PARTS = LARGEST + 2 * BESIDE
 """Bytes of a message that Zenoh puts together again; it drops a longer one in the middle, and the link stays."""
-_OF_THE_BUS = tuple(keys.own("*", subject) for subject in ("pulse", "past", "counts", "clock", "flush"))
+_OF_THE_BUS = tuple(keys.own("*", subject) for subject in ("pulse/*", "past", "counts", "clock", "flush/*"))
 _DATA = ("put", "delete", "query", "reply")
 
 
@@ -44,7 +44,7 @@ def paced(holders: Iterable[Holder]) -> list[dict[str, Any]]:
     Zenoh passes on one message in a span of time, and drops the next ones. So only what comes again has a rate.
     """
     rules = [
-        {"key_expr": f"{holder.robot}/{keys.own(f'{holder.mark}$*', 'pulse')}", "freq": float(MOST_PULSES)}
+        {"key_expr": f"{holder.robot}/{keys.own(f'{holder.mark}$*', 'pulse/*')}", "freq": float(MOST_PULSES)}
         for holder in holders
         if holder.role != ROUTER
     ]

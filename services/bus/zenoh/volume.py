@@ -79,10 +79,15 @@ class Listening:
         self._timer = self._loop.call_later(LOOK, self._look)
 
 
+def place(endpoint: str) -> str:
+    """Host and port of an endpoint."""
+    return endpoint.partition("/")[2]
+
+
 def volumes() -> dict[str, Volume]:
     """Volume of each TCP link of this process, by its other end. Nothing where no kernel tells."""
     found = {}
-    for where, link in _links():
+    for where, link in sockets():
         with suppress(OSError, AttributeError, struct.error):
             told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _COUNTS + 16)
             taken, brought = struct.unpack_from("QQ", told, _COUNTS)
@@ -90,7 +95,7 @@ def volumes() -> dict[str, Volume]:
     return found
 
 
-def _links() -> Iterator[tuple[str, socket.socket]]:
+def sockets() -> Iterator[tuple[str, socket.socket]]:
     """The sockets of this process that have another end, and where that is. Zenoh's stay Zenoh's."""
     try:
         numbers = [int(each) for each in os.listdir("/proc/self/fd")]

@@ -26,7 +26,7 @@ from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.seats import Seats
 
 PATTERNS = (
-    *FOLLOWED, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
+    *FOLLOWED, keys.ANY_ALIVE, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
     keys.ANY_PERCEIVED_ONGOING,
 )  # fmt: skip
 """Expressions for all that the window shows."""

@@ -63,7 +63,7 @@ class Attacker:
 
     @property
     def puts(self) -> list[str]:
-        return [*self.may("publishes"), keys.own(self.run, "pulse")]
+        return [*self.may("publishes"), keys.own(self.run, "pulse/news")]
 
     @property
     def questions(self) -> list[str]:
@@ -112,7 +112,7 @@ def as_large_as_allowed(by: Attacker) -> None:
 
 def pulses(by: Attacker) -> None:
     """Small pulses, as fast as the link takes them."""
-    by.put(keys.own(by.run, "pulse"), b"\x80")
+    by.put(keys.own(by.run, "pulse/news"), b"\x80")
 
 
 def small_messages(by: Attacker) -> None:

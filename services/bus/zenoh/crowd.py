@@ -1,0 +1,88 @@
+"""Bounds of what one holder may take of a router: links and tokens are counted; who has too many is cut. Pure.
+
+Zenoh bounds neither for one holder: a thousand links leave no place for others, and with the number of tokens of one
+link the time grows that each further one costs (measured: 5000 tokens 0.5 s of processor, 20,000 tokens 20 s).
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from engage_hri.schemas.access import Holder
+from engage_hri.schemas.units import Seconds
+
+MOST_LINKS = 100
+"""Links of one certificate."""
+MOST_TOKENS = 1000
+"""Tokens of one certificate; without keys, of one process. A process of ours has some three, and a robot a dozen."""
+BANNED: Seconds = 30.0
+"""Time in which who had too many gets no new link."""
+
+
+class Link(NamedTuple):
+    """A link of the router. zid: of the process at its other end. name: that in its certificate, if it has one.
+
+    address: of its other end, as Zenoh writes it.
+    """
+
+    zid: str
+    name: str
+    address: str
+
+
+class Crowd:
+    """Counts of links and tokens by holder; without keys of tokens alone, by process, for it has one link."""
+
+    def __init__(self, holders: Iterable[Holder] = ()) -> None:
+        self._marks = {holder.mark: holder.common_name for holder in holders}
+        self._links: dict[str, set[Link]] = {}
+        self._tokens: dict[str, set[str]] = {}
+        self._banned: dict[str, Seconds] = {}
+        """Time until which each gets no link."""
+
+    def came(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
+        """Take a new link; returns the line to tell, and the links to end."""
+        who = _owner(link)
+        own = self._links.setdefault(who, set())
+        own.add(link)
+        if self._banned.get(who, now) > now:
+            return "", (link,)
+        return self._too_many(who, "links", MOST_LINKS, now) if link.name and len(own) > MOST_LINKS else ("", ())
+
+    def went(self, link: Link) -> None:
+        """Take the end of a link."""
+        who = _owner(link)
+        if (own := self._links.get(who)) is not None:
+            own.discard(link)
+            if not own:
+                del self._links[who]
+
+    def shown(self, run: str, token: str, now: Seconds) -> tuple[str, tuple[Link, ...]]:
+        """Take a new token of the process with this id; returns as `came`."""
+        who = self._holder(run)
+        own = self._tokens.setdefault(who, set())
+        own.add(token)
+        return self._too_many(who, "tokens", MOST_TOKENS, now) if len(own) > MOST_TOKENS else ("", ())
+
+    def withdrawn(self, run: str, token: str) -> None:
+        """Take the end of a token."""
+        who = self._holder(run)
+        if (own := self._tokens.get(who)) is not None:
+            own.discard(token)
+            if not own:
+                del self._tokens[who]
+
+    def _holder(self, run: str) -> str:
+        return next((name for mark, name in self._marks.items() if run.startswith(mark)), run)
+
+    def _too_many(self, who: str, what: str, most: int, now: Seconds) -> tuple[str, tuple[Link, ...]]:
+        if self._banned.get(who, now) > now:
+            return "", ()
+        self._banned = {each: until for each, until in self._banned.items() if until > now} | {who: now + BANNED}
+        links = tuple(self._links.get(who, ()))
+        name = next((link.name for link in links), "") or f"process {who}"
+        told = f"too many: {name} has more than {most} {what}; its links end, and it gets none for {BANNED:g} s"
+        return told, links
+
+
+def _owner(link: Link) -> str:
+    return link.name or link.zid

@@ -1,0 +1,80 @@
+"""Who has too many links or tokens at a router: counted by certificate, cut at the bound, let in again later."""
+
+from engage_hri.schemas.access import Holder
+from engage_hri.services.bus.zenoh.crowd import BANNED, MOST_LINKS, MOST_TOKENS, Crowd, Link
+
+ALICE = Holder(robot="robot", role="manager", name="alice")
+BOB = Holder(robot="robot", role="manager", name="bob")
+
+
+def link(holder: Holder | None, number: int) -> Link:
+    name = holder.common_name if holder else ""
+    return Link(f"{holder.mark if holder else ''}{number}", name, f"tls/127.0.0.1:{number}")
+
+
+def test_one_link_more_than_the_bound_ends_all_of_that_certificate_and_no_other() -> None:
+    crowd = Crowd((ALICE, BOB))
+    crowd.came(link(BOB, 0), 0.0)
+    assert all(crowd.came(link(ALICE, number), 0.0) == ("", ()) for number in range(MOST_LINKS))
+
+    line, ended = crowd.came(link(ALICE, MOST_LINKS), 0.0)
+
+    assert ALICE.common_name in line
+    assert str(MOST_LINKS) in line
+    assert set(ended) == {link(ALICE, number) for number in range(MOST_LINKS + 1)}
+
+
+def test_who_goes_makes_room() -> None:
+    crowd = Crowd((ALICE,))
+    for number in range(3 * MOST_LINKS):
+        assert crowd.came(link(ALICE, number), 0.0) == ("", ())
+        crowd.went(link(ALICE, number))
+
+
+def test_who_had_too_many_gets_no_link_for_a_while_and_then_gets_one() -> None:
+    crowd = Crowd((ALICE, BOB))
+    for number in range(MOST_LINKS + 1):
+        crowd.came(link(ALICE, number), 0.0)
+    for number in range(MOST_LINKS + 1):
+        crowd.went(link(ALICE, number))
+
+    assert crowd.came(link(ALICE, 1000), BANNED - 0.1) == ("", (link(ALICE, 1000),))
+    assert crowd.came(link(BOB, 1001), BANNED - 0.1) == ("", ())
+    crowd.went(link(ALICE, 1000))
+    assert crowd.came(link(ALICE, 1002), BANNED) == ("", ())
+
+
+def test_tokens_of_all_processes_of_a_certificate_count_together() -> None:
+    crowd = Crowd((ALICE, BOB))
+    links = {link(ALICE, number) for number in range(2)}
+    for each in links:
+        crowd.came(each, 0.0)
+    for number in range(MOST_TOKENS):
+        assert crowd.shown(f"{ALICE.mark}{number % 2}", f"token-{number}", 0.0) == ("", ())
+        assert crowd.shown(f"{ALICE.mark}{number % 2}", f"token-{number}", 0.0) == ("", ()), "the same token again"
+
+    line, ended = crowd.shown(f"{ALICE.mark}7", "one more", 0.0)
+
+    assert ALICE.common_name in line
+    assert set(ended) == links
+    assert crowd.shown(f"{ALICE.mark}7", "and another", 1.0) == ("", ()), "it is told once"
+
+
+def test_tokens_that_are_withdrawn_do_not_count() -> None:
+    crowd = Crowd((ALICE,))
+    for number in range(3 * MOST_TOKENS):
+        assert crowd.shown(f"{ALICE.mark}1", f"token-{number}", 0.0) == ("", ())
+        crowd.withdrawn(f"{ALICE.mark}1", f"token-{number}")
+
+
+def test_without_keys_tokens_are_counted_by_process_and_links_not_at_all() -> None:
+    crowd = Crowd()
+    for number in range(3 * MOST_LINKS):
+        assert crowd.came(link(None, number), 0.0) == ("", ())
+    for number in range(MOST_TOKENS):
+        assert crowd.shown("7", f"token-{number}", 0.0) == ("", ())
+
+    line, ended = crowd.shown("7", "one more", 0.0)
+
+    assert "process 7" in line
+    assert ended == (link(None, 7),)
