@@ -11,7 +11,7 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
@@ -19,7 +19,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
+from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish, refuse
 from engage_hri.services.bus.zenoh.order import (
     Counts,
     Envelope,
@@ -360,7 +360,8 @@ class Readers:
     def _flush_asked(self, flow: keys.Flow, query: zenoh.Query) -> None:
         try:
             run, pulse = _flushes.decode(query.payload.to_bytes() if query.payload else b"")
-        except BAD:  # no process of ours, for it asks all: an answer would be one of each of us
+        except BAD as error:
+            refuse(query, Fault(reason=str(error)), "json")
             finish(query)
             return
         self._compare(run, flow, pulse)
