@@ -1,4 +1,4 @@
-"""What is told of messages that are refused again and again. Pure: time is an argument."""
+"""Counts of messages that are refused again and again: which of them to tell. Pure: time is an argument."""
 
 from collections import Counter
 

@@ -104,15 +104,22 @@ async def test_one_item_waits_for_a_share_of_a_flood_only():
     assert bridge._came == bridge._left == {}
 
 
-async def test_who_has_gone_has_nothing_more_to_say():
+async def test_a_token_overtakes_no_message_of_its_process_that_waits():
     robot, end = f"gone-{os.getpid()}", free_endpoint()
     here, there = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
     await acquainted(here, there)
     inbox, loud = here.join("here").subscribe(keys.FEEDBACK, keys.ANY_ALIVE), there.join("loud")
     loud.declare_alive()
     await matched(there, keys.FEEDBACK)
+    loud.publish(keys.FEEDBACK, state(0))
+    async with asyncio.timeout(PATIENCE):
+        while (first := await inbox.next()) is None or isinstance(first.message, PeerAlive):
+            pass  # from then on no message waits for the answer to a question about the past
     for number in range(10 * PLACES):
         loud.publish(keys.FEEDBACK, state(number))
+    deadline = asyncio.get_running_loop().time() + PATIENCE
+    while here.bridge.waiting < 10 * PLACES:  # nothing runs on the loop meanwhile
+        assert asyncio.get_running_loop().time() < deadline
     loud._token.undeclare()
     loud._token = None
 

@@ -252,7 +252,7 @@ class LoopBridge:
 
     A callback appends an item and wakes the loop if need be, nothing else: any waiting there stalls the link. On the
     loop each sender has its turn (`Turns`): who floods is served with the others, and not before them. The token of a
-    process takes its turn among the messages of that process, so who has gone has nothing more to say.
+    process takes its turn among the messages of that process, and overtakes none of them.
     Messages of a process of which too much waits are dropped, and questions if there are too many. Who comes and
     goes, and the answers to what was asked here, come in any case: nobody would ask for them again.
     """
