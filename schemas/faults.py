@@ -61,11 +61,14 @@ class Fault(Struct, frozen=True, kw_only=True, tag="fault", omit_defaults=True):
                 force_setattr(self, name, text.encode("utf-8", "backslashreplace").decode())
 
     def at(self, where: str, line: int = 0) -> "Fault":
-        """The same fault, told of something that it has ended."""
+        """Make the same fault, told of something that it has ended: `where`, and its line; 0: the same line."""
         return replace(self, where=where, line=line or self.line)
 
     def following(self, reason: str, where: str) -> "Fault":
-        """Fault of something that ended as something else did: of the same cause, and that is told in the reason."""
+        """Make the fault of something that ended as something else did, of the same cause.
+
+        reason: what has ended; this fault's reason is added to it. where: its place.
+        """
         return replace(self, reason=f"{reason}: {self.reason}", where=where, line=0, advice="")
 
     def within(self, *names: str) -> str:

@@ -71,7 +71,7 @@ async def _listen(
             raw = mark + b"(a line too long to show)\n"
         if not raw:
             return has_shown, False
-        if not raw.startswith(mark) and not other(raw):
+        if not raw.startswith(mark) and not other(raw.rstrip(b"\n")):
             continue
         deadline = loop.time() + (SILENCE if has_shown else BEGINNING)
         if not raw.startswith(mark):

@@ -196,7 +196,7 @@ class _Control:
         self.desk.accept(request.id)
         for live in meant:
             why = Fault(
-                reason="the body aborted it", where=request.behavior, cause="cancelled", whose=request.requester
+                reason="aborted on request", where=request.behavior, cause="cancelled", whose=request.requester
             )
             live.stop(why)
             self._revoke(live, request.how)

@@ -5,10 +5,12 @@ A disk that is full keeps chunks waiting, up to a limit; then the newest are dro
 
 import mmap
 import os
+import tempfile
 import time
 import zlib
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -32,7 +34,6 @@ class RecordingFile:
     def __init__(self, path: Path, facts: Mapping[str, str], tell: Tell, *, overwrite: bool = False) -> None:
         """Raises InputRefused: it cannot be written, or there is one already."""
         self.path = path
-        self.writer = Writer()
         self.dropped = 0
         self.written = 0
         self.slowest: Seconds = 0.0
@@ -42,6 +43,7 @@ class RecordingFile:
         self._trouble = ""
         self.is_removed = False
         self._is_elsewhere = False
+        self._asides = ExitStack()
         try:
             self._file = descriptor.opened(path, overwrite=overwrite)
         except BlockingIOError as error:
@@ -53,9 +55,13 @@ class RecordingFile:
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
         try:
+            self._channels = self._asides.enter_context(closing(Aside(path.parent)))
+            self._chunks = self._asides.enter_context(closing(Aside(path.parent)))
+            self.writer = Writer(self._channels, self._chunks)
             self._append(self.writer.begin(facts))
             _sync_folder(path)
         except OSError as error:
+            self._asides.close()
             os.close(self._file)
             path.unlink(missing_ok=True)  # else it would be in the way of the next attempt
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
@@ -74,6 +80,8 @@ class RecordingFile:
                 offset = self.written
                 self._append(self._waiting[0].data)
                 self.writer.placed(self._waiting.popleft(), offset)
+            self._channels.flush()
+            self._chunks.flush()
             os.fdatasync(self._file)
             if not self._stay():
                 return False
@@ -114,13 +122,20 @@ class RecordingFile:
                 self.dropped += sum(each.messages for each in self._waiting)
                 return False
             self._append(self.writer.told("end", note, self.written))
-            self._append(self.writer.finish(self.written, self._checksum))
+            begun = self.written
+            try:
+                for piece in self.writer.finish(begun, self._checksum):
+                    self._append(piece)
+            except OSError:
+                os.ftruncate(self._file, begun)
+                raise
             os.fdatasync(self._file)
         except OSError as error:
             self._complain(f"{error.strerror}; the end of the file is missing")
             return False
         finally:
             os.close(self._file)
+            self._asides.close()
         return True
 
     def _append(self, data: bytes) -> None:
@@ -140,6 +155,32 @@ class RecordingFile:
         if trouble != self._trouble:
             self._trouble = trouble
             self.tell(f"{self.path}: {trouble}")
+
+
+class Aside:
+    """Records that wait for the end of a recording, in a nameless file in its folder, which goes with the process."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  # until `close`
+        self._waiting = bytearray()
+
+    def append(self, record: bytes) -> None:
+        self._waiting += record
+
+    def flush(self) -> None:
+        """Put on the disk what waits. Raises OSError: some of it waits on."""
+        while self._waiting:
+            del self._waiting[: self._file.write(self._waiting)]
+
+    def __iter__(self) -> Iterator[bytes]:
+        """All of them, in pieces; then there is no more to append."""
+        self._file.seek(0)
+        while piece := self._file.read(descriptor.PIECE):
+            yield piece
+        yield bytes(self._waiting)
+
+    def close(self) -> None:
+        self._file.close()
 
 
 def read(path: Path) -> Recording:
@@ -171,11 +212,14 @@ def repair(path: Path) -> int:
                 last.message_index_offsets[index.channel_id] = until + len(tail)
                 tail += written(index)
             last.message_index_length = len(tail)
+    checksum = zlib.crc32(tail, recording.checksum(until))
+    channels, chunks = map(written, contents.channels), map(written, contents.chunks)
     try:
         with path.open("r+b") as file:
             file.truncate(until)
             file.seek(until)
-            file.write(tail + end(contents, until + len(tail), zlib.crc32(tail, recording.checksum(until))))
+            file.write(tail)
+            file.writelines(end(contents, channels, chunks, until + len(tail), checksum))
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:

@@ -102,7 +102,7 @@ class Recording:
         """Place of the first chunk with such messages, and their number, by what is wrong with them."""
         self._mark = Mark(number=-1, of="")
         """The last one that was read."""
-        self._contents = Contents([], [], [], [], Counter())
+        self._contents = Contents()
         self._chunks: list[tuple[int, int]] = []
         """Begin and end of each chunk's content in the file."""
         self._indexed: ChunkIndex | None = None
@@ -381,13 +381,11 @@ class Recording:
                     marks.append(msgspec.json.decode(body[_MESSAGE.size :], type=Mark))
                 found.append((log_time, id, place))
         self._follow(marks, at)
-        for id, told in channels.items():
-            if id not in self._channels:
-                self._contents.channels.append(told)
-            self._channels[id] = told
+        new = [told for id, told in channels.items() if id not in self._channels]
+        self._contents.channels += new
+        self._channels |= channels
         known_schemas = {each.id for each in self._contents.schemas}
         self._contents.schemas += [each for each in schemas if each.id not in known_schemas]
-        self._contents.counts += Counter(id for _, id, _ in found)
         self._indexed = ChunkIndex(
             chunk_length=end - at, chunk_start_offset=at, compression=chunk.compression,
             compressed_size=len(chunk.data), message_end_time=max((each[0] for each in found), default=0),
@@ -395,6 +393,7 @@ class Recording:
             message_index_offsets={}, uncompressed_size=len(content),
         )  # fmt: skip
         self._contents.chunks.append(self._indexed)
+        self._contents.count(self._indexed, Counter(id for _, id, _ in found), len(new))
         number = len(self._chunks)
         self._chunks.append((at + _HEAD.size, end))
         for log_time, id, place in found:

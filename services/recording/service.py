@@ -19,6 +19,7 @@ from engage_hri.services.recording.form import JSON, MSGPACK, kept
 from engage_hri.services.recording.losses import CLOCK, LOST, MORE, Losses, Offset
 from engage_hri.services.recording.reading import BILLION
 from engage_hri.services.recording.writing import Line
+from engage_hri.services.runtime.absent import Absent
 
 FLUSH: Seconds = 0.4
 """Longest time that a message waits until its chunk goes to the disk: a recorder that is killed loses no more."""
@@ -46,6 +47,7 @@ class Recorder:
         self._wall = wall
         self._known_before = bus.health.dropped
         self._lines: dict[tuple[object, ...], Line] = {}
+        self._heard: Absent[tuple[object, ...]] = Absent()
         self._offsets: dict[str, Seconds] = {}
         self._still: Seconds = 0.0
 
@@ -65,6 +67,7 @@ class Recorder:
                 self._own(MORE, msgspec.msgpack.encode(sample), MSGPACK)
                 return
             self._lines[name] = line
+        self._heard.leaves(name, self._bus.now())
         log_time = self._nanoseconds(sample.at)
         sent = self._bus.local(Stamp(sample.clock, sample.sent)) if sample.clock else sample.at
         self._file.writer.add(line, form.data, log_time, self._nanoseconds(sent), sample.number)
@@ -84,14 +87,16 @@ class Recorder:
         )
 
     def look(self) -> None:
-        """Note what has changed of other machines' clocks and of what was lost, and write to the disk."""
+        """Note what has changed of other machines' clocks and of what was lost, and forget who was long silent."""
+        for name in self._heard.forgotten(self._bus.now()):
+            self._file.writer.forget(self._lines.pop(name))
         changed = {
             each.clock: Offset(offset=each.offset, error=each.error)
             for each in self._bus.health.clocks
             if self._offsets.get(each.clock) != each.offset
         }
         if changed:
-            self._offsets |= {clock: told.offset for clock, told in changed.items()}
+            self._offsets = {each.clock: each.offset for each in self._bus.health.clocks}
             self._own(CLOCK, msgspec.json.encode(changed))
         health = self._bus.health
         losses = Losses(

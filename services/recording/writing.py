@@ -8,9 +8,11 @@ the library's own code.
 import json
 import zlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
+from hashlib import blake2b
+from typing import Protocol
 
 import msgspec
 import zstandard
@@ -33,7 +35,7 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
-from msgspec import Struct
+from msgspec import Struct, field
 
 from engage_hri.schemas.export import bundle
 from engage_hri.services.recording.form import JSON
@@ -78,7 +80,7 @@ _MARKS = Line(topic=CHUNK, form=JSON)
 
 
 class Sealed(Struct):
-    """A chunk that is not in the file yet. index: its offsets count from its own beginning. lines: new in it.
+    """A chunk that is not in the file yet. index: its offsets count from its own beginning. channels: told in it.
 
     messages: number of those of the bus.
     """
@@ -87,14 +89,26 @@ class Sealed(Struct):
     index: ChunkIndex
     counts: Counter[int]
     messages: int
-    lines: tuple[Line, ...]
-    has_schema: bool
+    channels: list[Channel]
+
+
+class Records(Protocol):
+    """Records that wait for the end of the file: a list, or a file of its own, for they grow with the recording."""
+
+    def append(self, record: bytes, /) -> None: ...
+
+    def __iter__(self) -> Iterator[bytes]:
+        """All of them in their order, in pieces of any size."""
 
 
 class Writer:
-    """The records of one file. waiting: messages that are in no chunk yet."""
+    """The records of one file. waiting: messages that are in no chunk yet.
 
-    def __init__(self) -> None:
+    Its memory is bounded, if its user forgets lines: of each channel it keeps two numbers and a digest of 16 bytes.
+    """
+
+    def __init__(self, channels: Records | None = None, chunks: Records | None = None) -> None:
+        """channels, chunks: where to put their records for the end of the file; in memory by default."""
         self.waiting = 0
         self._of_bus = 0
         self._facts: Mapping[str, str] = {}
@@ -104,15 +118,17 @@ class Writer:
         self._compressor = zstandard.ZstdCompressor(level=LEVEL)
         self._indices: dict[int, MessageIndex] = {}
         self._first = self._last = 0
-        self._channels: dict[Line, Channel] = {}
-        self._written: set[Line] = set()
-        """Lines whose channel is in the file, or in a chunk on its way there."""
-        self._new: list[Line] = []
-        self._schema: Schema | None = None
+        self._channels: dict[Line, int] = {}
+        """Ids of the lines that were heard of late."""
+        self._channel_ids: dict[bytes, int] = {}
+        """Ids of all lines, by digest: whoever comes back gets the same channel."""
+        self._untold: set[int] = set()
+        """Channels that are in no chunk on its way to the file, since theirs was dropped."""
+        self._new: list[Channel] = []
         self._has_schema = False
-        self._chunks: list[ChunkIndex] = []
-        self._metadata: list[MetadataIndex] = []
-        self._counts = Counter[int]()
+        self._totals = Totals()
+        self._told: Records = [] if channels is None else channels
+        self._chunks: Records = [] if chunks is None else chunks
 
     @property
     def size(self) -> int:
@@ -129,7 +145,7 @@ class Writer:
     def told(self, name: str, metadata: Mapping[str, str], offset: int) -> bytes:
         """Facts about the recording, to be written at this offset."""
         data = written(Metadata(name=name, metadata=dict(metadata)))
-        self._metadata.append(MetadataIndex(offset=offset, length=len(data), name=name))
+        self._totals.metadata.append(MetadataIndex(offset=offset, length=len(data), name=name))
         return data
 
     def add(self, line: Line, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
@@ -158,25 +174,31 @@ class Writer:
 
     def knows(self, line: Line) -> bool:
         """True if a message of this line needs no further channel, or there is room for one."""
-        return line in self._channels or len(self._channels) < MOST_CHANNELS
+        return len(self._channel_ids) < MOST_CHANNELS or line in self._channels or _digest(line) in self._channel_ids
+
+    def forget(self, line: Line) -> None:
+        """Forget a line that was not heard of for long, but not its channel."""
+        self._channels.pop(line, None)
 
     def _channel(self, line: Line) -> int:
-        channel = self._channels.get(line)
-        if channel is None:
+        id = self._channels.get(line)
+        if id is None:
+            new = len(self._channel_ids) + 1
+            id = self._channels[line] = self._channel_ids.setdefault(_digest(line), new)
+            if id == new:
+                self._untold.add(id)
+        if id in self._untold:
+            self._untold.remove(id)
             schema = SCHEMA if line.key and line.form == JSON else 0
-            channel = self._channels[line] = Channel(
-                id=len(self._channels) + 1, topic=line.topic, message_encoding=line.form, schema_id=schema,
-                metadata=line.metadata(),
-            )  # fmt: skip
-        if line not in self._written:
-            if channel.schema_id and not self._has_schema:
+            channel = Channel(
+                id=id, topic=line.topic, message_encoding=line.form, schema_id=schema, metadata=line.metadata()
+            )
+            if schema and not self._has_schema:
                 self._has_schema = True
-                self._schema = self._schema or _schema()
-                self._schema.write(self._chunk)
+                _schema().write(self._chunk)
             channel.write(self._chunk)
-            self._written.add(line)
-            self._new.append(line)
-        return channel.id
+            self._new.append(channel)
+        return id
 
     def seal(self) -> Sealed | None:
         """End the chunk and begin another. None: it has no messages."""
@@ -203,8 +225,7 @@ class Writer:
             ),
             Counter({channel: len(index.records) for channel, index in self._indices.items()}),
             self._of_bus,
-            tuple(self._new),
-            self._schema is not None and any(self._channels[line].schema_id for line in self._new),
+            self._new,
         )  # fmt: skip
         self._indices, self.waiting, self._of_bus, self._new = {}, 0, 0, []
         self._number += 1
@@ -213,66 +234,90 @@ class Writer:
     def placed(self, sealed: Sealed, offset: int) -> None:
         """Note that a chunk is in the file, at this offset."""
         offsets = {channel: offset + at for channel, at in sealed.index.message_index_offsets.items()}
-        self._chunks.append(replace(sealed.index, chunk_start_offset=offset, message_index_offsets=offsets))
-        self._counts += sealed.counts
+        index = replace(sealed.index, chunk_start_offset=offset, message_index_offsets=offsets)
+        self._chunks.append(written(index))
+        for channel in sealed.channels:
+            self._told.append(written(channel))
+            if channel.schema_id:
+                self._totals.schemas = [_schema()]
+        self._totals.count(index, sealed.counts, len(sealed.channels))
 
     def dropped(self, sealed: Sealed) -> None:
         """Note that the last chunk will never be in the file: what it told of its channels has to be told again."""
         self._number -= 1
-        self._written -= set(sealed.lines)
-        if sealed.has_schema:
+        self._untold |= {channel.id for channel in sealed.channels}
+        if any(channel.schema_id for channel in sealed.channels):
             self._has_schema = False
 
-    def finish(self, offset: int, checksum: int) -> bytes:
+    def finish(self, offset: int, checksum: int) -> Iterator[bytes]:
         """End of the file, to be written at this offset, behind the last chunk. checksum: of all before."""
-        channels = [channel for line, channel in self._channels.items() if line in self._written]
-        schemas = [] if self._schema is None else [self._schema]
-        return end(Contents(schemas, channels, self._chunks, self._metadata, self._counts), offset, checksum)
+        return end(self._totals, self._told, self._chunks, offset, checksum)
 
 
-class Contents(Struct):
-    """Everything in a file that its end has to tell of. counts: number of messages by channel."""
+class Totals(Struct):
+    """Contents of the end of a file, but for its channels and chunks, which are only counted."""
 
-    schemas: list[Schema]
-    channels: list[Channel]
-    chunks: list[ChunkIndex]
-    metadata: list[MetadataIndex]
-    counts: Counter[int]
+    schemas: list[Schema] = []
+    metadata: list[MetadataIndex] = []
+    statistics: Statistics = field(
+        default_factory=lambda: Statistics(
+            attachment_count=0, channel_count=0, channel_message_counts={}, chunk_count=0, message_count=0,
+            message_start_time=0, message_end_time=0, metadata_count=0, schema_count=0,
+        )
+    )  # fmt: skip
 
-    def statistics(self) -> Statistics:
-        return Statistics(
-            attachment_count=0, channel_count=len(self.channels), channel_message_counts=dict(self.counts),
-            chunk_count=len(self.chunks), message_count=self.counts.total(), metadata_count=len(self.metadata),
-            message_start_time=min((each.message_start_time for each in self.chunks), default=0),
-            message_end_time=max((each.message_end_time for each in self.chunks), default=0),
-            schema_count=len(self.schemas),
-        )  # fmt: skip
+    def count(self, chunk: ChunkIndex, counts: Counter[int], channels: int) -> None:
+        """Count a chunk. counts: its messages by channel. channels: number of those that no chunk before told of."""
+        known, begin = self.statistics, chunk.message_start_time
+        known.message_start_time = min(known.message_start_time, begin) if known.chunk_count else begin
+        known.message_end_time = max(known.message_end_time, chunk.message_end_time)
+        known.chunk_count += 1
+        known.channel_count += channels
+        known.message_count += counts.total()
+        for channel, number in counts.items():
+            known.channel_message_counts[channel] = known.channel_message_counts.get(channel, 0) + number
 
 
-def end(contents: Contents, offset: int, checksum: int) -> bytes:
-    """End of a file, to be written at this offset: where everything is, for readers that seek.
+class Contents(Totals):
+    """Everything in a file that its end has to tell of."""
 
-    checksum: CRC-32 of all bytes before.
+    channels: list[Channel] = []
+    chunks: list[ChunkIndex] = []
+
+
+def end(
+    totals: Totals, channels: Iterable[bytes], chunks: Iterable[bytes], offset: int, checksum: int
+) -> Iterator[bytes]:
+    """End of a file, to be written at this offset, piece by piece: where everything is, for readers that seek.
+
+    channels, chunks: their records. checksum: CRC-32 of all bytes before.
     """
-    data = written(DataEnd(data_section_crc=checksum))
-    start = offset + len(data)
-    groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-        (Opcode.SCHEMA, contents.schemas),
-        (Opcode.CHANNEL, contents.channels),
-        (Opcode.STATISTICS, [contents.statistics()]),
-        (Opcode.CHUNK_INDEX, contents.chunks),
-        (Opcode.METADATA_INDEX, contents.metadata),
+    yield (data := written(DataEnd(data_section_crc=checksum)))
+    start = at = offset + len(data)
+    known = totals.statistics
+    known.metadata_count, known.schema_count = len(totals.metadata), len(totals.schemas)
+    groups: list[tuple[Opcode, Iterable[bytes]]] = [
+        (Opcode.SCHEMA, map(written, totals.schemas)),
+        (Opcode.CHANNEL, channels),
+        (Opcode.STATISTICS, [written(known)]),
+        (Opcode.CHUNK_INDEX, chunks),
+        (Opcode.METADATA_INDEX, map(written, totals.metadata)),
     ]
-    summary, told = b"", b""
-    for opcode, records in groups:
-        begin = len(summary)
-        summary += b"".join(map(written, records))
-        if records:
-            told += written(SummaryOffset(opcode, start + begin, len(summary) - begin))
-    footer = written(Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0))
-    crc = zlib.crc32(summary + told + footer[:-4])
-    footer = written(Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=crc))
-    return data + summary + told + footer + MCAP0_MAGIC
+    crc, told = 0, b""
+    for opcode, pieces in groups:
+        begin = at
+        for piece in pieces:
+            crc, at = zlib.crc32(piece, crc), at + len(piece)
+            yield piece
+        if at > begin:
+            told += written(SummaryOffset(opcode, begin, at - begin))
+    footer = written(Footer(summary_start=start, summary_offset_start=at, summary_crc=0))
+    crc = zlib.crc32(told + footer[:-4], crc)
+    yield told + written(Footer(summary_start=start, summary_offset_start=at, summary_crc=crc)) + MCAP0_MAGIC
+
+
+def _digest(line: Line) -> bytes:
+    return blake2b(msgspec.msgpack.encode(line), digest_size=16).digest()
 
 
 @cache

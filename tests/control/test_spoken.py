@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,6 +35,16 @@ def test_a_speech_without_marks_is_given_as_it_is() -> None:
     speech = Speech(id="s", text="Just words, 5 * 3.", markup="Just <emphasis>words</emphasis>, 5 * 3.")
 
     assert spoken(speech) is speech
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner", "factor"), [("0", "-40", 0.5), ("+11", "-40", 2 ** (-1 / 12)), ("-11", "+40", 2 ** (1 / 12))]
+)
+def test_each_shift_of_a_voice_is_an_octave_at_most(outer: str, inner: str, factor: float) -> None:
+    markup = f'<prosody pitch="{outer}st">a <prosody pitch="{inner}st">low</prosody> one</prosody>'
+    pitches = {each.start: each.pitch for each in spans(given_to("a low one", markup=markup))}
+
+    assert pitches[2] == pytest.approx(factor)
 
 
 def test_markup_stays_around_its_words() -> None:

@@ -85,6 +85,21 @@ async def test_an_event_nobody_decides_delays_the_outcome_only_so_long(hub: Memo
         assert now() == 3.0
 
 
+@pytest.mark.parametrize("gone", ["dropped", "interrupted"])
+async def test_an_event_that_is_lost_after_its_start_does_not_delay_the_outcome(hub: MemoryHub, gone: str) -> None:
+    """Recognition may refuse it after its start: then nobody will ever decide it."""
+    async with stage(hub, GenerationConfig(decision_patience=3.0)) as partners:
+        pending = partners.send(refers())
+        await partners.fragment_block("show")
+        partners.reach("show", "ref-event", "start")
+        partners.end(partners.request("show"), **{gone: ("ref-event",)})
+        outcome = await pending.outcome
+
+        assert isinstance(outcome, FragmentOutcome)
+        assert "ref-event was never decided" not in outcome.warnings
+        assert now() == 0.0
+
+
 async def test_without_recognition_the_realizers_word_counts(hub: MemoryHub) -> None:
     async with stage(hub) as partners:
         pending = partners.send(refers())

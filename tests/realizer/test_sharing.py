@@ -4,14 +4,16 @@ import asyncio
 from collections.abc import Callable
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Gesture, Head, Mark, Pointing, Posture, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.services.realizer.plan.assembly import Assembler
 from engage_hri.services.realizer.plan.handover import Arrangement
-from engage_hri.services.realizer.plan.known import Known, holders_of, qualified
+from engage_hri.services.realizer.plan.known import Holder, Known, holders_of, qualified
 from engage_hri.services.realizer.plan.planner import plan_block
+from engage_hri.services.realizer.plan.sharing import needless_turns
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
@@ -364,3 +366,22 @@ def test_who_takes_a_part_after_a_stroke_by_plan_waits_for_that_stroke() -> None
 
     assert times[Point("a:q", "stroke_end")] < 0.75 < times[Point("a:q", "end")]
     assert [str(point) for point in plan.foreign] == ["a:q:stroke_end"]
+
+
+@pytest.mark.parametrize(("sync", "is_needless"), [("stroke_end", False), ("relax", True), ("end", True)])
+def test_nobody_waits_for_a_way_home_that_another_saves(sync: str, is_needless: bool) -> None:
+    """The way home begins with the first point after the stroke: who comes third waits for the second alone."""
+    body = FakeBody()
+    ours, second, third = (Gesture(id=id, lexeme="BEAT", mode="RIGHT_HAND") for id in ("first", "second", "third"))
+    chain = {each.id: plan_block(block((each,)), [body.estimate(each)]).chains[each.id] for each in (second, third)}
+    holder = plan_block(block((ours,)), [body.estimate(ours)]).chains["first"]
+    holder = replace(holder, points=tuple(Point("x:first", each.sync) for each in holder.points))
+    turn = ("third", Point("x:first", sync))
+    found = needless_turns(
+        {turn, ("third", Point("second", "end"))},
+        {"x:first": "second"},
+        Known(holders={"x:first": Holder(holder, is_natural=True, kept=frozenset())}),
+        chain,
+    )
+
+    assert found == ({turn} if is_needless else set())

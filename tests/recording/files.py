@@ -48,7 +48,7 @@ def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True
     if not is_whole:
         return data
     data += writer.told("end", {"messages": str(len(samples)), "lost": "0"}, len(data))
-    return data + writer.finish(len(data), crc32(data))
+    return data + b"".join(writer.finish(len(data), crc32(data)))
 
 
 def recording(samples: Sequence[Sample], chunk: int = 7) -> Recording:

@@ -389,7 +389,8 @@ async def test_an_id_that_is_too_long_is_refused_and_not_remembered(hub: MemoryH
     states = client.subscribe(keys.ANY_REQUEST_STATE)
     async with Requester(client) as requests:
         with pytest.raises(RequestRefused, match=f"an id of {LONGEST + 1} letters; at most {LONGEST}"):
-            await requests.send(keys.BLOCK, block(long)).outcome
+            await (pending := requests.send(keys.BLOCK, block(long))).outcome
+    assert (pending.key, pending.request) == (keys.BLOCK, block(long))  # who logs the refusal says what was refused
     assert len(states) == 0
 
     command(client, keys.BLOCK, block(long))

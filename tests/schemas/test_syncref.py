@@ -112,6 +112,8 @@ def test_the_spelling_of_bml_1_0_has_one_meaning_and_its_way_back(name: str, typ
 
 def test_the_draft_spelling_is_the_systems_own() -> None:
     assert canonical_sync("ready", "gaze", "draft") == "ready"
+    assert canonical_sync("attackPeak", "face", "draft") == "ready"
+    assert canonical_sync("attackPeak", "gesture", "draft") == "attackPeak"  # a gesture has none
     assert dialect_sync("stroke_start", "gaze", "draft") == "stroke_start"
 
 

@@ -14,7 +14,16 @@ from engage_hri.schemas.documents.json_codec import decode_json, encode_json, re
 from engage_hri.schemas.export import EXPORTED
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.schemas.tool import DESCRIPTION, FILE, PARTS, Format, ToolInput, input_schema, tool_definition
+from engage_hri.schemas.tool import (
+    DESCRIPTION,
+    FILE,
+    PARTS,
+    Format,
+    ToolInput,
+    input_schema,
+    tool_definition,
+    unlisted,
+)
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 
@@ -181,6 +190,25 @@ def test_a_known_world_leaves_only_its_ids_and_tells_what_they_look_like() -> No
     assert refer["refer"]["description"].endswith("There are: cup-1 (red cup), red-square.")
     assert look["look"]["enum"] == ["cup-1", "red-square", "table", "ann"]
     assert made["properties"]["addressee"]["enum"] == ["", "ann"]
+
+
+@pytest.mark.parametrize(("people", "objects"), [(300, 300), (240, 480), (0, 480), (490, 10), (10, 950), (600, 600)])
+def test_the_ids_of_a_big_world_stay_within_the_values_that_a_schema_may_list(people: int, objects: int) -> None:
+    """OpenAI's strict functions take 1000 values in all; a list that does not fit is left out whole."""
+    world = World(
+        entities=(
+            *(Entity(id=f"p{n}", kind="person", position=(1.0, 0.0, 1.0)) for n in range(people)),
+            *(Entity(id=f"o{n}", kind="object", position=(1.0, 0.0, 1.0)) for n in range(objects)),
+        )
+    )
+
+    def values(schema: object) -> int:
+        if isinstance(schema, dict):
+            return sum(map(values, schema.values()))
+        return len(schema) + sum(map(values, schema)) if isinstance(schema, list) else 0
+
+    assert values(input_schema(world)) <= 1000
+    assert ("look" in unlisted(world)) == (people + objects > 480)
 
 
 def test_an_empty_world_forbids_nothing() -> None:

@@ -49,6 +49,8 @@ class Decisions:
         self.lateness_watch = LatenessWatch(config)
         self._unwatched: set[str] = set()
         """Behaviors about which there is news, so that another report of theirs is to be expected than before."""
+        self._asked_at: dict[str, Seconds] = {}
+        """Time at which each behavior was really asked to begin (see `count_from`)."""
         self._asking: dict[str, Point] = {}
         """Behaviors that were told to pass a point, and are to ask again: something was held since."""
         self._kept_back: set[str] = set()
@@ -300,6 +302,15 @@ class Decisions:
         )  # fmt: skip
         return min((at for at in alarms if at is not None), default=None)
 
+    def count_from(self, behavior: str, now: Seconds) -> None:
+        """Count from now on how late a behavior is with its start: the body is not asked before.
+
+        A loop that is late asks long after this was decided. The body cannot be blamed for that.
+        """
+        self._asked_at[behavior] = now
+        self.lateness_watch.acquit(behavior)
+        self._watch(behavior, now)
+
     def _watch(self, behavior: str, now: Seconds) -> None:
         """Expect the next report of a behavior that is under way."""
         chain, facts = self.plan.chains.get(behavior), self.facts
@@ -311,7 +322,8 @@ class Decisions:
         if number >= len(points) or waits or facts.is_held(behavior):
             self.lateness_watch.forget(behavior)
             return
-        since = facts.reached[points[number - 1]] if number else facts.begun[behavior]
+        begun = self._asked_at.get(behavior, facts.begun[behavior])
+        since = facts.reached[points[number - 1]] if number else begun
         natural = chain.segments[number - 1].natural if number else 0.0
         asked = self.foresight.asked(points[number], since + natural)
         granted = self.grants.granted_at[behavior] if is_there else 0.0

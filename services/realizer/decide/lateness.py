@@ -68,6 +68,11 @@ class LatenessWatch:
         self._awaited.pop(behavior, None)
         self._alarms.clear(behavior)
 
+    def acquit(self, behavior: str) -> None:
+        """Forget that the behavior was late: it had not been asked."""
+        self.forget(behavior)
+        self._warned.discard(behavior)
+
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next call of `overdue` that may find something; None if no report is expected."""

@@ -131,6 +131,7 @@ class BehaviorRun:
     async def _by_body(self, behavior: BlockBehavior) -> None:
         block = self._block
         block.route(block.body.id(self.id))
+        block.decisions.count_from(self.id, block.bus.now())
         try:
             outcome = await self._send().outcome
         except (RequestRefused, NeverEnded) as error:

@@ -264,6 +264,8 @@ class BlockPerformance:
         match effect:
             case Begin(behavior=id) | Extend(behavior=id):
                 self._runs[id].command(effect)
+            case Late(behavior=id) | Stalled(behavior=id) if not self._runs[id].is_by_body:
+                self.decisions.count_from(id, self.bus.now())  # this loop is late: its task has not had its turn
             case Late():
                 if not self._shared.peers.has_left("control"):
                     self.report.overdue(self.decisions, effect)
