@@ -39,7 +39,7 @@ PURE_MACHINERY = {
     "services/client/chunking.py",
     "services/client/event_stream.py", "services/client/person_actions.py", "services/client/shared_world.py",
     "services/client/utterances.py",
-    "services/bus/samples.py", "services/bus/payloads.py",
+    "services/bus/samples.py", "services/bus/payloads.py", "services/bus/often.py", "services/bus/zenoh/turns.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
@@ -55,7 +55,8 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation realizer recognition"
     " simulation study > client > recording > requests > runtime > bus > tangram text",
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
-    "services/bus": "memory zenoh > answering > interface > payloads subscription > samples > config journal keyring",
+    "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often"
+    " > config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"
     " > actions blame estimates refusals spoken switching told unheard waiting > live warned > body"

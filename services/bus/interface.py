@@ -7,20 +7,26 @@ the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a 
 import asyncio
 import logging
 import platform
+import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine, Iterator
 from math import inf
 from typing import Any, Self
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.access import PARTICIPANTS
 from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.requests import Request, kind_of, life_of
+from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
+from engage_hri.services.bus.often import Often
+from engage_hri.services.bus.payloads import unreadable
+from engage_hri.services.bus.samples import sender_of
 from engage_hri.services.bus.subscription import CAPACITY as CAPACITY
 from engage_hri.services.bus.subscription import Keep as Keep
 from engage_hri.services.bus.subscription import Reading as Reading
@@ -61,6 +67,7 @@ class Bus(ABC):
         self._loop = asyncio.get_running_loop()
         self._gone = False
         self._is_told_unsent = False
+        self._refused = Often()
 
     @property
     @abstractmethod
@@ -130,6 +137,31 @@ class Bus(ABC):
         self.failures += 1
         self.log.error("%s: %s", self.name, fault)
         self._complain(fault)
+
+    def tell_refused(self, fault: Fault, of: str) -> bool:
+        """Tell a fault of what another program sent. False: not this time, for that has sent the like many times.
+
+        of: that program, as far as it is known.
+        """
+        kind = f"{fault.where} {re.sub('[0-9]+', '0', fault.reason)}"
+        times = self._refused.tell(of, kind, self.now())
+        if times:
+            reason = fault.reason if times == 1 else f"{fault.reason} ({times} times)"
+            self.publish(keys.fault(self.name), replace(fault, reason=reason, service=self.name))
+        return times > 0
+
+    def unreadable(self, error: EngageError, sample: Sample) -> Unreadable | None:
+        """Tell of a bad payload as a fault. Returns the notice for the server of its key, if that is to have one.
+
+        Somebody may wait for the end of a request or a block whose id can be read: of each there is a notice. Nobody
+        waits for one without an id: of those there is a notice whenever the fault is told.
+        """
+        key, is_told = sample.key, False
+        if not keys.matches(keys.ANY_FAULT, key):  # else two services could tell one another of it for ever
+            where = f"{key} from {sample.source or 'a stranger'}"
+            is_told = self.tell_refused(replace(error.fault, where=where), sender_of(sample))
+        notice = unreadable(error, key, sample.payload, sample.encoding)
+        return notice if notice is not None and (is_told or notice.id or notice.block) else None
 
     def _complain(self, fault: Fault) -> None:
         try:

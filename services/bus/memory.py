@@ -29,7 +29,7 @@ from engage_hri.services.bus.interface import (
     Subscription,
     Tap,
 )
-from engage_hri.services.bus.payloads import LOCAL, read_payload, unreadable
+from engage_hri.services.bus.payloads import LOCAL, read_payload
 from engage_hri.services.bus.subscription import KEYS_KEPT
 
 
@@ -136,11 +136,10 @@ class MemoryHub(Hub):
         for bus in tuple(self._buses.values()):
             bus.show(sample, self.sent)
         for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
-            bus.publish(keys.fault(bus.name), msgspec.structs.replace(error.fault, where=key, service=bus.name))
-        refused = unreadable(error, key, sample.payload, sample.encoding)
-        if refused is not None and (server := self._buses.get(keys.server_of(key))):
-            self.sent += 1
-            server.deliver(Received(key, refused, "", self._loop.time(), life=sample.life), self.sent)
+            notice = bus.unreadable(error, sample)
+            if notice is not None and bus.name == keys.server_of(key):
+                self.sent += 1
+                bus.deliver(Received(key, notice, "", self._loop.time(), life=sample.life), self.sent)
 
     def _pass_on(self, sender: str, received: Received, sample: Sample) -> None:
         self.sent += 1

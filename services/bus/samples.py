@@ -2,6 +2,7 @@
 
 from msgspec import Struct
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 
@@ -39,3 +40,8 @@ class Sample(Struct, frozen=True):
     number: int = 0
     clock: str = ""
     sent: Seconds = 0.0
+
+
+def sender_of(item: Received | Sample) -> str:
+    """Name of its sender, as far as it is known: its process, and the requester in its key."""
+    return f"{item.life} {keys.requester_of(item.key)}"

@@ -42,6 +42,7 @@ from engage_hri.schemas.requests import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received
+from engage_hri.services.bus.samples import sender_of
 from engage_hri.services.requests import asking_effects, serving_effects
 from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
@@ -298,14 +299,14 @@ class RequestDesk:
                 "%s: %s comes from %r; it counts as the sender's own", self._server, what, requester
             )
         if (fault := borrowed(message.life, received, self._server)) is not None:
-            self._bus.publish(keys.fault(self._server), fault)
+            self._bus.tell_refused(fault, sender_of(received))
             return None
         if requester != message.requester or not message.life:
             message = replace(message, requester=requester, life=message.life or sender)
         fault = unwieldy(message, self._server)
         if isinstance(message, KeepAlive):
             if fault is not None:
-                self._bus.publish(keys.fault(self._server), fault)
+                self._bus.tell_refused(fault, sender_of(received))
                 return None
             sent = min(now, self._bus.local(message.at))
             return self._carry_out(self._serving.keep_alive(message, sent, now, sender))

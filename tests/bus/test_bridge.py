@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+from types import SimpleNamespace
 
 import pytest
 import zenoh
@@ -12,7 +13,9 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Keep, Received, Subscription
 from engage_hri.services.bus.zenoh import session
 from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.bus.zenoh.readers import LOOK
 from engage_hri.services.bus.zenoh.session import Arrived
+from engage_hri.services.bus.zenoh.turns import PLACES
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, matched, messages, numbers, state
 
 BLOCK = zenoh.CongestionControl.BLOCK
@@ -37,7 +40,7 @@ async def test_a_message_that_waits_for_the_loop_keeps_nothing_of_zenohs_buffers
 
     speaker.publish(key, state(1))
     queue, deadline = here.bridge._streams if key == keys.NET else here.bridge._ordered, loop.time() + PATIENCE
-    while not (waiting := [one for _, item in tuple(queue) for one in arrived(item)]):
+    while not (waiting := [one for _, item, *_ in tuple(queue) for one in arrived(item)]):
         assert loop.time() < deadline
 
     assert [each.key for each in waiting] == [key]
@@ -84,6 +87,74 @@ async def test_a_flood_of_one_process_costs_the_others_nothing(monkeypatch: pyte
     await loud.leave()
     for hub in (*hubs, here):
         await hub.close()
+
+
+async def test_one_item_waits_for_a_share_of_a_flood_only():
+    order: list[str] = []
+    bridge = session.LoopBridge(lambda error, what: None)
+    for number in range(5000):
+        bridge._let_in_of("loud", 1, order.append, f"loud {number}")
+    bridge._let_in_of("quiet", 1, order.append, "quiet")
+    for _ in range(5001 // session.BATCH + 2):
+        await asyncio.sleep(0)
+
+    assert bridge.waiting == 0
+    assert order.index("quiet") == PLACES
+    assert [one for one in order if one != "quiet"] == [f"loud {number}" for number in range(5000)]
+    assert bridge._came == bridge._left == {}
+
+
+async def test_a_token_overtakes_no_message_of_its_process_that_waits():
+    robot, end = f"gone-{os.getpid()}", free_endpoint()
+    here, there = await open_hub(robot, listen=[end]), await open_hub(robot, connect=[end])
+    await acquainted(here, there)
+    inbox, loud = here.join("here").subscribe(keys.FEEDBACK, keys.ANY_ALIVE), there.join("loud")
+    loud.declare_alive()
+    await matched(there, keys.FEEDBACK)
+    loud.publish(keys.FEEDBACK, state(0))
+    async with asyncio.timeout(PATIENCE):
+        while (first := await inbox.next()) is None or isinstance(first.message, PeerAlive):
+            pass  # from then on no message waits for the answer to a question about the past
+    for number in range(10 * PLACES):
+        loud.publish(keys.FEEDBACK, state(number))
+    deadline = asyncio.get_running_loop().time() + PATIENCE
+    while here.bridge.waiting < 10 * PLACES:  # nothing runs on the loop meanwhile
+        assert asyncio.get_running_loop().time() < deadline
+    loud._token.undeclare()
+    loud._token = None
+
+    came: list[object] = []
+    async with asyncio.timeout(PATIENCE):
+        while not came or not isinstance(came[-1], PeerGone):
+            received = await inbox.next()
+            assert received is not None
+            came.append(received.message)
+    assert len([one for one in came if not isinstance(one, PeerAlive | PeerGone)]) == 10 * PLACES
+    await there.close()
+    await here.close()
+
+
+async def test_the_links_are_not_looked_at_for_each_message_of_a_stranger():
+    looks: list[float] = []
+
+    class Session:
+        @property
+        def info(self) -> object:
+            looks.append(0.0)
+            return SimpleNamespace(routers_zid=lambda: ["router"], peers_zid=list)
+
+    async with await open_hub(f"looks-{os.getpid()}", listen=[free_endpoint()]) as hub:
+        readers, loop = hub.readers, asyncio.get_running_loop()
+        readers._session = Session()  # type: ignore[assignment]
+        began = loop.time()
+        lives = {
+            readers._foreign_life(Arrived("k", b"", "", None, "", stamped_by, is_put=True))
+            for _ in range(2000)
+            for stamped_by in ("router", "itself")
+        }
+
+        assert lives == {"", "itself"}
+        assert len(looks) <= 1 + (loop.time() - began) / LOOK
 
 
 def test_a_full_queue_drops_of_the_loudest_and_never_who_comes_and_goes():

@@ -205,8 +205,13 @@ def form_asked(query: zenoh.Query, otherwise: str = "msgpack") -> str:
 
 
 def refuse(query: zenoh.Query, fault: Fault, form: str) -> None:
-    """Answer the query with an error."""
-    payload, encoding = in_form(str(query.key_expr), fault, form)
+    """Answer the query with an error, unless it asks all processes: such an error has the key that was asked.
+
+    No router lets a process answer for all, so each would only be told of as a denial.
+    """
+    if "/@bus/" in (key := str(query.key_expr)) and "*" in key:
+        return
+    payload, encoding = in_form(key, fault, form)
     query.reply_err(payload, encoding=encoding)
 
 

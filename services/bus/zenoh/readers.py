@@ -4,21 +4,22 @@ import asyncio
 from collections.abc import Callable, Container, Mapping
 from functools import partial
 from itertools import chain
+from math import inf
 from typing import Any
 
 import msgspec
 import zenoh
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
-from engage_hri.services.bus.payloads import read_payload, unreadable
-from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish
+from engage_hri.services.bus.payloads import read_payload
+from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish, refuse
 from engage_hri.services.bus.zenoh.order import (
     Counts,
     Envelope,
@@ -42,6 +43,8 @@ TRIES = 3
 """Number of times that a process that is there, but does not answer, is asked before what it sends is let through."""
 UNANSWERED: Seconds = 3.0
 """Time after which such a process is asked again, as long as it is there: nobody else tells what was missed."""
+LOOK: Seconds = 0.05
+"""Time between two looks at the links. A look halts the loop, and takes longer than all else that a message costs."""
 RUNS_KEPT = 256
 """Number of processes, there or gone, that a subscription remembers: one that is back gets on where it was."""
 
@@ -98,6 +101,9 @@ class Readers:
         self._trusts = trusts
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
+        self._passing: set[str] = set()
+        """Processes that pass on what others send, as of the last look."""
+        self._looked_at: Seconds = -inf
         self._flushing: list[tuple[str, keys.Flow, zenoh.Query]] = []
         self._decoded: tuple[Written, Message | None] | None = None
         self._flows: dict[keys.Flow, tuple[Any, ...]] = {}
@@ -237,9 +243,11 @@ class Readers:
         """
         if sample.sender or not sample.stamped_by:
             return sample.sender
-        info = self._session.info
-        passed_on_by = {*self._own, *map(str, info.routers_zid()), *map(str, info.peers_zid())}
-        return "" if sample.stamped_by in passed_on_by else sample.stamped_by
+        stamped_by, now = sample.stamped_by, self._loop.time()
+        if stamped_by not in self._passing and now - self._looked_at >= LOOK:
+            self._looked_at, info = now, self._session.info
+            self._passing = {*self._own, *map(str, info.routers_zid()), *map(str, info.peers_zid())}
+        return "" if stamped_by in self._passing else stamped_by
 
     def _deliver(self, reader: _Reader, written: Written, run: str, *, past: bool) -> None:
         if isinstance(reader.subscription, Tap):
@@ -247,7 +255,7 @@ class Readers:
             return
         # One sample often has several readers: it is decoded once.
         if self._decoded is None or self._decoded[0] is not written:
-            self._decoded = (written, self._decode(reader.bus, written))
+            self._decoded = (written, self._decode(reader.bus, written, run))
         message = self._decoded[1]
         if isinstance(message, Unreadable) and reader.bus.name != keys.server_of(written.key):
             return
@@ -263,17 +271,13 @@ class Readers:
     def _sent_at(self, written: Written) -> Seconds:
         return self._peers.clocks.local(Stamp(written.envelope.clock, written.envelope.sent))
 
-    def _decode(self, bus: Bus, written: Written) -> Message | None:
+    def _decode(self, bus: Bus, written: Written, run: str) -> Message | None:
         """Decode a message. A bad one is counted, and told as a fault; returns the notice for its server, if any."""
         try:
             return read_payload(written.payload, written.encoding, written.key, written.envelope.source)
         except EngageError as error:
             self.refused += 1
-            if not keys.matches(keys.ANY_FAULT, written.key):
-                where = f"{written.key} from {written.envelope.source or 'a stranger'}"
-                fault = msgspec.structs.replace(error.fault, where=where, service=bus.name)
-                bus.publish(keys.fault(bus.name), fault)
-            return unreadable(error, written.key, written.payload, written.encoding)
+            return bus.unreadable(error, _sample(written, run, self._loop.time()))
 
     def _catch_up(self, reader: _Reader, run: str, follower: Follower) -> None:
         if follower.behind and not follower.asking:
@@ -357,7 +361,7 @@ class Readers:
         try:
             run, pulse = _flushes.decode(query.payload.to_bytes() if query.payload else b"")
         except BAD as error:
-            query.reply_err(str(error))
+            refuse(query, Fault(reason=str(error)), "json")
             finish(query)
             return
         self._compare(run, flow, pulse)

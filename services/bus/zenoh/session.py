@@ -13,12 +13,14 @@ from typing import Any
 import zenoh
 from msgspec import Struct
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import ADVICE, ENDPOINT, is_encrypted, is_endpoint, is_on_this_machine
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.sizes import bounded
+from engage_hri.services.bus.zenoh.turns import Turns
 
 ROUTER_WITH_KEYS = "tls/localhost:7447"
 """Endpoint of the router for processes with keys that name no other."""
@@ -248,7 +250,9 @@ def copied(sample: zenoh.Sample) -> Arrived:
 class LoopBridge:
     """Queues from Zenoh's threads to the loop: one for all ordered keys; one for streams, the oldest dropped first.
 
-    A callback appends an item and wakes the loop if need be, nothing else: any waiting there stalls the link.
+    A callback appends an item and wakes the loop if need be, nothing else: any waiting there stalls the link. On the
+    loop each sender has its turn (`Turns`): who floods is served with the others, and not before them. The token of a
+    process takes its turn among the messages of that process, and overtakes none of them.
     Messages of a process of which too much waits are dropped, and questions if there are too many. Who comes and
     goes, and the answers to what was asked here, come in any case: nobody would ask for them again.
     """
@@ -258,7 +262,10 @@ class LoopBridge:
         self.traffic = Traffic()
         self._failed = failed
         self._loop = asyncio.get_running_loop()
-        self._ordered: deque[tuple[Callable[[Any], None], Any]] = deque()
+        self._ordered: deque[tuple[Callable[[Any], None], Any, str | None, int]] = deque()
+        """What came since the loop last looked: who takes it, the item, its sender (None: it waits for no other), and
+        its bytes."""
+        self._turns: Turns[tuple[Callable[[Any], None], Any, str | None, int]] = Turns()
         self._streams: deque[tuple[Callable[[Any], None], Any]] = deque(maxlen=STREAM_CROWD)
         self._came: dict[str, int] = {}
         self._left: dict[str, int] = {}
@@ -295,7 +302,9 @@ class LoopBridge:
         """Make a handler for a queryable. A question that is dropped ends without an answer."""
 
         def sort(query: zenoh.Query) -> None:
-            self._let_in_of("", CROWD_OF_ONE // QUESTIONS, enter, query)
+            asker = query.source_info
+            sender = "?" if asker is None else f"{asker.source_id.zid} ?"
+            self._let_in_of(sender, CROWD_OF_ONE // QUESTIONS, enter, query)
 
         return zenoh.handlers.Callback(sort, indirect=False)
 
@@ -310,36 +319,32 @@ class LoopBridge:
                 self._streams.append((enter, arrived))
                 self._wake()
                 return
-            sender = f"{arrived.sender or arrived.stamped_by} "  # not the one that stands for questions
+            # A router stamps for all who do not: of these, each who has a key of its own is a sender.
+            sender = arrived.sender or f"{arrived.stamped_by} {keys.requester_of(arrived.key)}"
             self._let_in_of(sender, EACH + len(arrived.payload), enter, arrived)
 
         return zenoh.handlers.Callback(sort, indirect=False)
 
     def _let_in_of(self, sender: str, size: int, enter: Callable[[Any], None], item: Any) -> None:
         came = self._came.get(sender, 0)
-        if came - self._left.get(sender, 0) > CROWD_OF_ONE or len(self._ordered) >= CROWD:
+        if came - self._left.get(sender, 0) > CROWD_OF_ONE or len(self._ordered) + len(self._turns) >= CROWD:
             self.traffic.dropped += 1
         else:
             self._came[sender] = came + size
-            self._let_in(self._pass_on, (sender, size, enter, item))
-
-    def _pass_on(self, waited: tuple[str, int, Callable[[Any], None], Any]) -> None:
-        sender, size, enter, item = waited
-        self._left[sender] = self._left.get(sender, 0) + size
-        enter(item)
+            self._let_in(enter, item, sender, size)
 
     @property
     def waiting(self) -> int:
-        return len(self._ordered) + len(self._streams)
+        return len(self._ordered) + len(self._turns) + len(self._streams)
 
     def close(self) -> None:
         """Drop all items, waiting or to come."""
         self._open = False
-        self._ordered.clear()
-        self._streams.clear()
+        for each in (self._ordered, self._turns, self._streams):
+            each.clear()
 
-    def _let_in(self, enter: Callable[[Any], None], item: Any) -> None:
-        self._ordered.append((enter, item))
+    def _let_in(self, enter: Callable[[Any], None], item: Any, sender: str | None = None, size: int = 0) -> None:
+        self._ordered.append((enter, item, sender, size))
         self._wake()
 
     def _wake(self) -> None:
@@ -358,19 +363,34 @@ class LoopBridge:
         waiting = self.waiting
         self.traffic.depth = max(self.traffic.depth, waiting)
         try:
+            for _ in range(len(self._ordered)):
+                one = self._ordered.popleft()
+                self._turns.append(_process_of(one[1]) if one[2] is None else one[2], one)
             for _ in range(min(waiting, BATCH)):
                 if not self._open:
                     return
-                enter, item = (self._ordered or self._streams).popleft()
+                if self._turns:
+                    enter, item, sender, size = self._turns.popleft()
+                    if sender is not None:
+                        self._left[sender] = self._left.get(sender, 0) + size
+                else:
+                    enter, item = self._streams.popleft()
                 self.traffic.passed += 1
                 try:
                     enter(item)
                 except Exception as error:
                     self._failed(error, f"what came in: {str(item)[:80]}")
         finally:
-            if (self._ordered or self._streams) and not self._woken:
+            if self.waiting and not self._woken:
                 self._woken = True
                 self._woken_at = self._loop.time()
                 self._loop.call_soon(self._drain)
-            elif not self._ordered:
+            elif not self._ordered and not self._turns:
                 self._came, self._left = {}, {}
+
+
+def _process_of(item: object) -> str | None:
+    """Process of a token, in `@bus/<run>/...`; None for all that is no token."""
+    if not isinstance(item, zenoh.Sample):
+        return None
+    return str(item.key_expr).partition("/@bus/")[2].partition("/")[0] or None
