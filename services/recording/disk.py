@@ -161,7 +161,8 @@ class Aside:
     """Records that wait for the end of a recording, in a nameless file in its folder, which goes with the process."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  # until `close`
+        with tempfile.TemporaryFile(dir=folder) as file:
+            self._file = os.dup(file.fileno())
         self._waiting = bytearray()
 
     def append(self, record: bytes) -> None:
@@ -170,17 +171,17 @@ class Aside:
     def flush(self) -> None:
         """Put on the disk what waits. Raises OSError: some of it waits on."""
         while self._waiting:
-            del self._waiting[: self._file.write(self._waiting)]
+            del self._waiting[: os.write(self._file, self._waiting)]
 
     def __iter__(self) -> Iterator[bytes]:
         """All of them, in pieces; then there is no more to append."""
-        self._file.seek(0)
-        while piece := self._file.read(descriptor.PIECE):
+        os.lseek(self._file, 0, os.SEEK_SET)
+        while piece := os.read(self._file, descriptor.PIECE):
             yield piece
         yield bytes(self._waiting)
 
     def close(self) -> None:
-        self._file.close()
+        os.close(self._file)
 
 
 def read(path: Path) -> Recording:

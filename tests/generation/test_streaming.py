@@ -330,7 +330,7 @@ async def test_required_words_that_are_broken_off_are_the_last_of_their_turn(sta
     assert {id: outcome.status for id, (_, outcome) in stage.outcomes.items()} == {
         "a": "failed", "b": "interrupted", "c": "interrupted",
     }  # fmt: skip
-    assert str(stage.outcomes["b"][1].fault) == "b: a, which it follows, failed: the body aborted it"
+    assert str(stage.outcomes["b"][1].fault) == "b: a, which it follows, failed: aborted on request"
     assert str(stage.outcomes["c"][1].fault) == "c: a failed"  # it had not been sent
     assert [(closed.status, closed.reason) for _, closed in stage.closed] == [("aborted", "a failed")]
     assert [id for id, _, _ in stage.words()] == ["a:s"]
@@ -345,7 +345,7 @@ async def test_words_that_fail_are_followed_by_the_next_ones(stage: Robot) -> No
     await stage.until("b:end")
 
     assert stage.reached["b:s:start"] == stage.reached["a:end"] < 1.2
-    assert stage.outcomes["a"][1].warnings == ("s was dropped: the body aborted it",)
+    assert stage.outcomes["a"][1].warnings == ("s was dropped: aborted on request",)
 
 
 # -- thinking -----------------------------------------------------------------------------------------------------

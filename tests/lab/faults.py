@@ -77,6 +77,9 @@ class Run(NamedTuple):
     wrong: list[str]
 
 
+CLIENTS = {"collaboration"}
+
+
 class Stage:
     """A robot over machines, and its records."""
 
@@ -198,15 +201,16 @@ class Stage:
         return [self.ids[name] for name in self.services if self.processes[name].returncode is None]
 
     def back_since(self) -> float | None:
-        """Time since which all services see one another; None: they do not."""
+        """Time since which all services see whom they need; None: they do not. Nobody asks the simulation."""
         self.read()
         latest = 0.0
         playing = {name for name in self.services if self.processes[name].returncode is None}
         for name in playing:
             seen = verdict.sees(self.events, self.ids.get(name, ""))
-            if not playing - {name} <= seen.keys():
+            needed = playing - {name} - CLIENTS if name == "simulation" else playing - {name}
+            if not needed <= seen.keys():
                 return None
-            latest = max(latest, *(seen[each] for each in playing - {name}))
+            latest = max(latest, *(seen[each] for each in needed))
         return latest
 
     async def until(self, holds: Callable[[], bool], seconds: float) -> bool:

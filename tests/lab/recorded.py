@@ -98,8 +98,8 @@ def tap(record: Record) -> None:
             pending.outcome.add_done_callback(told)
         return pending
 
-    def noting(peers: Peers, name: str, run: str, there: bool) -> None:
-        note(peers, name, run, there)
+    def noting(peers: Peers, part: keys.Part, name: str, run: str, there: bool) -> None:
+        note(peers, part, name, run, there)
         record("sees" if name in peers.names else "misses", name=name)
 
     ZenohHub.publish = publishing  # type: ignore[method-assign]

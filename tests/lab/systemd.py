@@ -16,8 +16,8 @@ from pathlib import Path
 
 INIT = next((path for path in ("/lib/systemd/systemd", "/usr/lib/systemd/systemd") if Path(path).exists()), "")
 DEVICES = ("null", "zero", "random", "urandom", "tty")
-OURS = tuple(dict.fromkeys(map(Path, (sys.base_prefix, sys.prefix, Path(__file__).parents[2]))))
-"""Folders of the host that units need: Python, our environment, our code."""
+OURS = sorted(set(map(Path, (sys.base_prefix, sys.prefix, Path(__file__).parents[2]))))
+"""Folders of the host that units need: Python, our environment, our code. What is in another comes after it."""
 
 
 def mount(*words: str) -> None:

@@ -62,7 +62,7 @@ def test_which_words_take_the_floor_without_a_voice(
     policy.hear("ann", text, began=since, is_final=is_final, is_line=is_line)
 
     aborted = policy.tick(2.5)
-    assert (aborted is not None and aborted.reason == "ann took the floor") == takes
+    assert (aborted is not None and aborted.why.reason == "ann took the floor") == takes
 
 
 def test_words_of_others_take_nothing() -> None:

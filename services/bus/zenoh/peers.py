@@ -275,7 +275,7 @@ class Peers:
         return answered.result() if answered.done() else None
 
     def _tell_time(self, query: zenoh.Query) -> None:
-        query.reply(query.key_expr, pack(Stamp(self.clocks.own, self.clocks.now())))
+        query.reply(keys.own(self._sent.run, "clock"), pack(Stamp(self.clocks.own, self.clocks.now())))
         finish(query)
 
     async def flush(self) -> None:
