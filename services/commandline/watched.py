@@ -18,6 +18,8 @@ BEGINNING: Seconds = 30.0
 BRIEF: Seconds = 2.0
 """Life of a child after which the next one does not come at once, but after `PAUSE`."""
 PAUSE: Seconds = 0.5
+LONGEST = 2**16
+"""Bytes of a line that is passed on."""
 
 
 async def watched(
@@ -60,27 +62,31 @@ async def _listen(
     """Pass on the lines until they end. Returns whether there was a sign of life, and whether it fell silent."""
     assert process.stdout is not None
     loop = asyncio.get_running_loop()
-    has_shown, deadline = False, loop.time() + BEGINNING
+    has_shown, deadline, rest = False, loop.time() + BEGINNING, b""
     while True:
         try:
             async with asyncio.timeout_at(deadline):
-                raw = await process.stdout.readline()
+                # In pieces: whoever waits for each line of a flood holds up the process that writes it.
+                piece = await process.stdout.read(LONGEST)
         except TimeoutError:
             return has_shown, True
-        except ValueError:
-            raw = mark + b"(a line too long to show)\n"
-        if not raw:
+        *lines, rest = (rest + piece).split(b"\n")
+        if len(rest) > LONGEST or (rest and not piece):
+            lines.append(rest)
+            rest = b""
+        for raw in lines:
+            line = raw if len(raw) <= LONGEST else mark + b"(a line too long to show)"
+            if line.startswith(mark):
+                text = line.removeprefix(mark).decode(errors="replace")
+                if text == SIGN:
+                    has_shown = True
+                else:
+                    tell(text)
+            elif not other(line):
+                continue
+            deadline = loop.time() + (SILENCE if has_shown else BEGINNING)
+        if not piece:
             return has_shown, False
-        if not raw.startswith(mark) and not other(raw.rstrip(b"\n")):
-            continue
-        deadline = loop.time() + (SILENCE if has_shown else BEGINNING)
-        if not raw.startswith(mark):
-            continue
-        line = raw.removeprefix(mark).decode(errors="replace").rstrip("\n")
-        if line == SIGN:
-            has_shown, deadline = True, loop.time() + SILENCE
-        else:
-            tell(line)
 
 
 async def _end(process: Process) -> None:

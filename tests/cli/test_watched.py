@@ -90,6 +90,32 @@ async def test_one_that_refuses_before_it_has_begun_is_not_tried_again(tmp_path:
     assert (code, lines) == (2, ["why"])
 
 
+async def test_its_lines_come_whole_and_in_order_however_they_are_written() -> None:
+    """Some are cut anywhere by the pipe; `other` gets those without the mark, and one without its end counts, too."""
+    source = """
+import sys
+for number in range(4000):
+    sys.stdout.write(("#" if number % 3 else "") + f"{number} " + "x" * (number % 300) + chr(10))
+sys.stdout.write("#" + "y" * 200_000 + chr(10) + "#" + chr(10) + "#the end")
+"""
+    marked: list[str] = []
+    others: list[bytes] = []
+
+    def other(line: bytes) -> bool:
+        others.append(line)
+        return False
+
+    async with asyncio.timeout(PATIENCE):
+        code = await watched([sys.executable, "-c", source], "it", marked.append, marked.append, b"#", other)
+
+    written = [f"{number} {'x' * (number % 300)}" for number in range(4000)]
+    assert code == 0
+    assert [line for line in marked if line[:1].isdigit()] == [line for n, line in enumerate(written) if n % 3]
+    assert [line for line in others if line[:1].isdigit()] == [line.encode() for line in written[::3]]
+    assert "(a line too long to show)" in marked
+    assert marked[-2:] == ["", "the end"]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")
 async def test_a_router_that_is_frozen_is_started_anew_and_all_are_back() -> None:
     endpoint = free_endpoint()
