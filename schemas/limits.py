@@ -1,7 +1,7 @@
 """Limits of what is read and sent: how many bytes a message may have on each key, and how many may come a second.
 
 The limits are for everybody: a bus refuses at the sender what is larger, and Zenoh drops it where it comes in
-(services/bus/zenoh/sizes.py). Each is at least ten times the largest message that was measured on its key with a
+(services/bus/zenoh/sizes.py). Each is eight times or more the largest message that was measured on its key with a
 thousand behaviors in a block, a thousand objects in a world, and the tangram task.
 """
 

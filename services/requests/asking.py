@@ -232,7 +232,8 @@ class Asking:
         if (
             event in _SENDS_AGAIN
             and before in _UNDECIDED
-            and now - (now if asked.sent_at is None else asked.sent_at) > ASLEEP
+            and asked.sent_at is not None
+            and now - asked.sent_at > ASLEEP
         ):
             event = Event.PATIENCE_OVER
         asked.state, actions = TABLE[before][event]

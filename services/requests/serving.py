@@ -364,8 +364,11 @@ class Serving:
 
     def _hand_end(self, record: Record, why: Fault) -> None:
         asked = record.request
-        lost = Cancel(id=asked.id, requester=asked.requester, life=asked.life, reason=why.reason, cause=why.cause)
-        self._hand(record, replace(lost, whose=why.whose))
+        lost = Cancel(
+            id=asked.id, requester=asked.requester, life=asked.life,
+            reason=why.reason, cause=why.cause, whose=why.whose,
+        )  # fmt: skip
+        self._hand(record, lost)
 
     # -- faults ---------------------------------------------------------------------------------------------------
 

@@ -166,14 +166,11 @@ class Readers:
 
     def _begin(self, flow: keys.Flow) -> None:
         """Follow those who publish on this flow, from the first subscription to it on."""
-        key, questions = (
-            keys.own(self._sent.run, f"flush/{flow}"),
-            self._bridge.questions(partial(self._flush_asked, flow)),
-        )
-        pulses = partial(self._pulse_heard, flow)
+        questions = self._bridge.questions(partial(self._flush_asked, flow))
+        pulses = self._bridge.samples(partial(self._pulse_heard, flow))
         self._flows[flow] = (
-            self._session.declare_queryable(key, questions),
-            self._session.declare_subscriber(keys.own("*", f"pulse/{flow}"), self._bridge.samples(pulses)),
+            self._session.declare_queryable(keys.own(self._sent.run, f"flush/{flow}"), questions),
+            self._session.declare_subscriber(keys.own("*", f"pulse/{flow}"), pulses),
         )
         self._peers.hear(flow)
 
