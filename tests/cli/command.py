@@ -13,6 +13,8 @@ import pytest
 
 from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.app import main
+from engage_hri.services.commandline.certificates import initialize
+from tests.bus.places import OWN_ADDRESS, free_endpoint
 
 GOOD_BLOCK = """\
 <bml id="hello">
@@ -68,3 +70,11 @@ def threads(pid: int) -> list[str]:
     """The names of all threads of a process but its first; Zenoh names its own, Python's carry the program's name."""
     tasks = Path(f"/proc/{pid}/task")
     return [(task / "comm").read_text().strip() for task in tasks.iterdir() if task.name != str(pid)]
+
+
+async def closed(folder: Path) -> tuple[Process, tuple[object, ...], tuple[object, ...]]:
+    """Start a router with keys for the robot `closed`. Returns it, and the options of services and of alice."""
+    ring, endpoint = folder / "ring", free_endpoint().replace("tcp/", "tls/")
+    initialize(ring, "closed", [("manager", "alice")], [OWN_ADDRESS], 2)
+    where = ("--robot", "closed", "--connect", endpoint, "--keys")
+    return await start("router", "--listen", endpoint, "--keys", ring), (*where, ring), (*where, ring / "alice")

@@ -9,11 +9,10 @@ from rich.console import Console
 
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.certificates import initialize
 from engage_hri.services.commandline.up import TASK, in_one
 from engage_hri.services.runtime.service import Ready
-from tests.bus.places import OWN_ADDRESS, free_endpoint
-from tests.cli.command import GOOD_BLOCK, start
+from tests.bus.places import free_endpoint
+from tests.cli.command import GOOD_BLOCK, closed, start
 from tests.cli.test_processes import PATIENCE, children, line, stopped, strangers
 
 
@@ -45,15 +44,12 @@ async def test_it_performs_what_is_played_in_one_process_and_ends_with_ctrl_c(tm
 
 @pytest.mark.real_time
 async def test_with_keys_each_service_in_the_process_has_its_own(tmp_path: Path) -> None:
-    ring, endpoint = tmp_path / "ring", free_endpoint().replace("tcp/", "tls/")
-    initialize(ring, "closed", [("manager", "alice")], [OWN_ADDRESS], 2)
+    router, services, alice = await closed(tmp_path)
     (tmp_path / "block.xml").write_text(GOOD_BLOCK)
-    where = ("--robot", "closed", "--connect", endpoint, "--keys")
-    router = await start("router", "--listen", endpoint, "--keys", ring)
-    up = await start("up", "--in-one", *where, ring)
+    up = await start("up", "--in-one", *services)
     try:
         await line(up, "all services are up", log=False)
-        play = await start("play", *where, ring / "alice", tmp_path / "block.xml")
+        play = await start("play", *alice, tmp_path / "block.xml")
         async with asyncio.timeout(PATIENCE):
             out, _ = await play.communicate()
 
@@ -68,10 +64,8 @@ async def test_with_keys_each_service_in_the_process_has_its_own(tmp_path: Path)
 
 @pytest.mark.real_time
 async def test_the_keys_of_one_holder_are_not_those_of_the_services(tmp_path: Path) -> None:
-    ring, endpoint = tmp_path / "ring", free_endpoint().replace("tcp/", "tls/")
-    initialize(ring, "closed", [("manager", "alice")], [OWN_ADDRESS], 2)
-    router = await start("router", "--listen", endpoint, "--keys", ring)
-    up = await start("up", "--in-one", "--robot", "closed", "--connect", endpoint, "--keys", ring / "alice")
+    router, _, alice = await closed(tmp_path)
+    up = await start("up", "--in-one", *alice)
     try:
         async with asyncio.timeout(PATIENCE):
             _, err = await up.communicate()

@@ -12,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.certificates import initialize
 from engage_hri.services.commandline.roster import NAMES, groups
-from tests.bus.places import OWN_ADDRESS, free_endpoint
-from tests.cli.command import GOOD_BLOCK, start
+from tests.bus.places import free_endpoint
+from tests.cli.command import GOOD_BLOCK, closed, start
 from tests.cli.test_processes import PATIENCE, children, line, stopped
 from tests.rigs.kills.trial import Verdict, trial
 
@@ -92,17 +91,14 @@ async def test_a_group_is_one_process_that_dies_and_comes_back_as_one_by_its_nam
 
 @pytest.mark.real_time
 async def test_with_keys_each_service_of_a_group_has_its_own(tmp_path: Path) -> None:
-    ring, endpoint = tmp_path / "ring", free_endpoint().replace("tcp/", "tls/")
-    initialize(ring, "closed", [("manager", "alice")], [OWN_ADDRESS], 2)
+    router, services, alice = await closed(tmp_path)
     (tmp_path / "block.xml").write_text(GOOD_BLOCK)
-    where = ("--robot", "closed", "--connect", endpoint, "--keys")
-    router = await start("router", "--listen", endpoint, "--keys", ring)
-    pair = await start("run", "control,realizer", *where, ring)
-    others = await start("run", "generation,simulation", *where, ring)
+    pair = await start("run", "control,realizer", *services)
+    others = await start("run", "generation,simulation", *services)
     try:
         await line(pair, "realizer is ready")
         await line(others, "simulation is ready")
-        play = await start("play", *where, ring / "alice", tmp_path / "block.xml")
+        play = await start("play", *alice, tmp_path / "block.xml")
         async with asyncio.timeout(PATIENCE):
             out, _ = await play.communicate()
 
