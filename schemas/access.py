@@ -195,6 +195,11 @@ PARTICIPANTS = {**{name: name for name in keys.SERVICES}, "simulation": "percept
 """Roles of the services that have another name."""
 
 
+def role_of(name: str) -> str:
+    """Role of a participant of this name who was given none: that of the service, or a manager's."""
+    return PARTICIPANTS.get(name, "manager")
+
+
 @lru_cache(64)
 def rows(role: str, does: Does) -> tuple[str, ...]:
     """Keys of all rows of a role, `OWN` among them."""

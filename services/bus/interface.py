@@ -17,7 +17,7 @@ from typing import Any, Self
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.access import PARTICIPANTS
+from engage_hri.schemas.access import role_of
 from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
@@ -57,7 +57,7 @@ class Bus(ABC):
         """life_numbers: numbers that no former participant of this name in this run has used."""
         self.robot = robot
         self.name = name
-        self.role = role or PARTICIPANTS.get(name, "manager")
+        self.role = role or role_of(name)
         self.part = keys.part_of(self.role)
         self.clock = clock
         self.run = run

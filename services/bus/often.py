@@ -12,6 +12,11 @@ MOST = 256
 """Kinds of all senders together that are counted apart; all further ones are one kind."""
 
 
+def is_told(times: int) -> bool:
+    """True for the first, the tenth, the hundredth ... time: what comes again and again is told so often."""
+    return str(times).rstrip("0") == "1"
+
+
 class Often:
     """Counts refusals of each sender and kind, and says which to tell: the first, the tenth, the hundredth ...
 
@@ -37,7 +42,7 @@ class Often:
         self._kinds[sender] += known is None
         times = 1 if known is None else known[0] + 1
         self._counts[sender, kind] = times, now
-        return times if str(times).rstrip("0") == "1" else 0
+        return times if is_told(times) else 0
 
     def _forget(self, now: Seconds) -> None:
         while self._counts:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import IO, BinaryIO, TextIO, cast
 
 from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.services.bus.often import is_told
 
 LOG = logging.getLogger("engage")
 Put = Callable[[bytes], int | None]
@@ -88,7 +89,7 @@ class Patient:
         if is_interrupted:
             self._interruptions += 1
             self._lost_before = lost_before
-        if str(self._interruptions).rstrip("0") == "1":
+        if is_told(self._interruptions):
             often = f" (for the {self._interruptions}th time)" if self._interruptions > 1 else ""
             if is_interrupted:
                 self._tell(f"{self.name}: cannot write: {self._reason}{often}; lines are lost until there is room")

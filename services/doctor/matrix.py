@@ -53,8 +53,8 @@ def _cells(facts: Facts) -> Iterator[Cell]:
 
 def _needs(viewer: str, other: str) -> bool:
     """True if one participant has to see another: everybody sees the robot, and services see their clients."""
-    part = keys.part_of(access.PARTICIPANTS.get(other, "manager"))
-    heard = access.rows(access.PARTICIPANTS.get(viewer, "manager"), "subscribes")
+    part = keys.part_of(access.role_of(other))
+    heard = access.rows(access.role_of(viewer), "subscribes")
     return part == "robot" or keys.alive("*", part) in heard
 
 

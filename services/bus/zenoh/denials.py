@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from engage_hri.schemas.utf8 import printable
+from engage_hri.services.bus.often import is_told
 
 LEVELS = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor=trace,zenoh::net::routing::hat=off"
 """Parts of Zenoh's log that tell of refusals, and all errors but those about the end of what was denied."""
@@ -20,8 +21,7 @@ WILD = 4
 """Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
 Keys of ours have one."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
-_THREAD = re.compile(r"ThreadId\((\d+)\)")
-_THREAD_OF = re.compile(rb"ThreadId\((\d+)\)")
+_THREAD = re.compile(rb"ThreadId\((\d+)\)")
 _CHECKED = re.compile(
     r"(?P<cached>Using cached result: )?(?P<zid>[0-9a-f]+)(?: on \S*?CertCommonName\((?P<name>.*?)\)\S*)?"
     r" is (?P<verdict>un)?authorized to (?P<what>[A-Z][A-Za-z/ ]*) \((?P<flow>ingress|egress)\) on (?P<key>\S+)"
@@ -31,7 +31,7 @@ _AFTER = b"interceptor"
 """What stands in a line after its time and thread, and before what is said."""
 _CACHING = re.compile(r"ACL \((?P<flow>ingress|egress)\): caching permissions for `(?P<key>.*?)`")
 _LAST_CACHED = "Declare Liveliness Subscriber"
-_ACCEPTED = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. .*Common Name: (?P<name>.*)\.$")
+_ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
 _NOBODY = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
 _TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
@@ -51,9 +51,9 @@ class Denials:
         self._tell = tell
         self._names: dict[str, str] = {}
         """Common names by process."""
-        self._accepted: dict[str, str] = {}
+        self._accepted: dict[bytes, str] = {}
         """Common name of the link that was accepted last, by thread."""
-        self._caching: dict[str, tuple[str, str]] = {}
+        self._caching: dict[bytes, tuple[str, str]] = {}
         """Flow and key for which permissions are being worked out, by thread."""
         self._count: Counter[str] = Counter()
         self._kinds: Counter[str] = Counter()
@@ -83,8 +83,7 @@ class Denials:
         if (level := _LEVEL.match(text)) is None:
             return False  # the rest of a line: a key may have line ends
         caching = _CACHING.search(text)
-        found = _THREAD.search(text)
-        thread = found[1] if found else ""
+        thread = _thread(line)
         if (checked := _CHECKED.search(text)) is not None:
             self._check(thread, checked, line)
         elif caching is not None:
@@ -126,7 +125,7 @@ class Denials:
 
         Threads write as they come. So one of many may be missed, which is told the next time.
         """
-        if _THREAD_OF.findall(before)[:1] != _THREAD_OF.findall(line)[:1]:
+        if _thread(before) != _thread(line):
             return
         checked = _CHECKED.search(_COLOR.sub(b"", before).decode(errors="replace"))
         if checked is not None and not checked["verdict"] and checked["flow"] == "ingress":
@@ -134,7 +133,7 @@ class Denials:
             what = f"{checked['what'].lower()} on {checked['key']}"
             self._say(f"dropped: {who} sends a {what} that is larger than may be sent", f"of what {who} does")
 
-    def _check(self, thread: str, checked: re.Match[str], line: bytes) -> None:
+    def _check(self, thread: bytes, checked: re.Match[str], line: bytes) -> None:
         if checked["name"]:
             self._know(checked["zid"], checked["name"])
         who = self._names.get(checked["zid"], f"process {checked['zid']}")
@@ -177,7 +176,11 @@ class Denials:
     def _told_again(self, kind: str) -> None:
         self._count[kind] += 1
         times = self._count[kind]
-        if times == 1:
-            self._tell(self._news[kind])
-        elif str(times).rstrip("0") == "1":
-            self._tell(f"{self._news[kind]} ({times} times)")
+        if is_told(times):
+            self._tell(self._news[kind] if times == 1 else f"{self._news[kind]} ({times} times)")
+
+
+def _thread(line: bytes) -> bytes:
+    """Number of the thread that wrote a line; empty: it is the rest of one."""
+    found = _THREAD.search(line)
+    return found[1] if found else b""

@@ -187,7 +187,7 @@ class ZenohHub(Hub):
 
     async def wait_until_free(self, *names: str) -> None:
         for name in names:
-            self.peers.see(keys.alive(name, keys.part_of(access.PARTICIPANTS.get(name, ""))))
+            self.peers.see(keys.alive(name, keys.part_of(access.role_of(name))))
         await self.peers.wait_for_quiet(QUIET)
         deadline = self._loop.time() + VACANCY
         while taken := sorted(set(names) & self.peers.names.keys()):
