@@ -21,9 +21,9 @@ from engage_hri.services.bus.zenoh import readers
 from engage_hri.services.bus.zenoh import session as zenoh_session
 from engage_hri.services.bus.zenoh.history import BATCH, History, finish
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
-from engage_hri.services.bus.zenoh.order import PULSE_FOR, Missing
+from engage_hri.services.bus.zenoh.order import PULSE_FOR, Envelope, Missing
 from engage_hri.services.runtime.service import Ready, running
-from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, matched, messages, numbers, state
+from tests.bus.places import PATIENCE, acquainted, echo, free_endpoint, matched, messages, numbers, state, take
 from tests.commanding import command
 
 pytestmark = pytest.mark.real_time
@@ -262,6 +262,24 @@ async def test_a_forged_message_far_ahead_deafens_nobody(town: Town, names_a_sou
     if names_a_source:
         assert await inbox.next(near.join("timer").now() + 1.5) is None  # after the next pulse, too
         assert "never sent them" in caplog.text
+
+
+async def test_nothing_is_believed_of_a_process_that_has_shown_no_past(town: Town, caplog: Any):
+    """Nobody can answer for it: that no answer comes proves nothing. What it says later comes, and as news."""
+    near, far, visitor = town
+    silent, inbox = far.join("silent"), near.join("here").subscribe(keys.FEEDBACK)
+    envelope = Envelope("silent", silent.clock, silent.now(), 7, 1)
+    visitor.session.put(
+        f"{visitor.robot}/{keys.FEEDBACK}", encode(state(-1)), encoding="application/msgpack",
+        attachment=msgspec.msgpack.encode(envelope), source_info=zenoh.SourceInfo(far.session.id, 0),
+    )  # fmt: skip
+
+    assert await inbox.next(silent.now() + readers.UNANSWERED + 0.5) is None
+    silent.publish(keys.FEEDBACK, state(1))
+    [told] = await take(inbox)
+
+    assert (told.message, told.past) == (state(1), False)
+    assert "never sent them" in caplog.text
 
 
 async def test_one_key_of_one_process_can_be_asked_for(town: Town):

@@ -195,6 +195,7 @@ class SentLog:
 class Follower:
     """One publishing process as one subscription sees it.
 
+    known: whether it was ever seen to have a past; until then nobody can answer for it, so nothing of it is believed.
     behind: the past is needed; until `catch_up` nothing is delivered. gaps: how often a message was missed.
     lost: messages that were gone for good. forged: claims that the process' answers have disproved. asking, again:
     kept for `Readers`: the question is on its way, and is to be asked once more after it. since: when it began.
@@ -203,6 +204,7 @@ class Follower:
     def __init__(self, patterns: Iterable[str], since: Seconds) -> None:
         self.patterns = tuple(patterns)
         self.since = since
+        self.known = False
         self.behind = True
         self.asking = False
         self.again = False
@@ -234,6 +236,16 @@ class Follower:
             return []
         self._deliver(written)
         return [written]
+
+    @property
+    def held(self) -> int:
+        """Number of messages that wait for the past."""
+        return len(self._held)
+
+    def drop(self) -> None:
+        """Take what is held for forged."""
+        self.forged += self.held
+        self._held = []
 
     def _deliver(self, written: Written) -> None:
         self._seen[written.key] = written.envelope.nth

@@ -184,7 +184,9 @@ class Readers:
                 carrier.undeclare()
 
     def _follower(self, reader: _Reader, run: str) -> Follower:
-        return reader.follower(run, self._peers.publishers, self._loop.time())
+        follower = reader.follower(run, self._peers.publishers, self._loop.time())
+        follower.known = follower.known or run in self._peers.publishers
+        return follower
 
     def _sample_came(self, pattern: str, sample: Arrived) -> None:
         if not sample.is_put:
@@ -210,6 +212,8 @@ class Readers:
             for one in follower.take(written):
                 self._deliver(reader, one, run, past=False)
             self._catch_up(reader, run, follower)
+            if not follower.known and follower.held == 1:
+                self._loop.call_later(UNANSWERED, self._give_up, reader, run, follower)
 
     def _is_trusted(self, written: Written, run: str) -> bool:
         """False for a message that its process may not send. One without an envelope is as good as its key."""
@@ -277,8 +281,20 @@ class Readers:
             return bus.unreadable(error, _sample(written, run, self._loop.time()))
 
     def _catch_up(self, reader: _Reader, run: str, follower: Follower) -> None:
-        if follower.behind and not follower.asking:
+        if follower.behind and not follower.asking and follower.known:
             self._ask(reader, run, follower)
+
+    def _give_up(self, reader: _Reader, run: str, follower: Follower) -> None:
+        """Drop what a process is said to have sent that has not shown itself: Zenoh tells of it before its messages.
+
+        If it is there after all, its past has them.
+        """
+        if not follower.known:
+            follower.drop()
+            self._tell_forged(reader, run)
+
+    def _tell_forged(self, reader: _Reader, run: str) -> None:
+        LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
 
     def _ask(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
         """Ask a process for what is missing."""
@@ -312,7 +328,7 @@ class Readers:
         for written, is_past in follower.catch_up(past):
             self._deliver(reader, written, run, past=is_past)
         if follower.forged > known:
-            LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
+            self._tell_forged(reader, run)
         if follower.again:
             follower.again, follower.behind = False, True
         self._catch_up(reader, run, follower)
