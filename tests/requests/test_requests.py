@@ -1,8 +1,10 @@
 """Both ends of a long request, over a memory bus that loses, repeats, delays, is cut, and whose ends die."""
 
 import asyncio
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -124,7 +126,7 @@ async def test_a_killed_server_fails_the_request_after_the_grace(hub: MemoryHub)
         with pytest.raises(RunFailed, match="realizer has not been seen for 4"):
             await pending.outcome
 
-    assert asyncio.get_running_loop().time() == 1.0 + Patience().grace
+    assert asyncio.get_running_loop().time() == 1.0 + 4.0  # as bus.md says
 
 
 async def test_a_restarted_server_does_not_perform_again_what_it_had_accepted(hub: MemoryHub):
@@ -174,6 +176,37 @@ async def test_a_request_that_may_have_begun_unaccepted_is_not_begun_again_by_th
     assert (server.taken, again.taken) == ([block()], [])
     assert not pending.accepted.done() or pending.accepted.exception()
     await again.die(hub)
+
+
+async def test_a_server_that_is_there_and_says_nothing_fails_the_request_after_half_a_minute(hub: MemoryHub):
+    mute = hub.join("realizer")
+    mute.declare_alive()
+    with mute.subscribe(keys.cancel("realizer")) as cancels:
+        async with Requester(hub.join("client")) as requests:
+            pending = requests.send(keys.BLOCK, block())
+
+            with pytest.raises(RunFailed, match="realizer is there, but has not answered for 30 s"):
+                await pending.outcome
+            assert asyncio.get_running_loop().time() == 30.0
+            received = await cancels.next()
+
+    assert received is not None
+    assert received.message.id == "b"
+
+
+def test_the_limits_are_those_that_the_page_tells():
+    page = Path(__file__).parents[2].joinpath("docs/bus.md").read_text()
+    patience = Patience()
+    for words, limits in (
+        (r"sent again after ([\d.]+) s, doubling to ([\d.]+) s", (patience.first_resend, patience.longest_resend)),
+        (r"(\d+) requests to one server are on their way", (patience.window,)),
+        (r"server gone for ([\d.]+) s", (patience.grace,)),
+        (r"server there, but without any answer for ([\d.]+) s", (patience.silence,)),
+        (r"requester gone for ([\d.]+) s", (GRACE,)),
+    ):
+        told = re.search(words, page)
+        assert told, words
+        assert tuple(map(float, told.groups())) == limits
 
 
 async def test_a_short_absence_of_the_server_is_harmless(hub: MemoryHub):
