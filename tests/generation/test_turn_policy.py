@@ -180,6 +180,19 @@ def test_a_failed_fragment_aborts_its_turn_and_what_is_in_line() -> None:
     assert turns.holds_the_turn  # with d
 
 
+def test_recognition_is_not_told_of_a_turn_that_has_the_id_of_one_that_failed_and_has_not_begun() -> None:
+    turns = policy()
+    turns.accept(fragment("a", "full"), "human")
+    turns.fragment_begins("a")
+    failed = turns.fragment_ended("a", complete=False, now=1.0)
+    turns.accept(fragment("a", "full"), "human")
+    again = turns.fragment_ended("a", complete=False, now=2.0)
+
+    assert failed is not None
+    assert again is not None
+    assert (failed.is_known, again.is_known) == (True, False)
+
+
 def test_after_a_fault_the_turn_cannot_go_on() -> None:
     turns = policy()
     turns.accept(fragment("a", "beginning"), "human")

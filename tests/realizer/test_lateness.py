@@ -36,6 +36,18 @@ def test_who_comes_to_look_long_after_gives_up_at_once() -> None:
     assert watch.overdue(20.0) == []
 
 
+def test_what_is_expected_again_as_before_is_late_again() -> None:
+    """As of a behavior that held for a while, and whose estimate has not changed."""
+    watch = LatenessWatch(CONFIG)
+    watch.expect("b", "stroke", 1.0, 1.0)
+    watch.forget("b")
+    assert watch.deadline is None
+
+    watch.expect("b", "stroke", 1.0, 1.0)
+
+    assert watch.overdue(2.5) == [Late("b", "stroke", 1.5)]
+
+
 def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> None:
     """Not from when something else about it was looked at again."""
     body = FakeBody()

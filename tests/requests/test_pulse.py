@@ -110,16 +110,23 @@ def test_what_has_not_ended_within_the_time_that_it_was_given_is_cancelled_then_
     assert cancelled[0] == pytest.approx(13.0 if again is None else 15.0)
 
 
-def test_it_is_renewed_three_times_within_held_after() -> None:
-    asking = asked_to_move()
-    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.01, "control")
-    renewed, at = [], 10.01
-    while at < 12.0:
-        at += 0.01
+@pytest.mark.parametrize(
+    ("held_after", "longest"), [(0.5, 0.5 / 3), (0.15, 0.05), (0.03, 0.05)], ids=["as usual", "short", "too short"]
+)
+def test_it_is_renewed_three_times_within_held_after_and_twenty_times_a_second_at_most(
+    held_after: float, longest: float
+) -> None:
+    asking = Asking("me", "1", Patience(lease=4.0))
+    asking.server_there("control", "run", 10.0)
+    asking.send(keys.BEHAVIOR, replace(MOVES, held_after=held_after), 10.0)
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_behavior"), 10.001, "control")
+    renewed = []
+    for millisecond in range(2, 2001):
+        at = 10.0 + millisecond / 1000
         renewed += [at for each in asking.tick(at) if isinstance(each, Renew)]
 
-    assert max(after - before for before, after in pairwise(renewed)) <= 0.5 / 3 + 0.011
-    assert len(renewed) < 14
+    assert max(after - before for before, after in pairwise(renewed)) <= longest + 0.0011
+    assert len(renewed) < 2.0 / longest + 2
 
 
 def test_what_is_not_accepted_yet_is_sent_as_often_since_it_may_have_begun() -> None:
