@@ -221,10 +221,8 @@ def marked_up(text: str, marks: Sequence[Mark], start: int, end: int, **how: str
     cuts = [(start, 1, opening), (end, -1, "</prosody>")]
     # A mark at the start of the span stands before it, one at its end behind it.
     cuts += [(mark.position, 0, f"<mark name={quoteattr(mark.id)}/>") for mark in marks]
-    ordered = sorted(cuts, key=lambda cut: cut[0])
-    ordered = sorted(ordered, key=lambda cut: (cut[0], cut[1] if cut[0] in (start, end) else 0))
     written, at = "", 0
-    for position, _, inserted in ordered:
+    for position, _, inserted in sorted(cuts, key=lambda cut: cut[:2]):
         written += escape(text[at:position]) + inserted
         at = max(at, position)
     return written + escape(text[at:])
