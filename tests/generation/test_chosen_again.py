@@ -109,6 +109,20 @@ async def test_a_reference_is_chosen_again_if_the_body_breaks_off_its_gesture(hu
     assert told.said == "Please take this very nice the cup from the table."
 
 
+async def test_punctuation_that_was_said_with_its_phrase_is_not_said_again_with_the_rest(hub: MemoryHub) -> None:
+    async def breaks(ann: Any, client: Robot) -> None:
+        await asyncio.sleep(2.0)  # "this," is said by then
+        await client.switch_on(BodyFault(kind="overheated", part="left_arm", before="stroke_start"))
+
+    refer = {"refer": "cup", "certainty": "high"}
+    says = ("Please take", ",", "and put the other things around", "on the table.")
+    first, comma, between, last = ({"say": each} for each in says)
+    call = {"turn_status": "full", "parts": [first, refer, comma, between, refer, last]}
+    told = await performed(hub, breaks, call)
+
+    assert told.said == "Please take this, and put the other things around it on the table."
+
+
 async def test_words_that_have_begun_are_said_and_a_warning_tells_that_nothing_was_shown(hub: MemoryHub) -> None:
     async def breaks(ann: Any, client: Robot) -> None:
         await client.switch_on(BodyFault(kind="overheated", part="left_arm", before="stroke"))
