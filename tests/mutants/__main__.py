@@ -55,13 +55,21 @@ class Mutant(Struct):
 
 
 class Verdict(Struct):
-    """killer: the test that failed, `timeout`, or nothing: the mutant lives. tried: test files that have run."""
+    """killer: the test that failed; a file that could not be imported; `timeout`; or nothing: the mutant lives.
+
+    tried: test files that have run. near: test files that run the line.
+    """
 
     mutant: Mutant
     killer: str
     tried: int
     near: int
     seconds: float
+
+    @property
+    def is_noticed_anyhow(self) -> bool:
+        """The mutant hung, or could not be imported: no claim of a test has failed."""
+        return bool(self.killer) and "::" not in self.killer
 
 
 def folders() -> dict[str, list[str]]:
@@ -160,6 +168,8 @@ class Copy:
         match process.returncode:
             case 0 | 5:  # all green, or none was there to run
                 return ""
+            case 4 if "while loading conftest" in told:
+                return "import of conftest.py"
             case 4:
                 raise SystemExit(told)
         red = re.search(r"^(?:FAILED|ERROR) (\S+?\.py(?:::.*?)?)(?: - .*)?$", told, re.MULTILINE)
@@ -218,7 +228,9 @@ def report(verdicts: Sequence[Verdict]) -> bool:
         ours = [each for each in verdicts if each.mutant.folder == folder and each.mutant.key not in reasons]
         killed = sum(bool(verdict.killer) for verdict in ours)
         well &= killed >= GOAL * len(ours)
-        print(f"{folder:24}{killed:4} of {len(ours):3}  {killed / max(len(ours), 1):4.0%}")
+        anyhow = sum(verdict.is_noticed_anyhow for verdict in ours)
+        told = f", {anyhow} without any claim" if anyhow else ""
+        print(f"{folder:24}{killed:4} of {len(ours):3}  {killed / max(len(ours), 1):4.0%}{told}")
     return well
 
 

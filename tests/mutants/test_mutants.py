@@ -161,6 +161,17 @@ def test_a_mutant_that_hangs_is_killed(tree: Copy, monkeypatch: pytest.MonkeyPat
     assert judged(tree, Mutant("services/most", "engage_hri/services/most.py", change, "", ""), "one") == "timeout"
 
 
+@pytest.mark.parametrize("reader", ["conftest", "test_one"])
+def test_a_mutant_that_cannot_be_imported_is_killed_and_told_apart(tree: Copy, reader: str) -> None:
+    (tree.root / f"tests/{reader}.py").write_text(
+        "import engage_hri.services.most as it\nassert it.most(1, 2) == 2\n"
+    )
+    verdict = tree.judged(mutant("negate", "(not (a > b))"), ["tests/test_one.py"], cast(Nearest, Map()), budget=60.0)
+
+    assert reader in verdict.killer
+    assert verdict.is_noticed_anyhow
+
+
 def test_code_of_another_tree_is_not_judged(tree: Copy, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.rmtree(tree.root / "engage_hri")
     (tree.root / "engage_hri").symlink_to(ROOT / "engage_hri")
