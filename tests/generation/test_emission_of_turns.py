@@ -88,6 +88,14 @@ def test_a_backchannel_is_announced_before_its_nod_or_word() -> None:
     assert [by_id(made)["backchannel"].needs for made in (nodded, said)] == [("n",), ("s",)]
 
 
+@pytest.mark.parametrize(("first", "needs"), [("r", ("r-phrase",)), ("s", ())])
+def test_the_pair_of_a_turn_falls_with_its_first_words_alone(first: str, needs: tuple[str, ...]) -> None:
+    parts = (reference("r"), speech("s"))
+    made = block(TurnFragment(id="f", behaviors=parts if first == "r" else parts[::-1]), [(LOOK, "it")])
+
+    assert by_id(made)["turn-pair"].needs == needs
+
+
 def test_a_turn_without_speech_ends_when_everything_in_it_has() -> None:
     waves = (Gesture(id="wave", lexeme="wave"), Gaze(id="g", target="piece"))
 
