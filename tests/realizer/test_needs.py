@@ -1,6 +1,6 @@
 """Behaviors that fall with what they need."""
 
-from engage_hri.schemas.behaviors import Event, Gaze, Head, Speech
+from engage_hri.schemas.behaviors import Event, Gaze, Head, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -33,3 +33,13 @@ def test_what_needs_something_that_falls_falls_too_and_all_else_stays() -> None:
 
     assert set(plan.dropped) == {"look", "this", "rest"}
     assert set(plan.chains) == {"nod"}
+
+
+def test_what_needs_something_that_cannot_be_on_time_falls_with_it() -> None:
+    late = Gaze(id="look", target="cup", timing=(Timing("start", "1.0"), Timing("end", "1.01")))
+    this = Speech(id="this", text="this", needs=("look",))
+
+    plan = plan_block(Block(id="b", behaviors=(late, this, Speech(id="rest", text="cup", needs=("this",)))), [])
+
+    assert plan.dropped == ("look", "this", "rest")
+    assert not plan.chains
