@@ -11,6 +11,7 @@ from engage_hri.schemas.behaviors import Reference, Speech, SpeechOption
 from engage_hri.schemas.blocks import Block, SpokenText
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment
+from engage_hri.schemas.requests import Cancel
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.requests.ends import RequestRefused
@@ -158,6 +159,23 @@ async def test_a_fragment_that_fails_before_its_block_tells_recognition_of_the_t
         assert outcome.status == "failed"
         await asyncio.sleep(0.1)
         assert [(each.signal.signal, each.signal.turn) for each in partners.signals] == [("aborted", "a")]
+
+
+async def test_what_is_cancelled_with_a_fragment_that_failed_is_told_the_cause_of_that(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        with partners.bus.subscribe(keys.cancel("realizer")) as inbox:
+            for id, status in (("a", "beginning"), ("b", "end")):
+                partners.send(says(id, status))
+                await partners.fragment_block(id)
+            gone = Fault(reason="control has left", cause="gone", whose="control")
+            partners.end(partners.request("a"), "failed", fault=gone)
+            received = await inbox.next()
+
+        assert received is not None
+        cancel = received.message
+        assert isinstance(cancel, Cancel)
+        assert (cancel.id, cancel.reason) == (partners.request("b").id, "a failed")
+        assert (cancel.cause, cancel.whose) == ("gone", "control")
 
 
 async def test_a_turn_that_never_began_is_not_aborted_aloud(hub: MemoryHub) -> None:
