@@ -1,5 +1,7 @@
 """Points of other blocks in a plan: when they count, and the message about its net."""
 
+from typing import Any
+
 import pytest
 from msgspec.structs import replace
 
@@ -8,6 +10,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.nets import Fired
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.perform.net_message import described, firings, tokens
+from engage_hri.services.realizer.plan.foresight import coming_with, is_behind
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -137,3 +140,34 @@ def test_a_point_that_waits_for_one_of_this_block_is_expected_after_it_and_no_ea
 
     assert known.in_truth((), {own: 2.0}, 4.0) == {own: 2.0, theirs: 2.5, ended: 4.25}
     assert known.in_truth((), {own: 0.25}, 0.5) == {own: 0.25, theirs: 1.0, ended: 1.5}
+
+
+@pytest.mark.parametrize(
+    ("own", "expected"),
+    [(Point("n", "end"), True), (Point("w", "end"), True), (Point("s", "end"), False), (BLOCK_END, True)],
+    ids=str,
+)
+def test_a_point_of_another_block_that_waits_for_what_follows_a_behavior_is_behind_it(
+    own: Point, *, expected: bool
+) -> None:
+    """The wait follows the nod, the speech follows nothing, and a block ends after all."""
+    both = block((NOD, Wait(id="w"), Speech(id="s", text="So")), after("n:stroke", "w:start"))
+    made: Any = plan_block(both, [estimate(NOD)])
+    theirs = Point("other:x", "start")
+
+    assert is_behind(made, Known(awaiting={theirs: {own: 0.5}}), theirs, "n") is expected
+    assert not is_behind(made, Known(), theirs, "n")
+
+
+@pytest.mark.parametrize(("first", "second", "waits"), [(1.0, 2.0, {"n"}), (2.0, 1.0, {"n"})])
+def test_what_comes_with_a_point_of_another_block_is_what_waits_for_that_block(
+    first: float, second: float, waits: set[str]
+) -> None:
+    """And not what waits for a third one, whichever of them comes first."""
+    mine = Block(id="third", behaviors=(Wait(id="y"),))
+    theirs, thirds = Point("other:x", "end"), Point("third:y", "end")
+    known = Known(blocks={**OTHERS, "third": mine}, points={theirs: first, thirds: second})
+    tied = block((NOD, Wait(id="w")), after("other:x:end", "n:start"), after("third:y:end", "w:start"))
+    made: Any = plan_block(tied, [estimate(NOD)], known=known)
+
+    assert {each.behavior for each in coming_with(made, known, theirs)} - {"other:x"} == waits
