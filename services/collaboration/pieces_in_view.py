@@ -37,8 +37,6 @@ class _View(Struct):
         """The piece at the median of where it was seen in the window, coordinate by coordinate, weighted by time."""
         pieces = [piece for _, piece in self.samples]
         last = pieces[-1]
-        if all(piece.position == last.position and piece.yaw == last.yaw for piece in pieces):
-            return last
         times = [max(at, now - WINDOW) for at, _ in self.samples]
         held = [end - at for at, end in zip(times, [*times[1:], now], strict=True)]
 

@@ -245,7 +245,7 @@ class Expectations(Observer):
 
     def _learn_words(self, behavior: str, interval: Interval | None, at: Seconds) -> bool:
         if interval is None or self._facts.held_between(interval.since, at, behavior):
-            return False
+            return False  # a hold says nothing about the voice
         return self._relearn(self.experience.learn_words(behavior, interval.natural, at - interval.since))
 
     def _relearn(self, changed: Collection[str]) -> bool:
