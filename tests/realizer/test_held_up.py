@@ -11,6 +11,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.held_up import STANDING, HeldUp
 from engage_hri.services.realizer.foresee.outlook import Outlook
+from engage_hri.services.realizer.net.stops import Stops
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.planning import elastic, plan, timed
 from tests.realizer.stage import block, together
@@ -144,3 +145,24 @@ def test_what_a_hold_has_cost_is_not_known_before_all_that_was_on_its_way_has_co
     decisions.reach(Point("s", "end"), 6.0)
     list(decisions.advance(6.0))
     assert not decisions.held_up.has_effect
+
+
+def test_what_holds_have_stopped_counts_from_the_start_of_the_block_whenever_that_was() -> None:
+    def stops(began: float) -> Stops:
+        decisions = Decisions(
+            plan(block((Wait(id="a", duration=5.0), Wait(id="b", duration=5.0)))), began, RealizerConfig()
+        )
+        decisions.follow([Point(id, "end") for id in "ab"])
+        decisions.advance(began)
+        for id in "ab":
+            decisions.reach(Point(id, "start"), began)
+        for held, at in (({"a"}, 1.0), (None, 1.5), ((), 2.0), ({"b"}, 3.0)):
+            decisions.hold(held, began + at)
+        return decisions.stops(began + 4.0)
+
+    first, later = stops(0.0), stops(64.0)
+
+    held = [(1.0, 1.5, {"a"}), (1.5, 2.0, None), (3.0, 4.0, {"b"})]
+    assert [(each.since, each.until, each.behaviors) for each in first.holds] == held
+    for told in ("holds", "phases", "reached", "times"):
+        assert getattr(first, told) == getattr(later, told), told
