@@ -184,6 +184,14 @@ def test_nothing_is_found_where_nothing_is_wrong() -> None:
     assert {cell.sees for cell in matrix(well())} == {"yes", "itself"}
 
 
+@pytest.mark.parametrize(("days", "is_told"), [(30.01, False), (29.99, True)])
+def test_a_certificate_is_told_from_thirty_days_before_its_end_on(days: float, *, is_told: bool) -> None:
+    """As its own process warns of it (docs/security.md)."""
+    facts = well(certificates=(Certificate(name="robot/observer/viewer", until=int(AT + days * 86400)),))
+
+    assert [each.where for each in findings(facts)] == ["robot/observer/viewer"] * is_told
+
+
 @pytest.mark.parametrize("what", ILL)
 def test_each_thing_that_is_wrong_is_told_with_what_to_do(what: str) -> None:
     facts, severity, where, words = ILL[what]

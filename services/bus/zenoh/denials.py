@@ -18,8 +18,8 @@ LEVELS = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor=trace,zeno
 MOST = 200
 """Number of different refusals of one holder that are told; a flood of them fills neither log nor memory."""
 WILD = 4
-"""Number of `$*` in a key from which on it is told who sent it: each multiplies the time in which Zenoh matches it.
-Keys of ours have one."""
+"""Most `$*` in a key of which nothing is told; of more it is told who sent it: each multiplies the time in which
+Zenoh matches it. Keys of ours have one."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
 _THREAD = re.compile(rb"ThreadId\((\d+)\)")
 _CHECKED = re.compile(
