@@ -139,9 +139,7 @@ class Copy:
                 self._write(path, whole)
             # What is in real time may be late by itself: it has to be green without the mutant.
             file = killer.partition("::")[0]
-            if file not in nearest.in_real_time or not self._first_red(
-                [killer], STARTS + 4.0 * nearest.seconds[file]
-            ):
+            if file not in nearest.doubtful or not self._first_red([killer], STARTS + 4.0 * nearest.seconds[file]):
                 break
             killer, left = "", left[left.index(file) + 1 :]
         return Verdict(mutant, killer, tried, len(tests), round(time.monotonic() - began, 1))

@@ -1,4 +1,4 @@
-"""A plugin of pytest, `-p tests.mutants.contexts`: which test file runs which line, and how long each file takes.
+"""A plugin of pytest, `-p tests.mutants.contexts`: which test file runs which line, how long it takes, and if it fails.
 
 Coverage knows contexts. Here the context is the test file, also in the processes that a test starts: they inherit it
 by the environment. It runs in each worker of xdist; the times are written by the process that hears of all.
@@ -36,7 +36,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 class Times:
-    """Seconds of each test file that is green, over all workers."""
+    """Seconds of each test file, over all workers, and which of them were red."""
 
     def __init__(self) -> None:
         self.seconds: Counter[str] = Counter()
@@ -51,8 +51,8 @@ class Times:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         path = Path(session.config.rootpath, SECONDS)
         path.parent.mkdir(parents=True, exist_ok=True)
-        times = {file: round(time, 3) for file, time in sorted(self.seconds.items()) if file not in self.red}
-        path.write_text(json.dumps(times, indent=0))
+        times = {file: round(time, 3) for file, time in sorted(self.seconds.items())}
+        path.write_text(json.dumps({"seconds": times, "red": sorted(self.red)}, indent=0))
 
 
 def pytest_configure(config: pytest.Config) -> None:

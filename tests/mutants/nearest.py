@@ -10,14 +10,22 @@ from tests.mutants.places import MAP, SECONDS
 
 
 class Nearest:
-    """seconds: how long a file took, of those that were green: a file that fails anyhow tells nothing of a mutant."""
+    """seconds: how long each file of tests took. doubtful: files of which a test may fail without any mutant, too.
+
+    That is what is in real time, and what was red when the map was made: some tests want more than the few cases that
+    a map tries.
+    """
 
     def __init__(self, root: Path) -> None:
         self._root = root
         self._data = CoverageData(str(root / MAP))
         self._data.read()
-        self.seconds: dict[str, float] = json.loads((root / SECONDS).read_text())
-        self.in_real_time = {name for name in self.seconds if "real_time" in (root / name).read_text()}
+        measured = json.loads((root / SECONDS).read_text())
+        self.seconds: dict[str, float] = measured["seconds"]
+        self.doubtful = {
+            *measured["red"],
+            *(name for name in self.seconds if "real_time" in (root / name).read_text()),
+        }
 
     def tests(self, file: str, change: Change, source: bytes) -> list[str]:
         """Files that run the statement of this change; those that run anything of its file if that is not known.
@@ -35,10 +43,10 @@ class Nearest:
         return sorted(found & self.seconds.keys(), key=lambda name: self._distance(name, file))
 
     def _distance(self, test: str, file: str) -> tuple[bool, bool, bool, float]:
-        """Virtual time before real time; what has the file's name, and its folder's; the quick before the slow."""
+        """What is sure before what is doubtful; what has the file's name, and its folder's; quick before slow."""
         folders, stem = Path(file).parent.parts, Path(file).stem
         return (
-            test in self.in_real_time,
+            test in self.doubtful,
             stem not in Path(test).stem.removeprefix("test_").split("_") and f"test_{stem}" != Path(test).stem,
             not set(Path(test).parent.parts[1:]) & set(folders),
             self.seconds[test],

@@ -102,9 +102,9 @@ FAILS_ANYHOW = "import pytest\npytestmark = [pytest.mark.real_time]\ndef test_la
 class Map:
     """Files of tests with the seconds that they take."""
 
-    def __init__(self, *real_time: str) -> None:
+    def __init__(self, *doubtful: str) -> None:
         self.seconds = {"tests/test_one.py": 0.1, "tests/test_late.py": 0.1}
-        self.in_real_time = set(real_time)
+        self.doubtful = set(doubtful)
 
 
 @pytest.fixture
@@ -128,8 +128,8 @@ def mutant(kind: str, new: str) -> Mutant:
     return Mutant("services/most", "engage_hri/services/most.py", change, "", "")
 
 
-def judged(tree: Copy, what: Mutant, *tests: str, real_time: tuple[str, ...] = ()) -> str:
-    return tree.judged(what, [f"tests/test_{name}.py" for name in tests], cast(Nearest, Map(*real_time)), 60.0).killer
+def judged(tree: Copy, what: Mutant, *tests: str, doubtful: tuple[str, ...] = ()) -> str:
+    return tree.judged(what, [f"tests/test_{name}.py" for name in tests], cast(Nearest, Map(*doubtful)), 60.0).killer
 
 
 def test_a_mutant_that_a_test_notices_is_killed_by_that_test_and_one_that_none_notices_lives(tree: Copy) -> None:
@@ -142,13 +142,12 @@ def test_a_mutant_that_a_test_notices_is_killed_by_that_test_and_one_that_none_n
     assert (tree.root / "engage_hri/services/most.py").read_text() == MODULE
 
 
-def test_a_test_in_real_time_that_fails_without_the_mutant_as_well_kills_none(tree: Copy) -> None:
+def test_a_test_that_fails_without_the_mutant_as_well_kills_none(tree: Copy) -> None:
     late = ("tests/test_late.py",)
 
-    assert judged(tree, mutant("compare", ">="), "late", "one", real_time=late) == ""
+    assert judged(tree, mutant("compare", ">="), "late", "one", doubtful=late) == ""
     assert (
-        judged(tree, mutant("negate", "(not (a > b))"), "late", "one", real_time=late)
-        == "tests/test_one.py::test_one"
+        judged(tree, mutant("negate", "(not (a > b))"), "late", "one", doubtful=late) == "tests/test_one.py::test_one"
     )
 
 
