@@ -1,4 +1,4 @@
-"""A plugin of pytest, `-p tests.mutants.contexts`: which test file runs which line, how long it takes, and if it fails.
+"""A plugin of pytest, `-p tests.mutants.contexts`: which test file runs which line, how long each takes, which fail.
 
 Coverage knows contexts. Here the context is the test file, also in the processes that a test starts: they inherit it
 by the environment. It runs in each worker of xdist; the times are written by the process that hears of all.
