@@ -266,6 +266,14 @@ def test_the_matrix_is_drawn() -> None:
     assert ["3", "recognition", "y", "y", "·", "y", "N"] in tiny
 
 
+def test_the_newest_counts_of_a_participant_are_drawn() -> None:
+    facts = with_one("control", bus={"lost": 2}, later=known("control", bus={"lost": 7}).status)
+    (row,) = [line.split() for line in drawn(facts, 120) if line.startswith("control") and "desk" in line]
+
+    assert "7" in row
+    assert "2" not in row
+
+
 @pytest.mark.parametrize("width", [60, 80, 120])
 def test_a_crowd_of_watchers_is_listed_below_the_matrix(width: int) -> None:
     watchers = tuple(Known(name=f"watch-{number}", answers=False) for number in range(60))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.study.permutation import DRAWS, EXACT, Paired, holm, paired
+from engage_hri.services.study.permutation import DRAWS, EXACT, Paired, holm, paired, separate
 
 
 def test_three_differences_of_one_sign_could_still_be_chance():
@@ -63,6 +63,15 @@ def test_many_pairs_are_tested_by_drawing():
     clear, none = paired([1.0] * (EXACT + 1)), paired([1.0, -1.0] * EXACT)
 
     # All + or all - comes once in 16384.
+    assert clear.p is not None
+    assert 0.0 < clear.p < 10 / DRAWS  # the sample itself is counted
+    assert none.p == 1.0
+
+
+def test_many_divisions_of_two_samples_are_tested_by_drawing():
+    clear, none = separate([0.0] * 20, [1.0] * 20), separate([0.0, 1.0] * 10, [1.0, 0.0] * 10)
+
+    # Of 1.4e11 divisions two are as extreme.
     assert clear.p is not None
     assert 0.0 < clear.p < 10 / DRAWS  # the sample itself is counted
     assert none.p == 1.0

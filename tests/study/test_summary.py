@@ -40,6 +40,22 @@ def test_the_overview_counts_finished_sessions_only():
     assert rows["backchannel"] == ("5.0 ± 1.4", "-")
 
 
+def test_each_measure_has_its_row_and_its_digits():
+    records = [
+        session("a", number, kind("backchannel", 4 + number), completion=99.0, pairs=1.5, face=(0.25, 0.5, 0.75),
+                mtbce=5.0)
+        for number in range(2)
+    ]  # fmt: skip
+
+    rows = dict(summary.overview(records).rows)
+
+    assert [rows[f"face, {third} third"] for third in ("first", "second", "last")] == [
+        "0.25 ± 0.00", "0.50 ± 0.00", "0.75 ± 0.00",
+    ]  # fmt: skip
+    assert rows["pair to pair (s)"] == "1.50 ± 0.00"
+    assert rows["connection events"] == "4.5 ± 0.7"
+
+
 def test_sessions_that_were_never_played_count_as_not_finished() -> None:
     records = [session("operational", 0), session("operational", 1)]
 
