@@ -327,7 +327,7 @@ class MemoryBus(Bus):
             answer = await server.answers.ask(key, asked, deadline, partial(self._hub.carried, key))
             if answer is not None:
                 return answer
-        raise self.unanswered(key, timeout)
+        raise self.unanswered(key, timeout, deadline)
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         self.answers.served[key] = answer

@@ -28,7 +28,6 @@ from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragment_runner import FragmentRunner
 from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.requests.causes import Sight
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.runtime.publisher import Publisher
@@ -271,7 +270,7 @@ class _Generation:
                     self._admit(request, now, until)  # too late to wait: refuses it for the missing person
                     continue
                 since, advice = now - self._config.world_patience, "is perception running?"
-                sight, name = Sight(NAME, self._bus.unlinked_at), self._perception.name or "perception"
+                sight, name = self._bus.sight, self._perception.name or "perception"
                 fault = sight.misses(name, id, since, now).following("the world is unknown", id)
                 self._refuse(id, replace(fault, advice=advice))
         for id, fault in self._runner.settle(now):

@@ -10,7 +10,8 @@ from engage_hri.schemas.requests import Cancel, KeepAlive, Kept
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.requests.ends import LATE, RequestDesk
+from engage_hri.services.bus.sight import LATE
+from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 TERM: Seconds = 2.0

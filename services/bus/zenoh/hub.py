@@ -363,7 +363,7 @@ class ZenohBus(Bus):
                     told = await self._try(key, message, payload, encoding, deadline)
         if told is not None:
             return told
-        raise self.unanswered(key, timeout)
+        raise self.unanswered(key, timeout, deadline)
 
     async def _try(
         self, key: str, message: Message, payload: bytes, encoding: str, deadline: Seconds
