@@ -98,16 +98,15 @@ class Bus(ABC):
         """Local time at which this process last had no router, though it had had one; -inf: never."""
         return -inf
 
-    def unanswered(self, key: str, within: Seconds, deadline: Seconds) -> NoReply:
+    def unanswered(self, key: str, within: Seconds) -> NoReply:
         """The error of a question that nobody has answered, with the reason as far as it can be known here."""
         server = keys.server_of(key)
         cause: Cause = "gone"
         why, advice = "it is not there", f"is {server} running?"
         if server in self.health.peers:
             cause, why, advice = "silent", "it is there, but does not answer", f"is {server} stuck?"
-        self.sight.look(self.now(), deadline)
         what = f"no reply from {server} within {within:g} s"
-        return NoReply(self.sight.fault(what, why, cause, server, key, deadline - within, advice))
+        return NoReply(self.sight.fault(what, why, cause, server, key, self.now() - within, advice))
 
     def new_life(self) -> str:
         """Make the life of a requester on this bus: two requesters may use the same ids then."""
@@ -216,9 +215,23 @@ class Bus(ABC):
         Messages that nobody can read are among them. capacity: bytes of the payloads that wait.
         """
 
-    @abstractmethod
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
-        """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault)."""
+        """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault).
+
+        A process that stood still asks once more: the time is not the server's, and asking changes nothing.
+        """
+        for _ in range(2):
+            deadline = self.now() + timeout
+            if (told := await self._query(key, message, deadline)) is not None:
+                return told
+            self.sight.look(self.now(), deadline)
+            if self.sight.woke_at < deadline:
+                break
+        raise self.unanswered(key, timeout)
+
+    @abstractmethod
+    async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
+        """Ask the server of an `rpc` key; None if nobody has answered by then. Raises InputRefused."""
 
     @abstractmethod
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
