@@ -20,8 +20,9 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.perceive import perceive
-from engage_hri.services.client.perceived_person import SEAT, PerceivedPerson
+from engage_hri.services.client.perceived_person import BESIDE, SEAT, PerceivedPerson, free_seat
 from engage_hri.services.client.robot import connect
+from engage_hri.services.client.utterances import WORD, speaking_time
 from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.simulation.still import show_world
 from tests.cli.command import engage
@@ -176,6 +177,30 @@ async def test_two_people_sit_beside_one_another_in_one_world(hub: MemoryHub) ->
         assert (await places(hub)).keys() == {"cup", "ball"}
 
 
+@pytest.mark.parametrize("count", [2, 5])
+def test_those_who_sit_down_at_once_sit_beside_one_another_as_near_the_middle_as_they_can(
+    count: int,
+) -> None:
+    seats = [free_seat((), skip) for skip in range(count)]
+
+    apart = [math.dist(one, other) for number, one in enumerate(seats) for other in seats[:number]]
+    assert min(apart) == pytest.approx(BESIDE)
+    assert max(math.dist(seat, SEAT) for seat in seats) == pytest.approx(BESIDE * (count // 2))
+
+
+async def test_a_hand_that_does_nothing_lies_before_its_owner(hub: MemoryHub) -> None:
+    async with scene(hub), perceive("ann", hub=hub), perceive("bob", hub=hub):
+        world = await places(hub)
+
+    for person in ("ann", "bob"):
+        (x, y, z), (u, v, w) = world[person], world[f"{person}-hand"]
+        assert (0.0 < x - u < 0.5, y == v, 0.3 < z - w < 0.8) == (True, True, True)
+
+
+def test_words_take_their_time_one_by_one_and_no_speech_takes_none() -> None:
+    assert [speaking_time(text) for text in ("", "yes", "put it there")] == pytest.approx([WORD, WORD, 3 * WORD])
+
+
 async def test_a_person_whom_the_world_has_already_is_not_put_there_again(hub: MemoryHub) -> None:
     ann = Entity(id="ann", kind="person", position=(2.0, 1.0, 1.5))
     async with scene(hub, World(entities=(*THINGS.entities, ann))), perceive("ann", hub=hub):
@@ -186,14 +211,17 @@ async def test_a_person_whom_the_world_has_already_is_not_put_there_again(hub: M
 async def test_a_thing_stays_where_somebody_has_laid_it(hub: MemoryHub) -> None:
     async with scene(hub):
         async with perceive("ann", hub=hub) as ann:
-            acting = asyncio.create_task(ann.act("cup", to=(0.7, 0.1, 0.7), seconds=1.0))
+            acting = asyncio.create_task(ann.act("cup", to=(0.7, 0.3, 0.9), seconds=1.0))
             await asyncio.sleep(0.45)
             midway = await places(hub)
             assert midway["ann-hand"] == midway["cup"]
             assert 0.5 < midway["cup"][0] < 0.7
+            way = (0.7 - 0.5, 0.3 - 0.1, 0.9 - 0.7)
+            done = [(at - began) / far for at, began, far in zip(midway["cup"], (0.5, 0.1, 0.7), way, strict=True)]
+            assert done == pytest.approx([done[0]] * 3)  # in a straight line
             await acting
         await asyncio.sleep(10.0)
-        assert (await places(hub))["cup"] == (0.7, 0.1, 0.7)
+        assert (await places(hub))["cup"] == (0.7, 0.3, 0.9)
 
 
 async def test_people_whose_program_was_killed_stay_for_a_grace(hub: MemoryHub) -> None:
