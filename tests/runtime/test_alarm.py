@@ -48,8 +48,14 @@ def test_an_alarm_rings_no_later_than_the_earliest_instant_it_was_given() -> Non
         alarm = Alarm(lambda: rings.append(loop.time()))
         for at in (3.0, 1.0, 2.0, None):
             alarm.set(at)
+        await asyncio.sleep(1.5)
+        alarm.set(4.0)  # it can be set again once it has rung
+        await asyncio.sleep(3.5)
+        alarm.set(6.0)
+        alarm.stop()
+        alarm.set(7.0)  # and once it was stopped
         await asyncio.sleep(10.0)
         return rings
 
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
-        assert runner.run(main()) == [1.0]
+        assert runner.run(main()) == [1.0, 4.0, 7.0]
