@@ -185,7 +185,7 @@ async def test_a_server_that_is_there_and_says_nothing_fails_the_request_after_h
         async with Requester(hub.join("client")) as requests:
             pending = requests.send(keys.BLOCK, block())
 
-            with pytest.raises(RunFailed, match="realizer is there, but has not answered for 30 s"):
+            with pytest.raises(RunFailed, match="realizer is there, but has not answered for 30"):
                 await pending.outcome
             assert asyncio.get_running_loop().time() == 30.0
             received = await cancels.next()
