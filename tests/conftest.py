@@ -92,7 +92,8 @@ class _Bugs(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         text = logging.Formatter().format(record)
-        if record.name != "asyncio" or text.startswith("Exception in callback"):  # the others come whenever garbage goes
+        # What else a loop tells comes when garbage is collected, perhaps in another test.
+        if record.name != "asyncio" or text.startswith("Exception in callback"):
             self.found.append(text)
 
 
