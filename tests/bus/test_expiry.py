@@ -45,6 +45,12 @@ def test_the_end_is_told_30_days_7_days_and_a_day_ahead_and_as_it_comes() -> Non
     assert [day for day, _ in lines] == pytest.approx([335, 358, 364, 365], abs=1e-6)
 
 
+def test_it_is_told_at_its_instant_and_not_at_the_next_full_hour() -> None:
+    minute = 1 / 24 / 60
+
+    assert [day for day, _ in told(10, left=8 + minute)] == pytest.approx([0, 1 + minute, 7 + minute, 8 + minute])
+
+
 def test_a_process_that_starts_late_tells_it_at_once_and_then_as_others_do() -> None:
     assert told(10, left=5) == [(0.0, expires("5 days")), (4.0, expires("24 hours")), (5.0, EXPIRED)]
 

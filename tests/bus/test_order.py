@@ -336,3 +336,14 @@ def test_what_is_handed_out_of_a_key_fits_into_its_row_or_is_one_message():
         packed = msgspec.msgpack.encode([(one.key, one.encoding, one.payload, one.envelope) for one in part])
         assert len(packed) <= SMALL + BESIDE
     assert len(parts) < len(sizes)
+
+
+def test_a_pulse_of_many_keys_has_the_last_ones_and_stays_small() -> None:
+    sent = SentLog("run")
+    for number in range(10_000):
+        write(sent, f"{keys.FEEDBACK}/{number:05}")
+
+    (counts,) = sent.recent(0.0).values()
+
+    assert [*counts] == [f"{keys.FEEDBACK}/{number:05}" for number in range(9999, 9999 - len(counts), -1)]
+    assert 0.5 * SMALL < len(msgspec.msgpack.encode(counts)) < SMALL
