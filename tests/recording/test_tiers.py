@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.interface import Sample
 from engage_hri.services.recording.annotations import Media, eaf, table, textgrid
 from engage_hri.services.recording.lanes import Annotation, Tier, apart
 from engage_hri.services.recording.reading import Recording
@@ -58,6 +60,26 @@ def test_looks_of_both_sides_are_those_that_were_told(task: Recording) -> None:
     assert by_name["robot words"].annotations[0].value
     speech = " ".join(one.value for one in by_name["robot speech"].annotations)
     assert " ".join(one.value for one in by_name["robot words"].annotations) == speech
+
+
+def test_words_of_people_are_where_they_were_said_as_they_were_understood_last() -> None:
+    def says(id: str, text: str, began: float, ended: float | None, at: float, clock: str = "loop") -> Sample:
+        last = None if ended is None else Stamp(clock, ended)
+        words = Utterance(actor="ann", id=id, text=text, began=Stamp(clock, began), ended=last, at=Stamp("loop", at))
+        return sample(keys.UTTERANCE, words, at)
+
+    told = [
+        sample(keys.fault("there"), Fault(reason="begin"), 0.0),
+        says("1", "put it their", 1.0, 2.0, 2.25),
+        says("1", "put it there", 1.0, 2.0, 2.5),
+        says("2", "yes", 3.0, None, 3.5),
+        says("3", "so", 71.0, 72.0, 5.0, clock="of nobody"),
+    ]
+
+    (words,) = [tier for tier in tiers(recording(told)) if tier.name == "ann words"]
+    found = [(one.begin, one.value) for one in words.annotations]
+    assert found == [(1.0, "put it there"), (3.0, "yes"), (5.0, "so")]
+    assert [one.end for one in words.annotations[:2]] == [2.0, 3.5]
 
 
 def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
