@@ -2,6 +2,7 @@
 
 from msgspec import Struct
 
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Stamp
 
 
@@ -9,13 +10,15 @@ class Hold(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A hold that is in force.
 
     block: id of a live block; empty: all that the robot performs, and what comes. behavior: of that block; empty: all
-    of it. since: when it began. until: when what it holds is stopped, unless somebody lets it go on before.
+    of it. since: when it began. until: when what it holds is stopped, unless somebody lets it go on before. why: what
+    has happened, and whose it was; None: somebody has asked for it.
     """
 
     since: Stamp
     until: Stamp
     block: str = ""
     behavior: str = ""
+    why: Fault | None = None
 
     def holds(self, other: "Hold") -> bool:
         """True if what the other holds is the same as what this one holds, or a part of it."""

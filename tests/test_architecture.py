@@ -27,7 +27,7 @@ MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 """Packages of `services` that pure files don't know either; their own pure files aside."""
 PURE_MACHINERY = {
     "services/requests/asked.py", "services/requests/asking.py", "services/requests/asking_effects.py",
-    "services/requests/asking_table.py", "services/requests/causes.py",
+    "services/requests/asking_table.py",
     "services/requests/deadlines.py", "services/requests/ended.py", "services/requests/window.py",
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
@@ -39,7 +39,8 @@ PURE_MACHINERY = {
     "services/client/chunking.py",
     "services/client/event_stream.py", "services/client/person_actions.py", "services/client/shared_world.py",
     "services/client/utterances.py",
-    "services/bus/samples.py", "services/bus/payloads.py", "services/bus/often.py", "services/bus/zenoh/turns.py",
+    "services/bus/samples.py", "services/bus/payloads.py", "services/bus/often.py", "services/bus/sight.py",
+    "services/bus/zenoh/turns.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
@@ -55,7 +56,7 @@ LAYERS = {
     "services": "commandline > collaboration console control doctor generation realizer recognition"
     " simulation study > client > recording > requests > runtime > bus > tangram text",
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
-    "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often"
+    "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often sight"
     " > config journal keyring",
     "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
     " > composed guarded ordinary voice > driven members > performing questions shown"

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.access import role_of
-from engage_hri.schemas.faults import ROUTER, Cause, EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.faults import Cause, EngageError, Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
@@ -27,6 +27,7 @@ from engage_hri.services.bus import journal
 from engage_hri.services.bus.often import Often
 from engage_hri.services.bus.payloads import unreadable
 from engage_hri.services.bus.samples import sender_of
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.bus.subscription import CAPACITY as CAPACITY
 from engage_hri.services.bus.subscription import Keep as Keep
 from engage_hri.services.bus.subscription import Reading as Reading
@@ -49,6 +50,7 @@ class Bus(ABC):
     role: what it does among the others, one of `keys.ROLES`; stands in the keys of its commands. part: follows from
     it; stands in the key of its presence.
     clock: the clock that `now` reads, the same for all processes that can compare their times directly.
+    sight: what it knows of itself when it misses others.
     run: the participant's life. failures: number of errors here that were contained.
     log: the log of what happens here (`services/bus/journal.py`).
     """
@@ -64,6 +66,7 @@ class Bus(ABC):
         self.failures = 0
         self.log = journal.logger(name, self.role)
         self._life_numbers = life_numbers
+        self.sight = Sight(name, lambda: self.unlinked_at)
         self._loop = asyncio.get_running_loop()
         self._gone = False
         self._is_told_unsent = False
@@ -98,14 +101,12 @@ class Bus(ABC):
     def unanswered(self, key: str, within: Seconds) -> NoReply:
         """The error of a question that nobody has answered, with the reason as far as it can be known here."""
         server = keys.server_of(key)
-        cause: Cause
-        cause, whose, why, advice = "gone", server, "it is not there", f"is {server} running?"
-        if self.unlinked_at >= self.now() - within:
-            cause, whose, why, advice = "unlinked", ROUTER, f"{self.name} has had no router", ""
-        elif server in self.health.peers:
+        cause: Cause = "gone"
+        why, advice = "it is not there", f"is {server} running?"
+        if server in self.health.peers:
             cause, why, advice = "silent", "it is there, but does not answer", f"is {server} stuck?"
-        reason = f"no reply from {server} within {within:g} s: {why}"
-        return NoReply(Fault(reason=reason, where=key, advice=advice, service=self.name, cause=cause, whose=whose))
+        what = f"no reply from {server} within {within:g} s"
+        return NoReply(self.sight.fault(what, why, cause, server, key, self.now() - within, advice))
 
     def new_life(self) -> str:
         """Make the life of a requester on this bus: two requesters may use the same ids then."""
@@ -214,9 +215,23 @@ class Bus(ABC):
         Messages that nobody can read are among them. capacity: bytes of the payloads that wait.
         """
 
-    @abstractmethod
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
-        """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault)."""
+        """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault).
+
+        A process that stood still asks once more: the time is not the server's, and asking changes nothing.
+        """
+        for _ in range(2):
+            deadline = self.now() + timeout
+            if (told := await self._query(key, message, deadline)) is not None:
+                return told
+            self.sight.look(self.now(), deadline)
+            if self.sight.woke_at < deadline:
+                break
+        raise self.unanswered(key, timeout)
+
+    @abstractmethod
+    async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
+        """Ask the server of an `rpc` key; None if nobody has answered by then. Raises InputRefused."""
 
     @abstractmethod
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:

@@ -106,7 +106,9 @@ def _held(message: Held) -> Entry:
 
 
 def _body_held(message: BodyHeld) -> Entry:
-    return WARNING if message.holds else DEBUG, f"held, since nobody renews it: {_names(message.holds)}"
+    reasons = sorted({each.why.reason for each in message.holds if each.why is not None})
+    text = "; ".join((f"held, since nobody renews it: {_names(message.holds)}", *reasons))
+    return WARNING if message.holds else DEBUG, text
 
 
 def _body_faults(message: BodyFaults) -> Entry:

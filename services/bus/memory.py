@@ -319,15 +319,14 @@ class MemoryBus(Bus):
         if self._taps.pop(tap, None) is not None:
             self._overflowed += tap.overflowed
 
-    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+    async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         asked = self._hub.carried(key, message)
         await asyncio.sleep(0)
-        deadline = self.now() + timeout
         while not self._gone and (server := await self._hub.answerer(key, self.name, deadline)) is not None:
             answer = await server.answers.ask(key, asked, deadline, partial(self._hub.carried, key))
             if answer is not None:
                 return answer
-        raise self.unanswered(key, timeout)
+        return None
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         self.answers.served[key] = answer

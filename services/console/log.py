@@ -70,7 +70,8 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return "; ".join(holds(before, after, at)) or None
         case BodyHeld(holds=waiting) if waiting:
             named = ", ".join(wording.held(each) for each in waiting)
-            return f"! the body holds {named}: nobody renews it"
+            reasons = sorted({each.why.reason for each in waiting if each.why is not None})
+            return f"! the body holds {named}: {'; '.join(reasons) or 'nobody renews it'}"
         case BodyFaults(faults=faults) if faults:
             return f"! faults of the body that are switched on: {', '.join(map(words, faults))}"
         case BodyFaults() if before.faults:

@@ -55,6 +55,7 @@ from engage_hri.services.control.unheard import Unheard
 from engage_hri.services.control.variability import Deviations, is_lost
 from engage_hri.services.control.warned import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.requests.serving_effects import Hold
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -370,13 +371,13 @@ class _Control:
 
     # -- dead man -----------------------------------------------------------------------------------------------
 
-    def _hold(self, name: str, until: Seconds | None) -> None:
-        """Hold a behavior that nobody renews, or let it go on. until: when it ends otherwise; None: it goes on."""
-        if (live := self._live.get(name)) is None:
+    def _hold(self, hold: Hold) -> None:
+        """Hold a behavior that nobody renews, or let it go on."""
+        if (live := self._live.get(hold.name)) is None:
             return
         self._unheard.let_go(live)
-        if until is not None:
-            self._unheard.hold(live, self._bus.stamp(), self._bus.stamp(until))
+        if hold.until is not None:
+            self._unheard.hold(live, self._bus.stamp(), self._bus.stamp(hold.until), hold.why)
         self.tell_held()
 
     def tell_held(self) -> None:

@@ -1,5 +1,6 @@
 """Behaviors that wait since nobody renews their authority. The pulse of a requester is the lease of its movements."""
 
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.holds import Hold
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.control.live import LiveBehavior
@@ -16,11 +17,13 @@ class Unheard:
         """Holds that are in force, the oldest first."""
         return tuple(self._holds.values())
 
-    def hold(self, live: LiveBehavior, since: Stamp, until: Stamp) -> None:
-        """Hold a behavior. until: when it ends unless it is renewed."""
+    def hold(self, live: LiveBehavior, since: Stamp, until: Stamp, why: Fault | None) -> None:
+        """Hold a behavior. until: when it ends unless it is renewed. why: what has happened."""
         live.miss(True)
         request = live.request
-        self._holds[request.id] = Hold(block=request.block, behavior=request.behavior.id, since=since, until=until)
+        self._holds[request.id] = Hold(
+            block=request.block, behavior=request.behavior.id, since=since, until=until, why=why
+        )
 
     def let_go(self, live: LiveBehavior) -> None:
         """Let a behavior go on."""

@@ -28,7 +28,7 @@ from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragment_runner import FragmentRunner
 from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.requests.causes import Sight
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.runtime.publisher import Publisher
@@ -83,8 +83,10 @@ class _Generation:
         self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
         self._perception = Publisher()
         self._seen = WorldReport(REPORT_GRACE)
-        self._early: dict[str, tuple[PerformFragment, Seconds]] = {}
-        """Fragments that wait for a report of the world, or for a person, and until when; by request id."""
+        self._early: dict[str, PerformFragment] = {}
+        """Fragments that wait for a report of the world, or for a person, by request id."""
+        self._patience = Silences[str](bus.sight)
+        """Times until which they do."""
         self._changed = asyncio.Event()
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Part of each request id, so that the ids differ after a restart."""
@@ -160,7 +162,8 @@ class _Generation:
     def _serve(self, request: Request, now: Seconds) -> None:
         match request:
             case PerformFragment():
-                self._admit(request, now, now + self._config.world_patience)
+                self._patience.set(request.id, now + self._config.world_patience)
+                self._admit(request, now)
             case Inhibit():
                 self._grant(request, now)
             case SetCondition():
@@ -168,15 +171,15 @@ class _Generation:
             case Cancel():
                 self._cancel(request)
 
-    def _admit(self, request: PerformFragment, now: Seconds, until: Seconds) -> None:
-        """Hand a fragment to the runner, or keep it while the world lacks what it needs. until: when to give up."""
+    def _admit(self, request: PerformFragment, now: Seconds, *, may_wait: bool = True) -> None:
+        """Hand a fragment to the runner, or keep it while the world lacks what it needs."""
         world = self._world(now)
         if (full := self._runner.full(len(self._early), request.fragment.id)) is not None:
             self._desk.refuse(request.id, full)  # nobody else is told: there may be thousands
             return
         try:
-            if world is None or (now < until and lacks_people(request.fragment, world)):
-                self._early[request.id] = (request, until)
+            if world is None or (may_wait and lacks_people(request.fragment, world)):
+                self._early[request.id] = request
             else:
                 self._runner.admit(request, world)
         except EngageError as error:
@@ -187,9 +190,9 @@ class _Generation:
     def _admit_early(self, now: Seconds) -> None:
         """Try again with the fragments that wait, now that the world is known or has changed."""
         early, self._early = self._early, {}
-        for request, until in early.values():
+        for request in early.values():
             with self._desk.serving(request):
-                self._admit(request, now, until)
+                self._admit(request, now)
 
     def _world(self, now: Seconds) -> World | None:
         """The world as it probably is; None if it was never reported, or whoever reported it has gone."""
@@ -255,8 +258,8 @@ class _Generation:
                     self._after(self._bus.now())
 
     def _deadline(self) -> Seconds | None:
-        due = [self._runner.deadline, self._arbiter.deadline, self._reports.deadline, self._seen.deadline]
-        due += [until for _, until in self._early.values()]
+        reports = (self._reports.deadline, self._seen.deadline)
+        due = (self._runner.deadline, self._arbiter.deadline, self._patience.earliest, *reports)
         return min((each for each in due if each is not None), default=None)
 
     def _after(self, now: Seconds) -> None:
@@ -264,16 +267,15 @@ class _Generation:
         self._observe(self._reports.advance(now))
         if (seen := self._seen.advance(now)) is not None:
             self._arbiter.feed(seen, now)
-        for id, (request, until) in list(self._early.items()):
-            if now >= until:
-                del self._early[id]
-                if self._world(now) is not None:
-                    self._admit(request, now, until)  # too late to wait: refuses it for the missing person
-                    continue
-                since, advice = now - self._config.world_patience, "is perception running?"
-                sight, name = Sight(NAME, self._bus.unlinked_at), self._perception.name or "perception"
-                fault = sight.misses(name, id, since, now).following("the world is unknown", id)
-                self._refuse(id, replace(fault, advice=advice))
+        while (id := self._patience.due(now)) is not None:
+            if (request := self._early.pop(id, None)) is None:
+                continue
+            if self._world(now) is not None:
+                self._admit(request, now, may_wait=False)  # refuses it for the missing person
+                continue
+            since, name = now - self._config.world_patience, self._perception.name or "perception"
+            fault = self._bus.sight.misses(name, id, since, now).following("the world is unknown", id)
+            self._refuse(id, replace(fault, advice="is perception running?"))
         for id, fault in self._runner.settle(now):
             self._refuse(id, fault)
         self._rule(now)

@@ -38,6 +38,7 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.requests.asked import Asked, Server
 from engage_hri.services.requests.asking_effects import (
     Complain,
@@ -48,8 +49,7 @@ from engage_hri.services.requests.asking_effects import (
     TellEnd,
 )
 from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
-from engage_hri.services.requests.causes import NEVER, Sight
-from engage_hri.services.requests.deadlines import Deadlines
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.records import ANEW, unwieldy
 from engage_hri.services.requests.window import Window
@@ -73,6 +73,8 @@ _UNDECIDED = (State.SENT, State.HEARD)
 _RESEND, _GRACE, _PATIENCE, _CANCEL, _SWALLOW = _CLOCKS = (
     Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
 )  # fmt: skip
+_OWN = (None, Event.RESEND_DUE, Event.SWALLOW_OVER)
+"""Deadlines of what this side is to do: they wait for nobody."""
 _SENDS_AGAIN = (Event.RESEND_DUE, Event.BACK)
 _ANSWERS = {Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDATED, Refused: Event.REFUSED}
 """The event that an answer of the server is; every other answer is an end."""
@@ -81,9 +83,9 @@ _ANSWERS = {Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDAT
 class Asking:
     """All requests of one life of one requester."""
 
-    def __init__(self, requester: str, life: str, patience: Patience) -> None:
+    def __init__(self, requester: str, life: str, patience: Patience, sight: Sight | None = None) -> None:
         self._requester = requester
-        self._sight = Sight(requester)
+        self._sight = sight or Sight(requester)
         self._life = life
         self._patience = patience
         self._asked: dict[str, Asked] = {}
@@ -93,7 +95,7 @@ class Asking:
         """Participants that are there: the life of each."""
         self._gone: set[str] = set()
         """Servers that have been there and are not: those of live requests, and all services of a robot."""
-        self._deadlines: Deadlines[tuple[Event | None, str]] = Deadlines()
+        self._deadlines = Silences[tuple[Event | None, str]](self._sight, is_own=lambda name: name[0] in _OWN)
         """Deadlines of requests, by event and id; of the next `KeepAlive`, by None and server."""
         self._effects: list[Effect] = []
 
@@ -203,9 +205,8 @@ class Asking:
             asked.run = asked.run or run
         return self._new_effects()
 
-    def tick(self, now: Seconds, unlinked_at: Seconds = NEVER) -> list[Effect]:
-        """Carry out all that is due by now. unlinked_at: when this process last had no router."""
-        self._sight.look(now, self.deadline, unlinked_at)
+    def tick(self, now: Seconds) -> list[Effect]:
+        """Carry out all that is due by now."""
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if event is None:
@@ -329,20 +330,19 @@ class Asking:
         self._fail(asked, ServerRestarted(self._sight.restarted(asked.server, asked.request.id, ANEW)))
 
     def _tell_silent(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        why = f"is there, but has not answered for {self._patience.silence:g} s"
-        self._fail(asked, OutcomeUnknown(self._fault(asked, why, "silent", ANEW)))
+        why, since = "is there, but has not answered", now - self._patience.silence
+        self._fail(asked, OutcomeUnknown(self._fault(asked, why, "silent", since, now, ANEW)))
 
     def _tell_unstoppable(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        why = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
-        fault = self._fault(asked, why, "late", f"is {asked.server} stuck? It is not asked any more")
+        why, since = "has not ended what was cancelled", now - self._patience.cancel
+        advice = f"is {asked.server} stuck? It is not asked any more"
+        fault = self._fault(asked, why, "late", since, now, advice)
         self._fail(asked, NeverEnded(fault))
         self._effects.append(Complain(fault))
 
-    def _fault(self, asked: Asked, why: str, cause: Cause, advice: str) -> Fault:
-        return Fault(
-            reason=f"{asked.server} {why}", where=asked.request.id, advice=advice, service=self._requester,
-            cause=cause, whose=asked.server,
-        )  # fmt: skip
+    def _fault(self, asked: Asked, why: str, cause: Cause, since: Seconds, now: Seconds, advice: str) -> Fault:
+        what = f"{asked.server} {why} for {now - since:.1f} s"
+        return self._sight.fault(what, "", cause, asked.server, asked.request.id, since, advice)
 
     def _fail(self, asked: Asked, error: EngageError) -> None:
         self._effects.append(TellEnd(asked.request.id, error))

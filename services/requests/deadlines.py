@@ -7,6 +7,7 @@ from math import inf
 from typing import Any, Generic, TypeVar
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import LATE, Sight
 
 K = TypeVar("K", bound=Hashable)
 SLACK = 64
@@ -73,3 +74,46 @@ class Deadlines(Generic[K]):
         name = heapq.heappop(self._heap)[-1]
         del self._at[name]
         return name
+
+
+class Silences(Deadlines[K]):
+    """Deadlines of what others are to do.
+
+    Time for which this process stood still does not count against them, and what came meanwhile is heard first: such
+    a deadline is put off, once. is_own: deadlines that are no others'.
+    """
+
+    def __init__(
+        self,
+        sight: Sight,
+        order: Callable[[K], Any] | None = None,
+        is_own: Callable[[K], bool] = lambda name: False,
+    ) -> None:
+        super().__init__(order)
+        self._sight = sight
+        self._is_own = is_own
+        self._slept: dict[K, Seconds] = {}
+        """For each that can still be put off: for how long this process had stood still when it was set."""
+
+    def clear(self, name: K) -> None:
+        super().clear(name)
+        self._slept.pop(name, None)
+
+    def set(self, name: K, at: Seconds | None) -> None:
+        if at is not None and at != self[name]:
+            self._slept[name] = self._sight.slept
+        super().set(name, at)
+
+    def due(self, now: Seconds) -> K | None:
+        while (at := self.earliest) is not None and at <= now:
+            self._sight.look(now, at)
+            name = super().due(now)
+            assert name is not None
+            before = self._slept.pop(name, None)
+            if before is None or self._is_own(name):
+                return name
+            later = max(at + self._sight.slept - before, self._sight.woke_at + LATE)
+            if later <= now:
+                return name
+            super().set(name, later)
+        return super().due(now)

@@ -55,8 +55,6 @@ from engage_hri.services.runtime.alarm import Alarm
 
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
 _COMMANDS = (Request, KeepAlive)
-LATE: Seconds = 0.05
-"""Lateness from which on a process was asleep on a busy machine, and the time for what came meanwhile to be heard."""
 
 
 class Requester:
@@ -73,7 +71,7 @@ class Requester:
         keys.chunk(bus.name)
         self._bus = bus
         self._life = bus.new_life()
-        self._asking = Asking(bus.name, self._life, patience or Patience())
+        self._asking = Asking(bus.name, self._life, patience or Patience(), bus.sight)
         self._pending: dict[str, Pending] = {}
         self._alarm = Alarm(self._tick)
         self._listening: asyncio.Task[None] | None = None
@@ -128,7 +126,7 @@ class Requester:
             self._carry_out(self._asking.server_there(message.participant, message.run, self._bus.now()))
 
     def _tick(self) -> None:
-        self._carry_out(self._asking.tick(self._bus.now(), self._bus.unlinked_at))
+        self._carry_out(self._asking.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
@@ -225,7 +223,7 @@ class RequestDesk:
 
     on_cancel: called when a requester has been gone for longer than the grace, has come back as another life, or has
     not renewed its request. on_extend: called with a request that a `KeepAlive` gives more authority. on_hold: called
-    with the name of a request to hold, as nobody renews it, and when it ends otherwise; None: it goes on. term: the
+    with a request to hold, as nobody renews it, or that goes on. term: the
     lease of requests that name none. The service's subscription must hold `RequestDesk.patterns(server)`.
     """
 
@@ -236,7 +234,7 @@ class RequestDesk:
         on_cancel: Callable[[Cancel], None],
         *,
         on_extend: Callable[[Request], None] | None = None,
-        on_hold: Callable[[str, Seconds | None], None] | None = None,
+        on_hold: Callable[[serving_effects.Hold], None] | None = None,
         term: Seconds | None = None,
     ) -> None:
         self._bus = bus
@@ -244,10 +242,9 @@ class RequestDesk:
         self._on_cancel = on_cancel
         self._on_extend = on_extend
         self._on_hold = on_hold
-        self._serving = Serving(server, term)
+        self._serving = Serving(server, term, bus.sight)
         self._answers = keys.request_state(server)
         self._alarm = Alarm(self._tick)
-        self._late_for: Seconds | None = None
 
     @staticmethod
     def patterns(server: str) -> tuple[str, ...]:
@@ -338,13 +335,7 @@ class RequestDesk:
         self._carry_out(self._serving.answer(name, answer, self._bus.now()))
 
     def _tick(self) -> None:
-        """Carry out what is due. If this process was late for it, what came meanwhile is heard first."""
-        now, due = self._bus.now(), self._serving.deadline
-        if due is not None and now - due > LATE and due != self._late_for:
-            self._late_for = due
-            self._alarm.set(now + LATE)
-        else:
-            self._carry_out(self._serving.tick(now, self._bus.unlinked_at))
+        self._carry_out(self._serving.tick(self._bus.now()))
 
     def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
@@ -360,7 +351,7 @@ class RequestDesk:
             elif isinstance(effect, serving_effects.Hold):
                 if self._on_hold is not None:
                     with self._bus.containing(f"request {effect.name}, which nobody renews"):
-                        self._on_hold(effect.name, effect.until)
+                        self._on_hold(effect)
             elif effect.is_ours:
                 self._bus.report(effect.fault)
             else:

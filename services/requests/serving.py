@@ -30,8 +30,8 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.requests.causes import NEVER, Sight
-from engage_hri.services.requests.deadlines import Deadlines
+from engage_hri.services.bus.sight import Sight
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ended import Ended
 from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.records import ANEW, Key, Record, content_of, event_of, key_of
@@ -65,9 +65,9 @@ _Cause = Request | Answer | Renewal | None
 class Serving:
     """All requests to one server. term: lease in seconds of a request that names none; None: without limit."""
 
-    def __init__(self, server: str, term: Seconds | None = None) -> None:
+    def __init__(self, server: str, term: Seconds | None = None, sight: Sight | None = None) -> None:
         self._server = server
-        self._sight = Sight(server)
+        self._sight = sight or Sight(server)
         self._term = term
         self._known: dict[tuple[Key, str], Record] = {}
         """Requests by key and kind, live or ended."""
@@ -79,7 +79,7 @@ class Serving:
         self._ended = Ended()
         self._names = Names()
         self._runs: dict[str, str] = {}
-        self._deadlines: Deadlines[tuple[Event, str]] = Deadlines()
+        self._deadlines = Silences[tuple[Event, str]](self._sight)
         self._effects: list[Effect] = []
 
     # -- questions ------------------------------------------------------------------------------------------------
@@ -188,9 +188,8 @@ class Serving:
             record.run = run
         return self._new_effects()
 
-    def tick(self, now: Seconds, unlinked_at: Seconds = NEVER) -> list[Effect]:
-        """Carry out all that is due by now. unlinked_at: when this process last had no router."""
-        self._sight.look(now, self.deadline, unlinked_at)
+    def tick(self, now: Seconds) -> list[Effect]:
+        """Carry out all that is due by now."""
         while (due := self._deadlines.due(now)) is not None:
             event, name = due
             if (record := self._named.get(name)) is not None:
@@ -306,8 +305,11 @@ class Serving:
             return
         record.is_held = True
         self._deadlines.clear((_UNHEARD, record.name))
-        lease = self._deadlines[record.lease]
-        self._effects.append(Hold(record.name, inf if lease is None else lease))
+        lease, requester = self._deadlines[record.lease], record.request.requester
+        is_there = not record.run or requester in self._runs
+        missed = self._sight.unrenewed if is_there else self._sight.misses
+        why = missed(requester, record.name, record.renewed_at, now)
+        self._effects.append(Hold(record.name, inf if lease is None else lease, why))
 
     def _wait_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
         if not record.request.unheard:  # else it is held meanwhile, and may take the time of its lease

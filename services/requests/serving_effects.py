@@ -26,11 +26,12 @@ class Hand(Struct, frozen=True):
 class Hold(Struct, frozen=True):
     """Tell the service to hold the request of this name, since nobody renews it, or to go on with it.
 
-    until: when it ends unless it is renewed; None: it goes on.
+    until: when it ends unless it is renewed; None: it goes on. why: what has happened, and whose it was.
     """
 
     name: str
     until: Seconds | None
+    why: Fault | None = None
 
 
 class Complain(Struct, frozen=True):

@@ -36,6 +36,7 @@ def happened(state: str, delay: float | None = None) -> ConnectionEvent:
     )  # fmt: skip
 
 
+LATE = Fault(reason="realizer has not renewed it for 0.5 s", cause="unrenewed", whose="realizer")
 LASTS = {"since": AT, "until": AT}
 
 
@@ -69,6 +70,11 @@ LASTS = {"since": AT, "until": AT}
             BodyHeld(at=AT, holds=(Hold(block="b", behavior="g", **LASTS),)),
             "WARNING",
             "held, since nobody renews it: b: g",
+        ),
+        (
+            BodyHeld(at=AT, holds=tuple(Hold(block="b", behavior=id, why=LATE, **LASTS) for id in "gh")),
+            "WARNING",
+            "held, since nobody renews it: b: g, b: h; realizer has not renewed it for 0.5 s",
         ),
         (BodyHeld(at=AT), "DEBUG", "held, since nobody renews it: nothing"),
         (FragmentOutcome(id="f", requester="me", fragment="f", status="done"), "INFO", "fragment f of me: done"),

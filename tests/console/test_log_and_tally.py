@@ -2,8 +2,10 @@ from io import StringIO
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 from rich.console import Console
 
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.holds import BodyHeld, Held, Hold
@@ -101,6 +103,11 @@ def test_it_is_told_what_waits_since_nobody_renews_it() -> None:
 
     assert lines(((waiting, 13.0), (BodyHeld(at=at(14.0)), 14.0)), Telling()) == [
         "0:03.0  ! the body holds b: wave: nobody renews it"
+    ]
+    late = Fault(reason="realizer has not renewed it for 0.5 s", cause="unrenewed", whose="realizer")
+    told = replace(waiting, holds=tuple(replace(each, why=late) for each in waiting.holds))
+    assert lines(((told, 13.0),), Telling()) == [
+        "0:03.0  ! the body holds b: wave: realizer has not renewed it for 0.5 s"
     ]
 
 

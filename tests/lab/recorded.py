@@ -45,7 +45,8 @@ class Record:
                 self("word", block=message.block, behavior=message.behavior, at=message.at.seconds,
                      position=message.position, word=message.word)  # fmt: skip
             case BodyHeld(holds=holds):
-                self("held", behaviors=[f"{each.block}:{each.behavior}" for each in holds])
+                self("held", behaviors=[f"{each.block}:{each.behavior}" for each in holds],
+                     why=[_why(each.why) for each in holds])  # fmt: skip
             case RobotState():
                 self._motion(message)
             case Accepted() | Refused() | Outcome():

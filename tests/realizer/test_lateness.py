@@ -3,6 +3,7 @@
 import pytest
 
 from engage_hri.schemas.behaviors import Event, Gesture, Mark, Speech
+from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
@@ -16,8 +17,8 @@ CONFIG = RealizerConfig(late=0.5, late_factor=1.0, stall=3.0, stall_factor=5.0)
 
 
 def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
-    watch = LatenessWatch(CONFIG)
-    watch.expect("b", "stroke", 1.0, 1.0)
+    watch = LatenessWatch(CONFIG, Sight("realizer"))
+    watch.expect("b", "stroke", 1.0, 1.0, 0.0)
 
     assert watch.deadline == 2.5
     assert watch.overdue(2.4) == []
@@ -28,12 +29,28 @@ def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
     assert watch.deadline is None
 
 
-def test_who_comes_to_look_long_after_gives_up_at_once() -> None:
-    watch = LatenessWatch(CONFIG)
-    watch.expect("b", "stroke", 1.0, 1.0)
+@pytest.mark.parametrize("waking", [2.6, 3.0, 9.0, 20.0, 1000.0])
+def test_who_comes_to_look_long_after_hears_first_what_came_and_counts_on_from_there(waking: float) -> None:
+    """Time for which one stood still oneself is nobody's delay. At 2.5 it is late, and 6.5 s after that stalled."""
+    watch = LatenessWatch(CONFIG, sight := Sight("realizer"))
+    watch.expect("b", "stroke", 1.0, 1.0, 0.0)
 
-    assert watch.overdue(20.0) == [Stalled("b", "stroke", 19.0)]
-    assert watch.overdue(20.0) == []
+    assert watch.overdue(waking) == []
+    assert sight.woke_at == pytest.approx(waking)
+    heard = waking + LATE
+    assert watch.overdue(heard - 0.01) == []
+    assert watch.overdue(heard) == [Late("b", "stroke", heard - 1.0)]
+    stalled = max(9.0 + sight.slept, heard)
+    assert watch.deadline == pytest.approx(stalled)
+    assert [type(each) for each in watch.overdue(stalled)] == [Stalled]
+
+
+def test_a_report_that_is_late_when_it_is_first_expected_is_no_standstill() -> None:
+    watch = LatenessWatch(CONFIG, sight := Sight("realizer"))
+    watch.expect("b", "stroke", 1.0, 1.0, 30.0)
+
+    assert [type(each) for each in watch.overdue(30.0)] == [Late, Stalled]
+    assert sight.slept == 0.0
 
 
 def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> None:

@@ -3,16 +3,18 @@
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.body import DescribeBody
+from engage_hri.schemas.behaviors import Wait
+from engage_hri.schemas.body import DescribeBody, PerformBehavior
 from engage_hri.schemas.faults import Cause, EngageError, Fault, NoReply
 from engage_hri.schemas.fragments import PerformFragment, TurnFragment
 from engage_hri.schemas.requests import Accepted, Cancel
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_effects import TellEnd
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
-from engage_hri.services.requests.serving_effects import Hand
+from engage_hri.services.requests.serving_effects import Hand, Hold
 
 PLEASE = PerformFragment(
     id="a", requester="me", life="1", lease=5.0,
@@ -20,18 +22,16 @@ PLEASE = PerformFragment(
 )  # fmt: skip
 
 
-def ended(serving: Serving, at: float, unlinked_at: float = float("-inf")) -> Fault:
+def ended(serving: Serving, at: float) -> Fault:
     """What the service is told of the end, by the clock."""
     (cancel,) = [
-        each.request
-        for each in serving.tick(at, unlinked_at)
-        if isinstance(each, Hand) and isinstance(each.request, Cancel)
+        each.request for each in serving.tick(at) if isinstance(each, Hand) and isinstance(each.request, Cancel)
     ]
     return cancel.fault("a")
 
 
-def accepted() -> Serving:
-    serving = Serving("generation")
+def accepted(unlinked_at: float = float("-inf")) -> Serving:
+    serving = Serving("generation", sight=Sight("generation", lambda: unlinked_at))
     serving.requester_there("me", "r1", 9.0)
     serving.take(PLEASE, 10.0, "p")
     serving.answer("a", Accepted(id="a"), 10.0)
@@ -45,19 +45,20 @@ def accepted() -> Serving:
 def test_a_requester_that_is_missed_is_gone_unless_the_server_itself_had_no_router(
     unlinked_at: float, cause: Cause, whose: str
 ) -> None:
-    serving = accepted()
+    serving = accepted(unlinked_at)
     serving.requester_gone("me", 11.0)
-    fault = ended(serving, 13.01, unlinked_at)
+    fault = ended(serving, 13.01)
 
     assert (fault.cause, fault.whose) == (cause, whose)
     assert fault.reason.startswith("me has not been seen for 2.0 s")
 
 
-def test_a_server_that_stood_still_itself_says_so() -> None:
+def test_a_server_that_stood_still_itself_hears_first_and_says_so() -> None:
     serving = accepted()
     serving.requester_gone("me", 11.0)
 
-    fault = ended(serving, 19.0)
+    assert serving.tick(19.0) == []  # what came meanwhile is heard first
+    fault = ended(serving, 19.0 + LATE)
     assert (fault.cause, fault.whose) == ("frozen", "generation")
 
 
@@ -73,20 +74,54 @@ def test_a_requester_that_began_another_life_and_one_that_does_not_renew_are_tol
     assert fault.reason.startswith("me has not renewed it for 5.0 s")
 
 
+MOVES = PerformBehavior(
+    id="a", requester="me", life="1", block="b", behavior=Wait(id="w"), through="start", lease=4.0, held_after=0.5
+)  # fmt: skip
+
+
+def held(unlinked_at: float, *, leaves: bool) -> Fault:
+    """The reason of a hold, half a second after the last renewal, or when the requester leaves."""
+    serving = Serving("control", sight=Sight("control", lambda: unlinked_at))
+    serving.requester_there("me", "r1", 9.0)
+    serving.take(MOVES, 10.0)
+    (hold,) = serving.requester_gone("me", 10.3) if leaves else serving.tick(10.51)
+    assert isinstance(hold, Hold)
+    assert hold.why is not None
+    return hold.why
+
+
+@pytest.mark.parametrize(
+    ("unlinked_at", "leaves", "cause", "whose", "told"),
+    [
+        (2.0, False, "unrenewed", "me", "me has not renewed it for 0.5 s: it, its machine or the network"),
+        (2.0, True, "gone", "me", "me has not been seen for 0.3 s: it, its machine or the network"),
+        (10.2, False, "unlinked", "router", "me has not renewed it for 0.5 s: control has had no router"),
+        (10.2, True, "unlinked", "router", "me has not been seen for 0.3 s: control has had no router"),
+    ],
+)
+def test_a_hold_says_what_has_happened_and_whose_it_was(
+    unlinked_at: float, leaves: bool, cause: Cause, whose: str, told: str
+) -> None:
+    why = held(unlinked_at, leaves=leaves)
+
+    assert (why.cause, why.whose, why.service) == (cause, whose, "control")
+    assert why.reason.startswith(told)
+
+
 @pytest.mark.parametrize(
     ("unlinked_at", "cause", "whose"), [(2.0, "gone", "generation"), (13.0, "unlinked", "router")]
 )
 def test_a_server_that_is_missed_is_gone_unless_the_requester_itself_had_no_router(
     unlinked_at: float, cause: Cause, whose: str
 ) -> None:
-    asking = Asking("me", "1", Patience())
+    asking = Asking("me", "1", Patience(), Sight("me", lambda: unlinked_at))
     asking.server_there("generation", "r1", 9.0)
     asking.send(keys.FRAGMENT, PLEASE, 10.0)
     asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_fragment"), 10.1, "generation")
     asking.server_gone("generation", 11.0)
     effects = []
     while asking.deadline is not None and asking.deadline <= 15.01:
-        effects += asking.tick(asking.deadline, unlinked_at)  # on time: it did not stand still
+        effects += asking.tick(asking.deadline)  # on time: it did not stand still
     (end,) = [each for each in effects if isinstance(each, TellEnd)]
     assert isinstance(end.end, EngageError)
 

@@ -6,11 +6,15 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, PerformBlock
+from engage_hri.schemas.body import DescribeBody, Estimates
+from engage_hri.schemas.faults import NoReply
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, KeepAlive, Kept
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.requests.ends import LATE, RequestDesk
+from engage_hri.services.bus.sight import LATE
+from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 TERM: Seconds = 2.0
@@ -22,6 +26,23 @@ def stand_still(until: Seconds) -> None:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
     loop._virtual_now = until
+
+
+async def test_a_question_that_was_slept_through_is_asked_again(hub: MemoryHub) -> None:
+    bus, control = hub.join("realizer"), hub.join("control")
+
+    async def describe(question: Message) -> Message:
+        await asyncio.sleep(0.5)
+        return Estimates(items=())
+
+    control.answer(keys.DESCRIBE, describe)
+    control.declare_alive()
+    asyncio.get_running_loop().call_at(0.2, stand_still, 5.0)
+
+    assert await bus.query(keys.DESCRIBE, DescribeBody(), 1.0) == Estimates(items=())
+    await asyncio.sleep(2.0)
+    with pytest.raises(NoReply, match="it is there, but does not answer"):
+        await bus.query(keys.DESCRIBE, DescribeBody(), 0.3)
 
 
 @pytest.mark.parametrize(("came", "is_ended"), [(0.5 * LATE, False), (2.0 * LATE, True)])

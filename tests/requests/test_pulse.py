@@ -181,7 +181,7 @@ async def test_a_server_that_was_itself_asleep_hears_first_what_came_meanwhile(
 ) -> None:
     server, client = hub.join("control", role="control"), hub.join("me", role="realizer")
     holds = list[str]()
-    desk = RequestDesk(server, "control", lambda _: None, on_hold=lambda name, until: holds.append(name))
+    desk = RequestDesk(server, "control", lambda _: None, on_hold=lambda hold: holds.append(hold.name))
     with server.subscribe(*RequestDesk.patterns("control")) as inbox:
 
         async def take() -> None:

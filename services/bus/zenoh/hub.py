@@ -349,10 +349,9 @@ class ZenohBus(Bus):
             self._overflowed += subscription.overflowed
             self._hub.readers.detach(subscription)
 
-    async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
+    async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         if self._hub.rights is not None:
             self._hub.rights.check(self.name, "asks", key)
-        deadline = self._loop.time() + timeout
         payload, encoding = in_form(key, message, "msgpack")
         told = await self._try(key, message, payload, encoding, deadline)
         if told is None:
@@ -361,9 +360,7 @@ class ZenohBus(Bus):
                 while told is None and self._loop.time() < deadline:
                     await came(deadline, ASK_AGAIN)
                     told = await self._try(key, message, payload, encoding, deadline)
-        if told is not None:
-            return told
-        raise self.unanswered(key, timeout)
+        return told
 
     async def _try(
         self, key: str, message: Message, payload: bytes, encoding: str, deadline: Seconds

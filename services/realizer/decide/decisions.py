@@ -10,6 +10,7 @@ from math import isfinite
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.grants import Grants
@@ -31,7 +32,7 @@ class Decisions:
 
     began: loop time of the block's start; all times are of that clock. observers: told what happens in the net, but
     not again what had happened before another plan. is_free: False for a behavior that is not to begin before
-    there is another plan.
+    there is another plan. sight: what this process knows of its own standstills.
     """
 
     def __init__(
@@ -41,12 +42,13 @@ class Decisions:
         config: RealizerConfig,
         observers: Callable[[Plan, RunningNet, Seconds], Sequence[Observer]] = lambda plan, net, began: (),
         is_free: Callable[[str], bool] = lambda behavior: True,
+        sight: Sight | None = None,
     ) -> None:
         self.began = began
         self.facts = Facts(began)
         self.foresight = Foresight(plan, self.facts)
         self.grants = Grants(self.facts, self.foresight, config, is_free)
-        self.lateness_watch = LatenessWatch(config)
+        self.lateness_watch = LatenessWatch(config, sight or Sight("realizer"))
         self._unwatched: set[str] = set()
         """Behaviors about which there is news, so that another report of theirs is to be expected than before."""
         self._asked_at: dict[str, Seconds] = {}
@@ -328,7 +330,7 @@ class Decisions:
         asked = self.foresight.asked(points[number], since + natural)
         granted = self.grants.granted_at[behavior] if is_there else 0.0
         expected = max(since + natural, asked, granted) + facts.held_between(since, now, behavior)
-        self.lateness_watch.expect(behavior, points[number].sync, expected, natural)
+        self.lateness_watch.expect(behavior, points[number].sync, expected, natural, now)
 
     # -- other blocks --------------------------------------------------------------------------------------------
 

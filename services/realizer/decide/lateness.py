@@ -10,9 +10,10 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.requests.deadlines import Deadlines
+from engage_hri.services.requests.deadlines import Silences
 
 
 class Late(Struct, frozen=True):
@@ -35,38 +36,33 @@ class Stalled(Struct, frozen=True):
     overdue: Seconds
 
 
-class _Awaited(Struct, frozen=True):
-    """The next report of a behavior: when it is expected, late, and so late that the behavior is stalled."""
-
-    sync: str
-    expected: Seconds
-    late: Seconds
-    stalled: Seconds
-
-
 class LatenessWatch:
     """The next report of each behavior under way, and when it becomes too late."""
 
-    def __init__(self, config: RealizerConfig) -> None:
+    def __init__(self, config: RealizerConfig, sight: Sight) -> None:
         self._config = config
-        self._awaited: dict[str, _Awaited] = {}
+        self._awaited: dict[str, tuple[str, Seconds, Seconds]] = {}
+        """Next report of each behavior, when it is expected, and how long the phase before it lasts."""
         self._warned: set[str] = set()
-        self._alarms: Deadlines[str] = Deadlines(str)
+        self._alarms = Silences[tuple[str, bool]](sight, lambda name: name)
+        """Times from which a behavior is late, and those from which it is stalled, too."""
 
-    def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds) -> None:
+    def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds, now: Seconds) -> None:
         """Expect `sync` as the next report, about at `expected`. natural: the duration of the phase before it."""
-        limits = self._config
-        late = expected + limits.late + limits.late_factor * natural
-        stalled = expected + limits.stall + limits.stall_factor * natural
-        awaited = _Awaited(sync, expected, late, stalled)
+        limits, awaited = self._config, (sync, expected, natural)
         if awaited != self._awaited.get(behavior):
             self._awaited[behavior] = awaited
-            self._alarms.set(behavior, stalled if behavior in self._warned else late)
+            late = expected + limits.late + limits.late_factor * natural
+            stalled = expected + limits.stall + limits.stall_factor * natural
+            if behavior not in self._warned:
+                self._alarms.set((behavior, False), max(now, late))
+            self._alarms.set((behavior, True), max(now, stalled))
 
     def forget(self, behavior: str) -> None:
         """Stop expecting a report: the behavior has ended, or holds until it may go on."""
         self._awaited.pop(behavior, None)
-        self._alarms.clear(behavior)
+        self._alarms.clear((behavior, False))
+        self._alarms.clear((behavior, True))
 
     def acquit(self, behavior: str) -> None:
         """Forget that the behavior was late: it had not been asked."""
@@ -81,16 +77,14 @@ class LatenessWatch:
     def overdue(self, now: Seconds) -> list[Late | Stalled]:
         """Behaviors that are late (told once for each), and behaviors that have been late for too long."""
         found: list[Late | Stalled] = []
-        for behavior in [*iter(lambda: self._alarms.due(now + EPSILON), None)]:
-            awaited = self._awaited[behavior]
-            if now >= awaited.stalled - EPSILON:
-                found.append(Stalled(behavior, awaited.sync, now - awaited.expected))
+        for behavior, is_stalled in [*iter(lambda: self._alarms.due(now + EPSILON), None)]:
+            sync, expected, _ = self._awaited[behavior]
+            if is_stalled:
+                found.append(Stalled(behavior, sync, now - expected))
                 self.forget(behavior)
-                continue
-            self._alarms.set(behavior, awaited.stalled)
-            if behavior not in self._warned:
+            else:
                 self._warned.add(behavior)
-                found.append(Late(behavior, awaited.sync, now - awaited.expected))
+                found.append(Late(behavior, sync, now - expected))
         return found
 
 

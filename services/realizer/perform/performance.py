@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.body import Estimate, SyncPointArrived, SyncPointReached
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Cause, Fault, InputRefused
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
@@ -99,7 +99,7 @@ class BlockPerformance:
     async def run(self) -> BlockOutcome:
         """Perform the block to its end, whatever that is. Ends everything it began."""
         began, block = self.bus.now(), self.plan.block.id
-        self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free)
+        self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free, self.bus.sight)
         self.held.begin()
         self.report.started(self.plan, began)
         self.report.unkept(self.plan)
@@ -264,8 +264,6 @@ class BlockPerformance:
         match effect:
             case Begin(behavior=id) | Extend(behavior=id):
                 self._runs[id].command(effect)
-            case Late(behavior=id) | Stalled(behavior=id) if not self._runs[id].is_by_body:
-                self.decisions.count_from(id, self.bus.now())  # this loop is late: its task has not had its turn
             case Late():
                 if not self._shared.peers.has_left("control"):
                     self.report.overdue(self.decisions, effect)
@@ -273,14 +271,13 @@ class BlockPerformance:
             case Stalled(behavior=id, sync=sync, overdue=overdue):
                 self.body.abort(id)
                 sync = self.report.spelling.sync(Point(id, sync))
-                self._runs[id].lose(self._stalled(f"stalled before {sync}, {overdue:.1f} s overdue"))
+                self._runs[id].lose(self._stalled(f"stalled before {sync}, {overdue:.1f} s overdue", overdue))
                 return True
         return False
 
-    def _stalled(self, reason: str) -> Fault:
-        return Fault(
-            reason=reason, cause="gone" if self._shared.peers.has_left("control") else "late", whose="control"
-        )
+    def _stalled(self, what: str, overdue: Seconds) -> Fault:
+        cause: Cause = "gone" if self._shared.peers.has_left("control") else "late"
+        return self.bus.sight.fault(what, "", cause, "control", "", self.bus.now() - overdue)
 
     def _tell(self) -> None:
         """Tell what was reached, in feedback and to other blocks."""
