@@ -232,6 +232,27 @@ async def test_a_router_passes_on_pulses_of_a_holder_at_their_rate_and_no_more()
             session.close()  # type: ignore[no-untyped-call]
 
 
+@pytest.mark.parametrize("key", ["engage/v1/cmd/realizer/manager/mallory/block", keys.own("e0001234", "pulse/news")])
+async def test_no_message_is_more_urgent_than_ours(sides: tuple[zenoh.Session, Witness], key: str) -> None:
+    sender, witness = sides
+    came: list[zenoh.Priority] = []
+    heard = witness.hear("put").callback
+
+    def note(sample: zenoh.Sample) -> None:
+        came.append(sample.priority)
+        heard(sample)
+
+    witness.session.declare_subscriber(key, zenoh.handlers.Callback(note, indirect=False))
+    publisher: Any = sender.declare_publisher(key)
+    await witness.wait(lambda: publisher.matching_status.matching)
+    above = [zenoh.Priority.REAL_TIME, zenoh.Priority.INTERACTIVE_HIGH, zenoh.Priority.DATA_HIGH]
+    for priority in (*above, zenoh.Priority.INTERACTIVE_LOW, zenoh.Priority.DATA):
+        sender.put(key, b"", priority=priority, congestion_control=BLOCK)
+        sender.delete(key, priority=priority, congestion_control=BLOCK)
+    await witness.wait(lambda: len(witness.came) == 10)
+    assert came == [zenoh.Priority.DATA] * 10
+
+
 def test_a_rows_bound_is_that_of_zenoh() -> None:
     """Zenoh takes the smallest limit of all expressions that include a key: so none may include one of a larger."""
     filters: Any = bounded()["low_pass_filter"]

@@ -15,10 +15,24 @@ MOST_IN_PARTS = LARGEST + 2 * BESIDE
 """Bytes of a message that Zenoh puts together again; it drops a longer one in the middle, and the link stays."""
 _OF_THE_BUS = tuple(keys.own("*", subject) for subject in ("pulse/*", "past", "counts", "clock", "flush/*"))
 _DATA = ("put", "delete", "query", "reply")
+_RUSHED = ("real_time", "interactive_high", "interactive_low", "data_high")
+PRIORITIES = (
+    {"messages": ["query"], "flows": ["ingress"], "overwrite": {"priority": "data_low"}},
+    *(
+        {
+            "messages": ["put", "delete"],
+            "flows": ["ingress"],
+            "qos": {"priority": each},
+            "overwrite": {"priority": "data"},
+        }
+        for each in _RUSHED
+    ),
+)
+"""Priorities of what comes in: a question is less urgent than a message of ours, and no message is more urgent."""
 
 
 def bounded() -> dict[str, object]:
-    """Settings of every session: how large a message may be that comes in, by its key."""
+    """Settings of every session: how large a message may be that comes in, by its key, and how urgent."""
     by_size: dict[int, set[str]] = {LARGEST: {"**"}}
     sent = {_of_all(row.key) for row in access.TABLE if row.does != "subscribes"}
     for key in (*sent, *_OF_THE_BUS):
@@ -27,7 +41,9 @@ def bounded() -> dict[str, object]:
         {"flows": ["ingress"], "messages": _DATA, "key_exprs": sorted(expressions), "size_limit": size + BESIDE}
         for size, expressions in by_size.items()
     ]
-    return {"transport/link/rx/max_message_size": MOST_IN_PARTS, "low_pass_filter": filters}
+    return {
+        "transport/link/rx/max_message_size": MOST_IN_PARTS, "low_pass_filter": filters, "qos/network": PRIORITIES,
+    }  # fmt: skip
 
 
 def _of_all(key: str) -> str:
