@@ -1,11 +1,13 @@
 """Clients that come to one robot at once, and leave at once: what each costs the router, and how the robot goes on.
 
-    python benchmarks/joining.py [--clients 1 10 50 200 500] [--plain] [--keys] [--json]
+    python benchmarks/joining.py [--clients 1 10 50 100 200 500 1000] [--plain] [--keys] [--json]
 
 A router and the four services, each a process. For each number so many clients of `connect()` come at once, in
 processes of a hundred, wait until they see all services, and go at once. Beside them one more client has short blocks
-performed, one after the other. Processor time is that of the router's processes until they compute no more. The last
-column says by how much the share of a client, who comes and who goes, has grown for each doubling of their number.
+performed, one after the other. An idle link costs the router the same all the time, for both ends say that they are
+there. So the processor time for those who come and go is what is left once idle links and the blocks, looked at
+before and in between, are taken off: else a client would cost more the longer a busy machine takes. The last column
+says by how much the share of a client, who comes and who goes, has grown for each doubling of their number.
 
 `--plain`: clients are plain Zenoh sessions that declare what an idle client of ours does, for numbers for which this
 machine is too small. `--keys`: all have certificates, and a hundred clients share one. Linux only.
@@ -45,6 +47,8 @@ ROBOT = "robot"
 TOGETHER = 100
 """Clients of one process, and of one certificate: a router gives one no more links."""
 PATIENCE: Seconds = 300.0
+SETTLE: Seconds = 2.0
+LOOK: Seconds = 4.0
 
 
 async def comes(stack: AsyncExitStack, endpoint: str, own: Keys | None, name: str) -> None:
@@ -81,7 +85,12 @@ async def comes_plain(stack: AsyncExitStack, endpoint: str, own: Keys | None, na
         session.declare_queryable(keys.own(run, "clock"), handler(nothing)),
         session.declare_queryable(keys.own(run, "flush/news"), handler(nothing)),
         session.declare_subscriber(keys.own("*", "pulse/news"), handler(nothing)),
-        *(session.declare_subscriber(each, handler(nothing)) for each in Requester.PATTERNS),
+        # What is about presence is in the tokens alone.
+        *(
+            session.declare_subscriber(each, handler(nothing))
+            for each in Requester.PATTERNS
+            if not keys.is_presence(each)
+        ),
         liveliness.declare_subscriber(keys.own("*", "log/news"), handler(nothing), history=True),
         liveliness.declare_token(keys.own(run, f"alive/client/{name}/boot")),
         liveliness.declare_subscriber(keys.tokens(keys.ANY_ROBOT_ALIVE), handler(came), history=True),
@@ -119,13 +128,11 @@ async def performs(robot: Robot, took: list[Seconds], lost: list[str]) -> None:
         took.append(time.perf_counter() - began)
 
 
-def settled(pids: list[int]) -> float:
-    """Processor time so far, once the processes compute next to nothing: they also pass on the blocks."""
-    before = -1.0
-    while (now := processor_seconds(pids)) > before + 0.1:
-        before = now
-        time.sleep(1.0)
-    return now
+async def upkeep(pids: list[int]) -> float:
+    """Processor time a second while nobody comes or goes: of links that are idle, and of the blocks."""
+    before, began = processor_seconds(pids), time.perf_counter()
+    await asyncio.sleep(LOOK)
+    return (processor_seconds(pids) - before) / (time.perf_counter() - began)
 
 
 def crowded(*arguments: str) -> subprocess.Popen[str]:
@@ -160,7 +167,7 @@ async def measure(numbers: list[int], *, plain: bool, with_keys: bool) -> list[d
 
             ring = ["--keys", stack.enter_context(tempfile.TemporaryDirectory()) + "/keys"]
             crowds = [("manager", f"crowd{each}") for each in range(-(-max(numbers) // TOGETHER))]
-            initialize(Path(ring[1]), ROBOT, (), crowds, 1)
+            initialize(Path(ring[1]), ROBOT, crowds, (), 1)
             endpoint = endpoint.replace("tcp/", "tls/")
         engage = (sys.executable, "-m", "engage_hri")
         router = started(stack, "router is ready", *engage, "router", "--listen", endpoint, *ring)
@@ -173,45 +180,56 @@ async def measure(numbers: list[int], *, plain: bool, with_keys: bool) -> list[d
             took: list[Seconds] = []
             lost: list[str] = []
             performing = asyncio.create_task(performs(robot, took, lost))
-            for number in numbers:
-                options = [*(["--plain"] if plain else []), "--crowd", endpoint, "".join(ring[1:])]
-                parts = [(first, min(TOGETHER, number - first)) for first in range(0, number, TOGETHER)]
-                children = [crowded(*options, str(first), str(count)) for first, count in parts]
-                await asyncio.to_thread(_answers, children, "ready")
-                before = await asyncio.to_thread(settled, pids)
-                took.clear()
-                began = time.perf_counter()
-                await told(children, "come", "there")
-                seconds = time.perf_counter() - began
-                there = await asyncio.to_thread(settled, pids)
-                memory = megabytes(pids)
-                began = time.perf_counter()
-                await told(children, "go", "gone")
-                leaving = time.perf_counter() - began
-                gone = await asyncio.to_thread(settled, pids)
-                for child in children:
-                    child.wait()
-                rows.append(
-                    {
-                        "clients": number, "seconds": seconds, "router": there - before, "leaving": leaving,
-                        "router_leaving": gone - there, "MB": memory, "blocks": len(took), "slowest": max(took),
-                        "lost": len(lost), "restarted": family(router) != pids,
-                    }
-                )  # fmt: skip
-                print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
-            performing.cancel()
+            try:
+                for number in numbers:
+                    options = [*(["--plain"] if plain else []), "--crowd", endpoint, "".join(ring[1:])]
+                    parts = [(first, min(TOGETHER, number - first)) for first in range(0, number, TOGETHER)]
+                    children = [crowded(*options, str(first), str(count)) for first, count in parts]
+                    await asyncio.to_thread(_answers, children, "ready")
+                    without = await upkeep(pids)
+                    took.clear()
+                    before, began = processor_seconds(pids), time.perf_counter()
+                    await told(children, "come", "there")
+                    coming = time.perf_counter() - began
+                    # What has come is still being told to others.
+                    await asyncio.sleep(SETTLE)
+                    there = processor_seconds(pids)
+                    idle, memory = await upkeep(pids), megabytes(pids, "Rss")
+                    staying, began = processor_seconds(pids), time.perf_counter()
+                    await told(children, "go", "gone")
+                    leaving = time.perf_counter() - began
+                    await asyncio.sleep(SETTLE)
+                    gone = processor_seconds(pids)
+                    for child in children:
+                        child.wait()
+                    # The number of links grows, and falls, about evenly.
+                    half = (idle + without) / 2
+                    rows.append(
+                        {
+                            "clients": number, "seconds": coming, "leaving": leaving,
+                            "router": there - before - coming * half - SETTLE * idle,
+                            "router_leaving": gone - staying - leaving * half - SETTLE * without,
+                            "idle": idle - without, "all_coming": there - before, "all_leaving": gone - staying,
+                            "MB": memory, "blocks": len(took), "slowest": max(took), "lost": len(lost),
+                            "restarted": family(router) != pids,
+                        }
+                    )  # fmt: skip
+                    print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
+            finally:
+                performing.cancel()
     return rows
 
 
 def grown(before: dict[str, Any], now: dict[str, Any], what: str) -> float:
     """Factor by which the share of a client has grown for each doubling of their number."""
     share, was = now[what] / now["clients"], before[what] / before["clients"]
-    return float((share / was) ** (1 / log2(now["clients"] / before["clients"]))) if share and was else float("nan")
+    doublings = log2(now["clients"] / before["clients"])
+    return float((share / was) ** (1 / doublings)) if share > 0.0 and was > 0.0 else float("nan")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--clients", type=int, nargs="+", default=[1, 10, 50, 200, 500])
+    parser.add_argument("--clients", type=int, nargs="+", default=[1, 10, 50, 100, 200, 500, 1000])
     parser.add_argument("--plain", action="store_true")
     parser.add_argument("--keys", action="store_true")
     parser.add_argument("--json", action="store_true")
@@ -225,13 +243,14 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    print("clients  all there  router s  MB   gone in  router s  blocks  slowest  lost  doubled")
+    print("clients  all there  router s  MB   gone in  router s  idle, of a core  blocks  slowest  lost  doubled")
     for before, row in zip([None, *rows], rows, strict=False):
-        costs = ("router", "router_leaving") if before else ()
-        growth = ", ".join(f"{grown(before, row, cost):.2f}" for cost in costs)
+        costs = ("router", "router_leaving")
+        growth = ", ".join(f"{grown(before, row, cost):.2f}" for cost in costs) if before else ""
         print(
             f"{row['clients']:7} {row['seconds']:8.1f} s {row['router']:8.2f} {row['MB']:4.0f}"
-            f" {row['leaving']:7.1f} s {row['router_leaving']:8.2f} {row['blocks']:7} {row['slowest']:6.2f} s"
+            f" {row['leaving']:7.1f} s {row['router_leaving']:8.2f} {row['idle']:14.1%}"
+            f"  {row['blocks']:7} {row['slowest']:6.2f} s"
             f" {row['lost']:5}  {growth}{'  restarted' if row['restarted'] else ''}"
         )
 

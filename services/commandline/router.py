@@ -7,8 +7,8 @@ import sys
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from secrets import token_hex
 from select import PIPE_BUF, select
 from typing import Annotated
 
@@ -55,11 +55,14 @@ class Options:
             " Whoever fills this one takes no place of theirs. May be repeated.",
         ),
     ] = None  # fmt: skip
-    attended: Annotated[str, typer.Option("--attended", hidden=True)] = ""
+    attended: Annotated[int, typer.Option("--attended", hidden=True)] = 0
 
 
 def main(options: Options) -> int:
-    """Route until a signal, in a process of its own that is watched over."""
+    """Route until a signal, in a process of its own that is watched over.
+
+    options: attended: number of the pipe to whoever watches over this process.
+    """
     keys = _keys(options)
     if options.attended:
         os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)  # read when the first session opens
@@ -79,11 +82,9 @@ async def _watch(options: Options) -> int:
             "the robot's router": _command(options, options.robot_listen, connect),
             "the router of all others": _command(options, options.listen, near),
         }
-    tell, mark = _teller(), token_hex()
+    tell = _teller("standard output", beneath(sys.stdout).fileno())
     watching = [
-        asyncio.create_task(
-            watched([*each, "--attended", mark], name, tell, LOG.warning, mark.encode(), Denials(tell).feed)
-        )
+        asyncio.create_task(watched([*each, "--attended"], name, tell, LOG.warning, Denials(tell).feed))
         for name, each in commands.items()
     ]
     try:
@@ -125,31 +126,30 @@ def _command(options: Options, listen: list[str], connect: list[str]) -> list[st
     ]
 
 
-def _teller(mark: str = "") -> Callable[[str], None]:
-    """mark: for whoever watches over this process. Others write to its output, too, and what they like."""
-    out = Patient("standard output", _without_waiting, LOG.warning)
+def _teller(name: str, number: int) -> Callable[[str], None]:
+    """name, number: of the file to which lines go."""
+    out = Patient(name, partial(_without_waiting, number), LOG.warning)
 
     def tell(line: str) -> None:
-        out.write(f"{mark}{line}\n")
+        out.write(f"{line}\n")
 
     return tell
 
 
-def _without_waiting(data: bytes) -> int | None:
-    """Write to standard output if its reader takes it: one who stops reading must not stop the router."""
-    output = beneath(sys.stdout)
-    return output.write(data[:PIPE_BUF]) if select([], [output.fileno()], [], 0)[1] else None
+def _without_waiting(number: int, data: bytes) -> int | None:
+    """Write to a pipe if its reader takes it: one who stops reading must not stop the router."""
+    return os.write(number, data[:PIPE_BUF]) if select([], [number], [], 0)[1] else None
 
 
 async def _route(options: Options, keys: Keys | None) -> None:
     from engage_hri.services.bus.zenoh.router import routing
     from engage_hri.services.bus.zenoh.session import MOST_SESSIONS
 
-    tell = _teller(options.attended)
+    tell = _teller("the watch", options.attended)
 
     def sign() -> None:
         """Show a sign of life, in whatever thread: past what the loop has to write."""
-        _without_waiting(f"{options.attended}{SIGN}\n".encode())
+        _without_waiting(options.attended, f"{SIGN}\n".encode())
 
     _let_in_many()
     async with (

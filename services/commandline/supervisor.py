@@ -53,16 +53,21 @@ def without_threads() -> Iterator[None]:
 
 @asynccontextmanager
 async def spawned(
-    end: Callable[[Process], Awaitable[None]], *arguments: str, limit: int = 2**16, stderr: int | None = None
+    end: Callable[[Process], Awaitable[None]],
+    *arguments: str,
+    limit: int = 2**16,
+    stderr: int | None = None,
+    shared: Sequence[int] = (),
 ) -> AsyncIterator[Process]:
     """Run a child process while the body of `async with` runs, with pipes to standard input and output.
 
-    end: is called at the end, and must end the process; cancellations do not cut it short. The child has its own
-    process group: a terminal's Ctrl-C reaches only us, and we end the children in order.
+    end: is called at the end, and must end the process; cancellations do not cut it short. shared: files of ours that
+    are open in it, too, with the same numbers. The child has its own process group: a terminal's Ctrl-C reaches only
+    us, and we end the children in order.
     """
     creating = asyncio.ensure_future(
         asyncio.create_subprocess_exec(
-            *arguments, stdin=PIPE, stdout=PIPE, stderr=stderr, limit=limit, start_new_session=True
+            *arguments, stdin=PIPE, stdout=PIPE, stderr=stderr, limit=limit, start_new_session=True, pass_fds=shared
         )
     )
     try:

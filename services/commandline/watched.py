@@ -1,8 +1,10 @@
 """Watch over one child process: it shows signs of life, and is started anew when it shows none, or ends."""
 
 import asyncio
+import os
 from asyncio.subprocess import Process
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.supervisor import ended_in_order, ending, killed, spawned, without_threads
@@ -27,21 +29,22 @@ async def watched(
     name: str,
     tell: Callable[[str], None],
     warn: Callable[[str], None],
-    mark: bytes = b"",
     other: Callable[[bytes], bool] = lambda line: False,
 ) -> int:
     """Run a process until cancelled, and again whenever it hangs or ends. Returns the exit code of one that refuses.
 
+    The process gets the number of a pipe as its last argument, for its lines and signs. What Zenoh logs in it goes
+    to standard output: in a flood that is always full, and a sign would find no room there.
     One that ends by itself before its first sign refuses to run: it has said why. name: of the process, for people.
-    tell: gets the lines of its standard output that begin with `mark`. other: gets all that do not, and says of each
-    whether it is a sign of life. warn: gets what became of it.
+    tell: gets the lines of its pipe. other: gets those of its standard output, and says of each whether it is a sign
+    of life. warn: gets what became of it.
     """
     loop = asyncio.get_running_loop()
     with without_threads():
         while True:
             began = loop.time()
-            async with spawned(_end, *command) as process:
-                has_shown, is_silent = await _listen(process, tell, mark, other)
+            async with _piped(command) as (process, lines):
+                has_shown, is_silent = await _listen(process, lines, tell, other)
                 if is_silent:
                     await killed(process)
                 code = await process.wait()
@@ -56,37 +59,66 @@ async def watched(
                 await asyncio.sleep(PAUSE)
 
 
+@asynccontextmanager
+async def _piped(command: Sequence[str]) -> AsyncIterator[tuple[Process, asyncio.StreamReader]]:
+    """Run a process that has one more pipe to us, and its number as the last argument."""
+    loop, lines = asyncio.get_running_loop(), asyncio.StreamReader()
+    ours, its = os.pipe()
+    reading, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), os.fdopen(ours, "rb", 0))
+    try:
+        async with spawned(_end, *command, str(its), shared=(its,)) as process:
+            os.close(its)  # it ends with the process
+            its = -1
+            yield process, lines
+    finally:
+        reading.close()
+        if its >= 0:
+            os.close(its)
+
+
 async def _listen(
-    process: Process, tell: Callable[[str], None], mark: bytes, other: Callable[[bytes], bool]
+    process: Process, lines: asyncio.StreamReader, tell: Callable[[str], None], other: Callable[[bytes], bool]
 ) -> tuple[bool, bool]:
     """Pass on the lines until they end. Returns whether there was a sign of life, and whether it fell silent."""
     assert process.stdout is not None
-    loop = asyncio.get_running_loop()
-    has_shown, deadline, rest = False, loop.time() + BEGINNING, b""
-    while True:
-        try:
-            async with asyncio.timeout_at(deadline):
-                # In pieces: whoever waits for each line of a flood holds up the process that writes it.
-                piece = await process.stdout.read(LONGEST)
-        except TimeoutError:
-            return has_shown, True
+    loop, has_shown = asyncio.get_running_loop(), False
+
+    def is_alive() -> None:
+        silence.reschedule(loop.time() + (SILENCE if has_shown else BEGINNING))
+
+    def take(line: bytes) -> None:
+        nonlocal has_shown
+        if (text := line.decode(errors="replace")) == SIGN:
+            has_shown = True
+        else:
+            tell(text)
+        is_alive()
+
+    def take_other(line: bytes) -> None:
+        if other(line):
+            is_alive()
+
+    try:
+        async with asyncio.timeout(BEGINNING) as silence, asyncio.TaskGroup() as group:
+            group.create_task(_each(lines, take))
+            group.create_task(_each(process.stdout, take_other))
+    except TimeoutError:
+        return has_shown, True
+    return has_shown, False
+
+
+async def _each(stream: asyncio.StreamReader, take: Callable[[bytes], None]) -> None:
+    """Take each line of a stream, in pieces: whoever waits for each line of a flood holds up who writes it."""
+    rest = b""
+    while piece := await stream.read(LONGEST):
         *lines, rest = (rest + piece).split(b"\n")
-        if len(rest) > LONGEST or (rest and not piece):
+        if len(rest) > LONGEST:
             lines.append(rest)
             rest = b""
-        for raw in lines:
-            line = raw if len(raw) <= LONGEST else mark + b"(a line too long to show)"
-            if line.startswith(mark):
-                text = line.removeprefix(mark).decode(errors="replace")
-                if text == SIGN:
-                    has_shown = True
-                else:
-                    tell(text)
-            elif not other(line):
-                continue
-            deadline = loop.time() + (SILENCE if has_shown else BEGINNING)
-        if not piece:
-            return has_shown, False
+        for line in lines:
+            take(line if len(line) <= LONGEST else b"(a line too long to show)")
+    if rest:
+        take(rest)
 
 
 async def _end(process: Process) -> None:

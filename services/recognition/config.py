@@ -8,7 +8,6 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.ranges import not_negative, positive
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
-from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 GazeResolution = Literal["object", "table"]
 
@@ -102,9 +101,6 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     look_break: Seconds = 0.15
     """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
     meanwhile waits for the decision."""
-    forgotten_after: Seconds = FORGOTTEN_AFTER
-    """Time after which a person who has gone, or of whom no report comes, is forgotten: the same id then means a new
-    person. What the old one did stays in the statistics of all together."""
     longest_speech: Seconds = 60.0
     """Time after which speech is over if no report of its end has come. The next beginning ends it, too."""
     longest_gesture: Seconds = 10.0
@@ -138,9 +134,10 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
             raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
         if not 0 <= self.look_break <= self.sensing.settling:
             raise ValueError("look_break must not be negative, nor longer than sensing.settling")
-        if not self.forgotten_after > max(FACE_GRACE, self.after_robot_directed, self.direct_by_look):
+        if max(self.after_robot_directed, self.direct_by_look) >= FORGOTTEN_AFTER:
             raise ValueError(
-                f"forgotten_after must be greater than {FACE_GRACE:g} s, after_robot_directed and direct_by_look"
+                f"after_robot_directed and direct_by_look must be less than {FORGOTTEN_AFTER:g} s: "
+                "who has gone is then forgotten"
             )
         if self.enough_events < 2:
             raise ValueError("enough_events must be at least 2: one event has no time between events")

@@ -32,7 +32,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
         recognition.begin()
         try:
             while not inbox.is_over:
-                received = await inbox.next(recognition.deadline)
+                received = await inbox.next(None if len(inbox) else recognition.deadline)
                 with bus.containing(received or "what is due by now"):
                     if received is None:
                         recognition.advance()

@@ -65,6 +65,8 @@ LARGEST_CHUNK = 64 * 1024 * 1024
 CHUNKS_KEPT = 16
 """Number of chunks that are kept decompressed."""
 BILLION = 1_000_000_000
+LONGEST_SILENCE = 3600 * BILLION
+"""Nanoseconds that a recorder may have waited for a robot, by a time that has no checksum."""
 LATEST = 2**63 - 1
 """Latest time in a file, in nanoseconds since 1970: in the year 2262."""
 
@@ -120,6 +122,7 @@ class Recording:
             known = "nothing in it can be read" if not self._channels else "it is a recording of another program"
             reason = "what it says of its beginning is damaged" if self.damaged else known
             raise InputRefused(Fault(reason=reason, where=name, advice="`engage record` makes recordings"))
+        self._check_beginning()
         try:
             is_readable = isfinite(self.began) and 0 <= self.wall <= LATEST
         except ValueError:
@@ -310,6 +313,21 @@ class Recording:
             self._damage(at, "the record at the end of the data is damaged")
         elif is_end and not is_right and not self.damaged:  # what is damaged differs from the checksum, of course
             self._damage(at, "the data differs from its checksum outside of the messages")
+
+    def _check_beginning(self) -> None:
+        """Compare the time of the beginning with what has a checksum: a replay waits from then for the first message.
+
+        Each mark has it. Where there are no marks it is not much earlier than the first message.
+        """
+        wall, times = self._mark.of, self._times
+        if not wall and times:
+            first, last = min(times), max(times)
+            began = self.facts.get("wall", "")
+            is_near = began.isdecimal() and 0 <= first - int(began) <= max(last - first, LONGEST_SILENCE)
+            wall = began if is_near else str(first)
+        if times and wall != self.facts.get("wall", ""):
+            self.facts = {**self.facts, "wall": wall}
+            self._damage(0, "the time of its beginning is damaged")
 
     def _damage(self, at: int, reason: str) -> None:
         self._indexed = None

@@ -187,8 +187,8 @@ class Writer:
             id = self._channels[line] = self._channel_ids.setdefault(_digest(line), new)
             if id == new:
                 self._untold.add(id)
-        if id in self._untold:
-            self._untold.remove(id)
+        if (is_new := id in self._untold) or line is _MARKS:  # each chunk can be read without those before it
+            self._untold.discard(id)
             schema = SCHEMA if line.key and line.form == JSON else 0
             channel = Channel(
                 id=id, topic=line.topic, message_encoding=line.form, schema_id=schema, metadata=line.metadata()
@@ -197,7 +197,7 @@ class Writer:
                 self._has_schema = True
                 _schema().write(self._chunk)
             channel.write(self._chunk)
-            self._new.append(channel)
+            self._new += [channel] if is_new else []
         return id
 
     def seal(self) -> Sealed | None:

@@ -21,12 +21,13 @@ pytestmark = pytest.mark.real_time
 
 BEATS = f"""
 import itertools, os, signal, sys, time
+out = open(int(sys.argv[-1]), "w", buffering=1)
 life = len(open(sys.argv[1]).read()) if os.path.exists(sys.argv[1]) else 0
 open(sys.argv[1], "a").write("x")
 for beat in itertools.count():
-    print({SIGN!r}, flush=True)
+    print({SIGN!r}, file=out)
     if beat == 0:
-        print("life", life, flush=True)
+        print("life", life, file=out)
     if life == 0 and beat == 3:
         {{fault}}
     time.sleep(0.05)
@@ -83,22 +84,23 @@ async def test_one_that_hangs_or_ends_is_started_anew(
 
 async def test_one_that_refuses_before_it_has_begun_is_not_tried_again(tmp_path: Path) -> None:
     lines: list[str] = []
-    command = [sys.executable, "-c", "print('why'); raise SystemExit(2)"]
+    source = "import os, sys; os.write(int(sys.argv[-1]), b'why'); raise SystemExit(2)"
     async with asyncio.timeout(PATIENCE):
-        code = await watched(command, "it", lines.append, lines.append)
+        code = await watched([sys.executable, "-c", source], "it", lines.append, lines.append)
 
     assert (code, lines) == (2, ["why"])
 
 
 async def test_its_lines_come_whole_and_in_order_however_they_are_written() -> None:
-    """Some are cut anywhere by the pipe; `other` gets those without the mark, and one without its end counts, too."""
+    """Some are cut anywhere by the pipe; `other` gets what is of standard output. One without its end counts, too."""
     source = """
 import sys
+out = open(int(sys.argv[-1]), "w")
 for number in range(4000):
-    sys.stdout.write(("#" if number % 3 else "") + f"{number} " + "x" * (number % 300) + chr(10))
-sys.stdout.write("#" + "y" * 200_000 + chr(10) + "#" + chr(10) + "#the end")
+    print(number, "x" * (number % 300), file=out if number % 3 else sys.stdout)
+print("y" * 200_000, "", "the end", sep=chr(10), end="", file=out)
 """
-    marked: list[str] = []
+    lines: list[str] = []
     others: list[bytes] = []
 
     def other(line: bytes) -> bool:
@@ -106,14 +108,45 @@ sys.stdout.write("#" + "y" * 200_000 + chr(10) + "#" + chr(10) + "#the end")
         return False
 
     async with asyncio.timeout(PATIENCE):
-        code = await watched([sys.executable, "-c", source], "it", marked.append, marked.append, b"#", other)
+        code = await watched([sys.executable, "-c", source], "it", lines.append, lines.append, other)
 
     written = [f"{number} {'x' * (number % 300)}" for number in range(4000)]
     assert code == 0
-    assert [line for line in marked if line[:1].isdigit()] == [line for n, line in enumerate(written) if n % 3]
-    assert [line for line in others if line[:1].isdigit()] == [line.encode() for line in written[::3]]
-    assert "(a line too long to show)" in marked
-    assert marked[-2:] == ["", "the end"]
+    assert [line for line in lines if line[:1].isdigit()] == [line for n, line in enumerate(written) if n % 3]
+    assert others == [line.encode() for line in written[::3]]
+    assert "(a line too long to show)" in lines
+    assert lines[-2:] == ["", "the end"]
+
+
+async def test_one_whose_output_is_always_full_shows_its_signs_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a flood, of which Zenoh logs each message in many threads."""
+    monkeypatch.setattr(module, "SILENCE", 0.5)
+    source = f"""
+import os, select, sys, threading, time
+out = int(sys.argv[-1])
+for _ in range(8):
+    threading.Thread(target=lambda: [os.write(1, b"authorized\\n" * 300) for _ in iter(int, 1)], daemon=True).start()
+end = time.monotonic() + 3.0
+while time.monotonic() < end:
+    if select.select([], [out], [], 0)[1]:
+        os.write(out, {SIGN!r}.encode() + b"\\n")
+    time.sleep(0.05)
+os.write(out, b"the end\\n")
+os._exit(0)
+"""
+    ended, lines, warnings = asyncio.Event(), list[str](), list[str]()
+
+    def tell(line: str) -> None:
+        lines.append(line)
+        ended.set()
+
+    task = asyncio.create_task(watched([sys.executable, "-c", source], "it", tell, warnings.append))
+    async with asyncio.timeout(PATIENCE):
+        await ended.wait()
+    task.cancel()
+    await asyncio.wait([task])
+
+    assert (lines, warnings) == (["the end"], [])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")

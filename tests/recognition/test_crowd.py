@@ -2,6 +2,7 @@
 
 import random
 from collections import Counter
+from unittest import mock
 
 import pytest
 from hypothesis import given, settings
@@ -12,15 +13,17 @@ from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statistics
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events import people
 from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from tests.random_cases import share_of
 from tests.recognition.kept import kinds
 from tests.recognition.observations import HUMAN, ROBOT, Log, request_event, stamp, world
-from tests.recognition.passers import Lobby, visit
+from tests.recognition.passers import EVERY, Lobby, visit
 from tests.recognition.test_random_streams import Chance, Stream
 
 NEVER = 1e9
@@ -42,14 +45,14 @@ def met_and_lost(**config: object) -> Log:
 
 
 def test_who_has_been_gone_for_long_is_forgotten():
-    log = met_and_lost(forgotten_after=60.0)
-    log.until(61.9)
+    log = met_and_lost()
+    log.until(1.9 + FORGOTTEN_AFTER)
     assert "ann" in log.session.persons
-    log.until(62.0)
+    log.until(2.0 + FORGOTTEN_AFTER)
 
     assert forgotten(log) == ["ann"]
     assert "ann" not in log.session.persons
-    log.requests_event("mutual_facial_gaze", 63.0, responder="ann")
+    log.requests_event("mutual_facial_gaze", 3.0 + FORGOTTEN_AFTER, responder="ann")
     faults = [effect.fault for effect in log.effects if isinstance(effect, Refused)]
     assert [(fault.reason, fault.advice) for fault in faults] == [("unknown actor 'ann'", "known: host")]
 
@@ -71,51 +74,51 @@ def test_nothing_waits_for_forgetting():
 
 
 def test_who_comes_back_in_time_is_not_forgotten():
-    log = met_and_lost(forgotten_after=60.0)
-    log.found("ann", 50.0)
-    log.until(1000.0)
+    log = met_and_lost()
+    log.found("ann", FORGOTTEN_AFTER)
+    log.until(3 * FORGOTTEN_AFTER)
 
     assert forgotten(log) == []
 
 
 def test_who_is_in_the_world_is_not_forgotten_though_the_face_is_lost():
-    log = Log("ann", forgotten_after=60.0)
+    log = Log("ann")
     log.lost("ann", 2.0)
     log.until(1000.0)
     assert forgotten(log) == []
     log.feed(world("host"), 1001.0)
-    log.until(1061.0)
+    log.until(1001.0 + FORGOTTEN_AFTER)
 
     assert forgotten(log) == ["ann"]
 
 
 def test_who_is_missing_in_the_world_and_told_of_by_nobody_has_gone():
-    log = Log("ann", forgotten_after=60.0)
+    log = Log("ann")
     log.looks("ann", ROBOT, 1.0)
     log.looks(ROBOT, "ann", 1.5)
     log.feed(world("host"), 10.0)
-    log.until(69.9)
+    log.until(9.9 + FORGOTTEN_AFTER)
     assert log.states("mfg-1") == ["started", "succeeded"]
-    log.until(70.0)
+    log.until(10.0 + FORGOTTEN_AFTER)
 
     assert forgotten(log) == ["ann"]
-    assert log.told()[-1] == ("mfg-1", "completed", 70.0)
+    assert log.told()[-1] == ("mfg-1", "completed", 10.0 + FORGOTTEN_AFTER)
     assert log.last("mfg-1").duration == pytest.approx(8.5)
 
 
 def test_whom_only_their_actions_tell_of_are_forgotten_after_the_last():
-    log = Log("host", forgotten_after=60.0)
+    log = Log("host")
     log.begins("voice-1", "speak", 1.0)
     log.ends("voice-1", "speak", 30.0)
-    log.until(89.9)
+    log.until(29.9 + FORGOTTEN_AFTER)
     assert forgotten(log) == []
-    log.until(90.0)
+    log.until(30.0 + FORGOTTEN_AFTER)
 
     assert forgotten(log) == ["voice-1"]
 
 
 def test_who_has_been_found_is_there_however_quiet():
-    log = Log("host", forgotten_after=60.0)
+    log = Log("host")
     log.found("ann", 1.0)
     log.until(5000.0)
 
@@ -123,16 +126,16 @@ def test_who_has_been_found_is_there_however_quiet():
 
 
 def test_who_comes_back_later_is_somebody_new_and_the_totals_stay():
-    log, published = met_and_lost(forgotten_after=60.0), PublishedStatistics(ROBOT, RecognitionConfig())
-    log.until(100.0)
-    log.found("ann", 100.0)
-    log.looks("ann", ROBOT, 100.0)
+    log, published = met_and_lost(), PublishedStatistics(ROBOT, RecognitionConfig())
+    log.until(700.0)
+    log.found("ann", 700.0)
+    log.looks("ann", ROBOT, 700.0)
     changes = [effect for effect in log.effects if isinstance(effect, ConnectionEvent | Forgotten)]
-    (first, everybody) = sorted(published.feed(changes, set(), 100.0), key=lambda one: one.session.events)
+    (first, everybody) = sorted(published.feed(changes, set(), 700.0), key=lambda one: one.session.events)
 
     assert (first.actor, first.session.events) == ("ann", 1)
     assert (everybody.actor, everybody.session.events) == ("", 2)
-    assert everybody.session.max_gap == 99.0
+    assert everybody.session.max_gap == 699.0
 
 
 def test_the_book_of_open_events_keeps_nobody_without_one():
@@ -146,10 +149,11 @@ def test_the_book_of_open_events_keeps_nobody_without_one():
     assert book._open == {}
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.5, 2.0])
-def test_nobody_is_forgotten_who_may_still_count(seconds):
-    with pytest.raises(ValueError, match="forgotten_after must be greater than"):
-        RecognitionConfig(forgotten_after=seconds)
+@pytest.mark.parametrize("setting", ["after_robot_directed", "direct_by_look"])
+def test_nobody_is_forgotten_who_may_still_count(setting: str):
+    assert getattr(RecognitionConfig(**{setting: FORGOTTEN_AFTER - 1.0}), setting) > 0.0  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="after_robot_directed and direct_by_look must be less than 600 s"):
+        RecognitionConfig(**{setting: FORGOTTEN_AFTER})  # type: ignore[arg-type]
 
 
 # -- what they cost -----------------------------------------------------------------------------------------------
@@ -157,7 +161,7 @@ def test_nobody_is_forgotten_who_may_still_count(seconds):
 
 @pytest.mark.parametrize("raw", [False, True], ids=["symbolic", "raw"])
 def test_what_is_kept_does_not_grow_with_those_who_have_passed(raw: bool):
-    lobby = Lobby(RecognitionConfig(forgotten_after=40.0))
+    lobby = Lobby(RecognitionConfig())
     sizes = []
     for number in range(600):
         for at, observation in visit(number, raw=raw):
@@ -166,7 +170,7 @@ def test_what_is_kept_does_not_grow_with_those_who_have_passed(raw: bool):
             sizes.append(kinds(*lobby.kept()))
     early, late = sizes
 
-    assert len(lobby.recognizer.session.persons) < 10
+    assert len(lobby.recognizer.session.persons) <= FORGOTTEN_AFTER / EVERY + 2
     for kind, count in late.items():
         assert count <= 1.1 * early[kind] + 40, kind
 
@@ -244,8 +248,15 @@ def _of(name: str, observation: object) -> object:
 
 
 def told(stream: Stream, forgotten_after: float) -> tuple[Counter[object], Statistics, int]:
-    """The effects, but for their numbers: at one instant it is whoever was met first; the totals; who is known."""
-    config = RecognitionConfig(forgotten_after=forgotten_after)
+    """The effects, but for their numbers: at one instant it is whoever was met first; the totals; who is known.
+
+    forgotten_after: in place of the bound of the house.
+    """
+    with mock.patch.object(people, "FORGOTTEN_AFTER", forgotten_after):
+        return _told(stream, RecognitionConfig())
+
+
+def _told(stream: Stream, config: RecognitionConfig) -> tuple[Counter[object], Statistics, int]:
     session, published = Session(ROBOT, config), PublishedStatistics(ROBOT, config)
     session.feed(world("ann", "bob"), 0.0)
     effects = []

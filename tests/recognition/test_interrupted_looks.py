@@ -118,17 +118,17 @@ def test_a_look_elsewhere_ends_the_last_without_waiting():
 
 
 def test_breaks_of_people_long_gone_are_forgotten():
-    recognizer = Recognizer(ROBOT, RecognitionConfig(forgotten_after=30.0))
+    recognizer = Recognizer(ROBOT, RecognitionConfig())
     recognizer.feed(world("nobody-else"), 0.0, 0.0)
     for number in range(100):
-        at, actor = 60.0 * number, f"track-{number}"
+        at, actor = 1000.0 * number, f"track-{number}"
         for observation in (
             ActionBegan(actor=actor, action="look", at=stamp(at), targets=(ROBOT,)),
             ActionEnded(actor=actor, action="look", at=stamp(at + 1.0), targets=(ROBOT,)),
             ActorLost(actor=actor, at=stamp(at + 1.0)),
         ):
             recognizer.feed(observation, observation.at.seconds, observation.at.seconds)
-        recognizer.advance(at + 50.0)
+        recognizer.advance(at + 900.0)
 
     assert len(recognizer._interrupted._breaks) + len(recognizer._interrupted._lost) <= 2
 

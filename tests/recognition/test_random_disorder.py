@@ -23,7 +23,7 @@ CELL = 0.04
 CONFIG = RecognitionConfig(
     manipulation_limit=8.3, adjacency_pair_limit=4.3,
     turn_patience=12.3, third_turn_limit=1.83, after_robot_directed=2.3,
-    forgotten_after=600.3, longest_speech=60.3, longest_gesture=10.3, longest_manipulation=120.3,
+    longest_speech=60.3, longest_gesture=10.3, longest_manipulation=120.3,
 )  # fmt: skip
 """No limit, nor the time of a lost face, is a number of full seconds: none passes between observations of a cell."""
 

@@ -246,11 +246,11 @@ async def test_the_states_of_who_is_forgotten_are_withdrawn(hub: MemoryHub):
     def look(actor: str) -> None:
         bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor=actor, action="look", at=bus.stamp(), targets=(ROBOT,)))
 
-    async with running(hub, recognition(forgotten_after=60.0)):
+    async with running(hub, recognition()):
         for name in ("ann", "bob", "carl"):
             bus.publish(keys.PERCEIVED_ACTION, ActorFound(actor=name, at=bus.stamp()))
             look(name)
-            await asyncio.sleep(40.0)
+            await asyncio.sleep(400.0)
             bus.publish(keys.PERCEIVED_ACTION, ActorLost(actor=name, at=bus.stamp()))
         look("dora")
         await asyncio.sleep(1.0)

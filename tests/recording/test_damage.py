@@ -258,3 +258,18 @@ def test_a_damaged_byte_in_a_chunk_costs_that_chunk_at_most() -> None:
 
             assert found == [one for one in whole if one in found]
             assert (begin, end) == first or len(whole) - len(found) <= 7, place
+
+
+@pytest.mark.parametrize("name", ["without an end", "whole", "old"])
+@pytest.mark.parametrize("by", [-(10**18), -(10**17), 10**15, 10**18])
+def test_a_replay_does_not_wait_for_a_beginning_that_only_a_damaged_part_tells_of(name: str, by: int) -> None:
+    """The first chunk is damaged, and a digit of the beginning in the facts is, which have no checksum."""
+    data = file(name)
+    begin, end = next((begin, end) for begin, end in records(data) if data[begin] == 6)
+    bad = changed(data, (begin + end) // 2, 0xFF) if name != "old" else data
+    recording = Recording(bad.replace(str(WALL).encode(), str(WALL + by).encode(), 1))
+    times = [recording.time(number) for number in range(len(recording))]
+
+    assert recording.damaged
+    assert times
+    assert all(0.0 <= each <= told()[-1].at for each in times)

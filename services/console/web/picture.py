@@ -79,7 +79,9 @@ class Picture:
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
-        self.people = Acquaintances()
+        self._people = Acquaintances()
+        self.reporters: dict[str, str] = {}
+        """Participant that tells of each person."""
         self._numbers = count()
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
@@ -140,7 +142,7 @@ class Picture:
         match message:
             case World():
                 self._world = message
-                self.people.see([each.id for each in message.people], self.now)
+                self._people.see([each.id for each in message.people], self.now)
                 self._changed("scene")
             case RobotState():
                 self._state = message
@@ -157,10 +159,10 @@ class Picture:
             case Statistics(actor=actor):
                 self._measures.feed(message, at)
                 if actor:
-                    self.people.hear(actor, self.now)
+                    self._people.hear(actor, self.now)
                 self._changed("measures")
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
-                self.people.hear(message.actor, self.now)
+                self._people.hear(message.actor, self.now)
             case BlockProgress() | SyncPointProgress() | PredictionFeedback():
                 self._take_block(message, at)
             case NetPlanned() | NetMarked() | NetWaiting():
@@ -259,6 +261,11 @@ class Picture:
         self._notes.append(Note(self.zero(at), level, text))
         self._changed("notes")
 
+    def note_reporter(self, person: str, name: str, now: Seconds) -> None:
+        """Note which participant tells of a person."""
+        self._people.hear(person, now)
+        self.reporters[person] = name
+
     def silence(self, names: frozenset[str], now: Seconds) -> None:
         """Say which participants have not answered a question for their status."""
         self.now = max(self.now, now)
@@ -271,8 +278,9 @@ class Picture:
         """Let time pass: forget what is over, and tell what is told slowly."""
         self.now = max(self.now, now)
         self._settles = self.now + SETTLED_EVERY
-        for person in self.people.forgotten(self.now):
+        for person in self._people.forgotten(self.now):
             self._measures.forget(person)
+            self.reporters.pop(person, None)
             self._changed("measures")
         for id in self._blocks.forget(now):
             self._drop(f"{BLOCK}{id}")

@@ -56,8 +56,6 @@ class Window:
         self.viewers = 0
         self.listeners: set[Callable[[Message], None]] = set()
         self._here: set[str] = set()
-        self._reporters: dict[str, str] = {}
-        """Participant that tells of each person."""
         self._numbers = count(1)
 
     def __call__(self, message: Message, at: Seconds) -> None:
@@ -80,16 +78,13 @@ class Window:
     @property
     def invitation(self) -> Invitation:
         """Invitation to who may sit down."""
-        return invitation(self.picture.present, self._reporters, self._here)
+        return invitation(self.picture.present, self.picture.reporters, self._here)
 
     async def note_reporters(self, reports: Subscription) -> None:
         """Note who tells of whom, until the subscription is closed."""
         async for received in reports:
             if isinstance(received.message, OngoingActions):
-                actor, people = received.message.actor, self.picture.people
-                people.hear(actor, self.bus.now())
-                self._reporters = {one: by for one, by in self._reporters.items() if one in people}
-                self._reporters[actor] = keys.reporter_of(received.key)
+                self.picture.note_reporter(received.message.actor, keys.reporter_of(received.key), self.bus.now())
 
     def new_id(self) -> str:
         """Make an id for a fragment that somebody makes at the page."""

@@ -13,6 +13,7 @@ from engage_hri.services.recognition.events.machine import EventWriter, Forgotte
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.requests.deadlines import Deadlines
+from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
 
 class People:
@@ -47,7 +48,7 @@ class People:
         """Take a view of the world: people in it are here, those that are missing now may have gone."""
         before = self._scene.people_in_world
         self._scene.see(world, at)
-        self._scene.forget_others(at - self._config.forgotten_after)
+        self._scene.forget_others(at - FORGOTTEN_AFTER)
         for id in sorted(self._scene.people_in_world):
             self.person(id)
         for id in sorted(before ^ self._scene.people_in_world):
@@ -65,7 +66,7 @@ class People:
         """Drop persons without a sign for long. No deadline wakes for that: it happens at the next step."""
         while self._unseen:
             id, since = next(iter(self._unseen.items()))
-            if since + self._config.forgotten_after > now:
+            if since + FORGOTTEN_AFTER > now:
                 return
             person = self.persons[id]
             if person.presence.here:

@@ -26,6 +26,7 @@ from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, i
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import Voice
+from engage_hri.services.runtime.absent import Absent
 from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 Raw = HeadPose | VoiceActivity | World | RobotState
@@ -84,8 +85,8 @@ class Attention:
         self._actors: dict[str, _Actor] = {}
         self._attended: dict[str, _Actor] = {}
         """The actors for whom a deadline or an undecided action is pending."""
-        self._mentioned_at: dict[str, Seconds] = {}
-        """Time of the last observation of each actor; the longest ago first."""
+        self._mentioned: Absent[str] = Absent()
+        """All actors, each by its last observation."""
         self._came = 0
         self._world_at = NEVER
 
@@ -182,8 +183,7 @@ class Attention:
         if id not in self._actors:
             self._came += 1
             self._actors[id] = _Actor(id, self._came, self._config)
-        self._mentioned_at.pop(id, None)
-        self._mentioned_at[id] = at
+        self._mentioned.leaves(id, at)
         return self._actors[id]
 
     def _attend(self, id: str) -> None:
@@ -193,12 +193,9 @@ class Attention:
             self._attended.pop(id, None)
 
     def _forget(self, now: Seconds) -> None:
-        """Forget actors without an observation for `forgotten_after`, as the session does."""
-        while self._mentioned_at:
-            id, at = next(iter(self._mentioned_at.items()))
-            if at + self._config.forgotten_after > now:
-                return
-            del self._mentioned_at[id], self._actors[id]
+        """Forget actors who have not been observed for long, as the session does."""
+        for id in self._mentioned.forgotten(now):
+            del self._actors[id]
             self._attended.pop(id, None)
             self._gaze_targets.forget_face(id)
 

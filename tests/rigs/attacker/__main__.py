@@ -1,6 +1,6 @@
 """Attack a robot with each role and each attack, beside a manager who performs: `python -m tests.rigs.attacker`.
 
-Prints a table. Exit 1 after an attack that cost a fragment, or a router of 150 MB, or a second and a half.
+Prints a table. Exit 1 if an attack costs a fragment, a restart or 150 MB of the router, or a second and a half.
 """
 
 import argparse
@@ -41,7 +41,13 @@ async def trial(options: argparse.Namespace) -> int:
                     one = await attacked(siege, robot, role, attack, options.seconds)
                     done, lost = len(one.performed.seconds), one.performed.lost
                     slow = one.performed.slowest
-                    wrong = bool(lost) or one.memory > MOST_MEMORY or slow > calm.slowest + SLOWER or not done
+                    wrong = (
+                        bool(lost)
+                        or one.memory > MOST_MEMORY
+                        or slow > calm.slowest + SLOWER
+                        or not done
+                        or one.restarts > 0
+                    )
                     is_wrong |= wrong
                     told = one.told[0] if one.told else ""
                     print(
@@ -49,7 +55,7 @@ async def trial(options: argparse.Namespace) -> int:
                         f" {one.memory:.0f} | {told} |{' WRONG' if wrong else ''}",
                         flush=True,
                     )
-                    for each in lost:
+                    for each in (*lost, *(line for line in siege.router.lines if "anew" in line)):
                         print(f"    {each}")
     return int(is_wrong)
 

@@ -79,8 +79,9 @@ class Attacker:
 
     def ask(self, key: str, payload: bytes) -> None:
         self.session.get(
-            key, zenoh.handlers.Callback(lambda reply: None, indirect=False), payload=payload, timeout=1.0
-        )
+            key, zenoh.handlers.Callback(lambda reply: None, indirect=False), payload=payload, timeout=1.0,
+            priority=zenoh.Priority.REAL_TIME,
+        )  # fmt: skip
 
 
 def one_byte_more(by: Attacker) -> None:
@@ -120,8 +121,13 @@ def small_messages(by: Attacker) -> None:
     by.put(by.next_of(by.puts), b"\xc1" * 100, encoding="application/msgpack")
 
 
+def urgent_messages(by: Attacker) -> None:
+    """Small messages that nobody can read, with the highest priority, as fast as the link takes them."""
+    by.put(by.next_of(by.puts), b"\xc1" * 100, encoding="application/msgpack", priority=zenoh.Priority.REAL_TIME)
+
+
 def questions(by: Attacker) -> None:
-    """Small questions, as fast as the link takes them."""
+    """Small questions with the highest priority, as fast as the link takes them."""
     by.ask(by.next_of(by.questions), b"")
 
 
@@ -136,7 +142,8 @@ def encodings(by: Attacker) -> None:
 ATTACKS: Mapping[str, Callable[[Attacker], None]] = {
     each.__name__.replace("_", "-"): each
     for each in (
-        one_byte_more, huge, huge_questions, as_large_as_allowed, pulses, small_messages, questions, encodings,
+        one_byte_more, huge, huge_questions, as_large_as_allowed, pulses, small_messages, urgent_messages, questions,
+        encodings,
     )
 }  # fmt: skip
 

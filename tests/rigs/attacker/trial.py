@@ -75,6 +75,12 @@ class Siege:
         words = ("refused a link", "loud: ", "somebody") if role == NOBODY else (name,)
         return [line for line in self.router.lines if any(word in line for word in words)]
 
+    @property
+    def restarts(self) -> int:
+        """Number of times that the router was started anew."""
+        self.router.drain()
+        return sum("started anew" in line for line in self.router.lines)
+
     def manager(self) -> Robot:
         """A manager of ours, as a context manager."""
         if self.ring is None:
@@ -111,7 +117,10 @@ class Siege:
 
 @dataclass
 class Result:
-    """An attack and what came of it. memory: the most of the router, in MB. told: lines that name the attacker."""
+    """An attack and what came of it. memory: the most of the router, in MB. told: lines that name the attacker.
+
+    restarts: of the router.
+    """
 
     role: str
     attack: str
@@ -120,11 +129,12 @@ class Result:
     performed: Performed
     memory: float
     told: list[str]
+    restarts: int
 
 
 async def attacked(siege: Siege, robot: Robot, role: str, attack: str, seconds: float) -> Result:
     """Perform while somebody attacks."""
-    known = len(siege.told_of(role))
+    known, restarts = len(siege.told_of(role)), siege.restarts
     attacker = await siege.attack(role, attack, seconds)
     memory = 0.0
 
@@ -139,7 +149,10 @@ async def attacked(siege: Siege, robot: Robot, role: str, attack: str, seconds: 
     out, _ = await attacker.communicate()
     watching.cancel()
     count = json.loads(out or b'{"times": -1, "refused": 0}')
-    return Result(role, attack, **count, performed=performed, memory=memory, told=siege.told_of(role)[known:])
+    told = siege.told_of(role)[known:]
+    return Result(
+        role, attack, **count, performed=performed, memory=memory, told=told, restarts=siege.restarts - restarts
+    )
 
 
 def _family(pid: int) -> list[int]:
