@@ -55,12 +55,12 @@ def test_a_report_that_is_late_when_it_is_first_expected_is_no_standstill() -> N
 
 def test_what_is_expected_again_as_before_is_late_again() -> None:
     """As of a behavior that held for a while, and whose estimate has not changed."""
-    watch = LatenessWatch(CONFIG)
-    watch.expect("b", "stroke", 1.0, 1.0)
+    watch = LatenessWatch(CONFIG, Sight("realizer"))
+    watch.expect("b", "stroke", 1.0, 1.0, 0.0)
     watch.forget("b")
     assert watch.deadline is None
 
-    watch.expect("b", "stroke", 1.0, 1.0)
+    watch.expect("b", "stroke", 1.0, 1.0, 0.0)
 
     assert watch.overdue(2.5) == [Late("b", "stroke", 1.5)]
 
