@@ -62,9 +62,6 @@ class Acquaintances:
         self._seen: frozenset[str] = frozenset()
         self._absent: Absent[str] = Absent()
 
-    def __contains__(self, person: str) -> bool:
-        return person in self._seen or person in self._absent
-
     def see(self, people: Collection[str], now: Seconds) -> None:
         """Take the people in the world: nobody is forgotten who is in it."""
         seen = frozenset(people)

@@ -58,6 +58,9 @@ COMING = 1024
 """Of these, how many may be about to open."""
 KNOCK: Seconds = 2.0
 """Time that a connection has to open, when it is asked whether anybody is there."""
+ON_THE_WAY = {"so_sndbuf": 131_072, "so_rcvbuf": 131_072}
+"""Bytes of a link that wait in the systems of its two ends. Systems let megabytes wait else, and what comes after a
+flood waits behind all of them (docs/decisions/0126-a-flood-does-not-wait-in-the-system.md)."""
 BATCH = 256
 CROWD = 262_144
 """Number of messages waiting for the loop from which on even ordered ones are dropped (and asked for again)."""
@@ -169,7 +172,7 @@ def encrypted(keys: Keys) -> dict[str, object]:
         for what, path in (("certificate", keys.certificate), ("private_key", keys.private))
     }
     trust = {"root_ca_certificate": keys.authority, "enable_mtls": True, "verify_name_on_connect": True}
-    return {"transport/link/tls": {**own, **trust, "close_link_on_expiration": True}}
+    return {"transport/link/tls": {**own, **trust, "close_link_on_expiration": True, **ON_THE_WAY}}
 
 
 def _check(*endpoints: str) -> None:
@@ -200,6 +203,7 @@ def _config(
         "scouting/delay": 1,
         "timestamping/enabled": True,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tcp": ON_THE_WAY,
         "transport/link/tx/queue/congestion_control/block/wait_before_close": STALL_US,
         "transport/shared_memory/enabled": False,
     }

@@ -55,7 +55,7 @@ async def trial(options: argparse.Namespace) -> int:
                         f" {one.memory:.0f} | {told} |{' WRONG' if wrong else ''}",
                         flush=True,
                     )
-                    for each in (*lost, *(line for line in siege.router.lines if "anew" in line)):
+                    for each in (*lost, *(line for line in siege.router.lines if "started anew" in line)):
                         print(f"    {each}")
     return int(is_wrong)
 
