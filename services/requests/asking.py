@@ -330,19 +330,19 @@ class Asking:
         self._fail(asked, ServerRestarted(self._sight.restarted(asked.server, asked.request.id, ANEW)))
 
     def _tell_silent(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        why, since = "is there, but has not answered", now - self._patience.silence
-        self._fail(asked, OutcomeUnknown(self._fault(asked, why, "silent", since, now, ANEW)))
+        what = f"is there, but has not answered for {self._patience.silence:g} s"
+        self._fail(asked, OutcomeUnknown(self._fault(asked, what, "silent", now - self._patience.silence, ANEW)))
 
     def _tell_unstoppable(self, asked: Asked, now: Seconds, answer: _Said) -> None:
-        why, since = "has not ended what was cancelled", now - self._patience.cancel
+        what = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
         advice = f"is {asked.server} stuck? It is not asked any more"
-        fault = self._fault(asked, why, "late", since, now, advice)
+        fault = self._fault(asked, what, "late", now - self._patience.cancel, advice)
         self._fail(asked, NeverEnded(fault))
         self._effects.append(Complain(fault))
 
-    def _fault(self, asked: Asked, why: str, cause: Cause, since: Seconds, now: Seconds, advice: str) -> Fault:
-        what = f"{asked.server} {why} for {now - since:.1f} s"
-        return self._sight.fault(what, "", cause, asked.server, asked.request.id, since, advice)
+    def _fault(self, asked: Asked, what: str, cause: Cause, since: Seconds, advice: str) -> Fault:
+        """what: the server has not done, and for how long."""
+        return self._sight.fault(f"{asked.server} {what}", "", cause, asked.server, asked.request.id, since, advice)
 
     def _fail(self, asked: Asked, error: EngageError) -> None:
         self._effects.append(TellEnd(asked.request.id, error))
