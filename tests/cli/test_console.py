@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline import windowed
+from engage_hri.services.commandline import console, windowed
 from engage_hri.services.commandline.console import kept_token
 from engage_hri.services.recording.disk import read
 from tests.bus.places import free_endpoint
@@ -123,3 +123,18 @@ def test_the_demo_opens_a_window_only_where_somebody_sees_it(
     assert windowed.can_open(terminal) is opens
     monkeypatch.setattr(windowed, "NEEDED", ("no_such_package",))
     assert windowed.can_open(terminal) is False
+
+
+@needs_console
+@pytest.mark.parametrize(("role", "has_token"), [("observer", False), ("operator", True), ("wizard", True)])
+def test_the_address_has_a_token_only_where_the_role_of_the_window_has_rights(
+    engage: Engage, monkeypatch: pytest.MonkeyPatch, role: str, has_token: bool
+) -> None:
+    async def at_once() -> None:
+        pass
+
+    monkeypatch.setattr(console, "forever", at_once)
+    told = engage("console", "--connect", free_endpoint(), "--port", "0", "--role", role)
+
+    assert told.code == 0
+    assert ("?token=" in told.out) is has_token

@@ -49,6 +49,13 @@ def test_the_log_tells_both_sides(played: dict[str, Any]) -> None:
         assert expected in played["out"]
 
 
+def test_the_log_leaves_out_sync_points_and_who_has_the_head(played: dict[str, Any]) -> None:
+    told = [line.strip().partition("  ")[2] for line in played["out"].splitlines()]
+
+    assert sum(line.startswith("robot ") for line in told) > 10
+    assert not [line for line in told if line.startswith("head: ") or re.match(r"\S+:\S+:\S+ at ", line)]
+
+
 def test_each_event_ends_once_and_has_its_cause(played: dict[str, Any]) -> None:
     lines = [json.loads(line) for line in (played["folder"] / "events.jsonl").read_text().splitlines()]
 

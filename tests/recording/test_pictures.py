@@ -1,6 +1,7 @@
 """Pictures of scenes: what is on them, and that they are files that others open."""
 
 import io
+import math
 from pathlib import Path
 
 import numpy as np
@@ -8,13 +9,14 @@ import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
+from msgspec.structs import replace
 from PIL import Image
 
 from engage_hri.schemas.world import Entity
 from engage_hri.services.console.view import empty
 from engage_hri.services.console.web.scene import section as scene_section
-from engage_hri.services.recording.above import LEAST, frame, together
-from engage_hri.services.recording.drawing import PERSON, ROBOT, draw, pictures, sheet, times_of_film, write_film
+from engage_hri.services.recording.above import LEAST, frame, seen, together
+from engage_hri.services.recording.drawing import PERSON, POINT, ROBOT, draw, pictures, sheet, times_of_film, write_film
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.scenes import scenes, spread
 
@@ -104,3 +106,34 @@ def test_times_of_a_film_follow_its_rate_and_speed() -> None:
     assert times_of_film(10.0, 1.0, 5.0) == [0.0, 5.0, 10.0]
     assert times_of_film(10.0, 1.0, 1.0, until=2.0) == [0.0, 1.0, 2.0]
     assert spread(8.0, 4) == [1.0, 3.0, 5.0, 7.0]
+
+
+def test_a_robot_that_points_is_drawn_with_a_line_from_its_hand_to_the_target(task: Recording) -> None:
+    seen_pointing = 0
+    for scene in scenes(task, [number / 2 for number in range(int(2 * task.duration))]):
+        axes = Figure().add_subplot()
+        draw(axes, scene, LEAST)
+        lines = [each for each in axes.lines if to_rgba(each.get_color()) == to_rgba(POINT) and each.get_ls() == "-"]
+        targets = scene.doing.get((scene.robot, "point"), ())[:1]
+        assert len(lines) == len(targets)
+        for line, target in zip(lines, targets, strict=True):
+            assert scene.body is not None
+            assert scene.world is not None
+            (entity,) = [each for each in scene.world.entities if each.id == target]
+            hands = [arm.tip for arm in (scene.body.left_arm, scene.body.right_arm) if arm is not None and arm.tip]
+            begin, end = np.asarray(line.get_xydata())
+            assert min(math.dist(begin, seen(*hand[:2])) for hand in hands) < 1e-9
+            assert math.dist(begin, end) == pytest.approx(math.dist(begin, seen(*entity.position[:2])))
+            seen_pointing += math.dist(end, seen(*entity.position[:2])) < 0.1
+    assert seen_pointing > 0
+
+
+def test_a_scene_in_which_no_world_has_been_told_yet_is_drawn_without_things(task: Recording) -> None:
+    (scene,) = scenes(task, [3.0])
+    bare = replace(scene, world=None, doing={(scene.robot, "point"): ("blue-square",)})
+    axes = Figure().add_subplot()
+
+    draw(axes, bare, LEAST)
+
+    assert [each.get_facecolor() for each in axes.patches] == [to_rgba(ROBOT)]
+    assert not [each for each in axes.lines if to_rgba(each.get_color()) == to_rgba(POINT)]

@@ -13,6 +13,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.services.bus.interface import Sample
+from engage_hri.services.recording import reading
 from engage_hri.services.recording.disk import read, repair
 from engage_hri.services.recording.reading import Recording
 from tests.recording.files import FACTS, WALL, all_of, bytes_of, nanoseconds, sample, saved
@@ -218,3 +219,15 @@ def test_a_recording_of_nothing_opens(tmp_path: Path) -> None:
     recording = read(saved(tmp_path / "empty.mcap", []))
 
     assert (len(recording), recording.duration, recording.is_whole) == (0, 0.0, True)
+
+
+def test_a_chunk_is_read_up_to_the_largest_size_and_no_larger_one_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = bytes_of(told(), chunk=100)
+    summary = make_reader(io.BytesIO(data)).get_summary()
+    assert summary is not None
+    (chunk,) = summary.chunk_indexes
+
+    monkeypatch.setattr(reading, "LARGEST_CHUNK", chunk.uncompressed_size)
+    assert all_of(Recording(data)) == told()
+    monkeypatch.setattr(reading, "LARGEST_CHUNK", chunk.uncompressed_size - 1)
+    assert f"a chunk says that it has {chunk.uncompressed_size} bytes" in " ".join(map(str, Recording(data).damaged))

@@ -7,12 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive
-from engage_hri.schemas.status import Status
+from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.recording import disk
 from engage_hri.services.recording.disk import RecordingFile, read
@@ -196,3 +199,40 @@ def test_a_file_that_could_not_be_begun_is_not_left_behind(tmp_path: Path, monke
         RecordingFile(tmp_path / "a.mcap", {}, print)
 
     assert not list(tmp_path.iterdir())
+
+
+async def test_a_file_that_was_ended_says_how_many_messages_have_come_and_how_many_are_lost(tmp_path: Path) -> None:
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub):
+        there = hub.join("there")
+        for number in range(20):
+            there.publish(keys.fault("there"), Fault(reason=str(number)))
+        await asyncio.sleep(1.0)
+
+    recording = read(tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file:
+        notes = {each.name: each.metadata for each in make_reader(file).iter_metadata()}
+    assert len(recording) >= 20
+    assert notes["end"] == {"messages": str(len(recording)), "lost": "0"}
+
+
+async def test_only_services_are_asked_for_their_status_and_only_as_they_come(tmp_path: Path) -> None:
+    asked: list[str] = []
+
+    def answering(bus: Bus) -> None:
+        def status(question: Message) -> Status:
+            asked.append(bus.name)
+            return Status(participant=bus.name, run=bus.run, version="1", at=bus.stamp(), joined=bus.stamp())
+
+        bus.answer(keys.status(bus.name), status, empty=AskStatus())
+        bus.declare_alive()
+
+    async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub):
+        service, page, beside = hub.join("generation"), hub.join("page"), hub.join("generation-beside")
+        for each in (service, page, beside):
+            answering(each)
+        await asyncio.sleep(1.0)
+        service.publish(keys.fault("generation"), Fault(reason="it goes on"))
+        await page.leave()
+        await asyncio.sleep(1.0)
+
+    assert asked == ["generation"]

@@ -8,6 +8,7 @@ from random import Random
 
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer as PlainWriter
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
@@ -144,3 +145,24 @@ async def test_who_comes_back_after_long_speaks_in_the_same_channel(tmp_path: Pa
     topics = [each.topic for each in recording.contents.channels]
     assert faults_in(recording) == ["0", "1", "2"]
     assert len(topics) == len(set(topics))
+
+
+def test_the_statistics_of_a_file_without_messages_are_those_of_the_plain_library(tmp_path: Path) -> None:
+    file, plain = opened(tmp_path / "a.mcap"), PlainWriter(str(tmp_path / "plain.mcap"))
+    plain.start("engage", "engage")
+    plain.add_metadata("engage", FACTS)
+    plain.finish()
+
+    assert file.close({})
+
+    found = []
+    for name in ("a.mcap", "plain.mcap"):
+        with (tmp_path / name).open("rb") as data:
+            summary = make_reader(data).get_summary()
+        assert summary is not None
+        found.append(summary.statistics)
+    ours, theirs = found
+    assert ours is not None
+    assert theirs is not None
+    ours.metadata_count = theirs.metadata_count  # that of the end is more
+    assert ours == theirs
