@@ -1,7 +1,9 @@
 """`engage check-body`: what it prints of a body that keeps the contract, of one that breaks it, and of none."""
 
+import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,7 +11,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from rich.console import Console
 
+from engage_hri.schemas.body import Capabilities, JointLimit
+from engage_hri.services.control.testing.render import rendered
+from engage_hri.services.control.testing.report import BodyReport, Stated
 from tests.cli.command import Engage
 
 DRIVERS = '''
@@ -306,3 +312,28 @@ def test_who_is_stopped_leaves_the_robot(drivers: Path, stop: signal.Signals, co
     assert told == ["in\n", "out\n", "in\n", "out\n"]
     assert "Stopped: 0 laws were judged" in out
     assert "reports every sync point once and in order" in out
+
+
+@pytest.mark.parametrize("is_seen", [True, False])
+def test_the_speeds_that_joints_were_seen_to_have_are_beside_those_that_the_body_states(is_seen: bool) -> None:
+    able = Capabilities(
+        body="two", types=(), parts=("neck", "arm"),
+        joints=(
+            JointLimit(joint="tilt", part="neck", low=-0.5, high=0.5, speed=1.0, acceleration=5.0),
+            JointLimit(joint="lift", part="arm", low=0.0, high=2.0, speed=2.0, acceleration=4.0),
+        ),
+    )  # fmt: skip
+    report = BodyReport(
+        driver="simulated", capabilities=able, stated=Stated(tolerance=0.1, noise=0.0, accuracy=0.01), asked=(),
+        not_asked=(), unknown=(), estimate=0.0, fastest={"tilt": 0.25} if is_seen else {},
+    )  # fmt: skip
+    out = io.StringIO()
+    Console(file=out, width=120).print(rendered(report))
+
+    lines = [re.split(r"  +", line.strip()) for line in out.getvalue().splitlines()]
+    head = next(number for number, line in enumerate(lines) if line[0] == "joint")
+    assert ("seen degrees/s" in lines[head]) is is_seen
+    assert lines[head + 1 : head + 3] == [
+        ["tilt", "neck", "-29", "29", "57", "286", *["14"] * is_seen],
+        ["lift", "arm", "0", "115", "115", "229", *["0"] * is_seen],
+    ]

@@ -1,11 +1,15 @@
 """`engage explain`: the table behind each choice, for people and as JSON."""
 
+import io
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from engage_hri.schemas.fragments import PairConsidered, ReferenceChoice
+from engage_hri.services.commandline.explain import show_tables
 from tests.cli.command import ALONE, GOOD_BLOCK, Engage
 
 KEYS = {
@@ -248,3 +252,19 @@ def test_a_look_after_a_point_starts_where_the_glance_has_led_the_head(
     costs = {(pair["reference"], pair["gesture"]): pair["cost"] for pair in pairs}
     assert (costs["g-r", "gaze"] > costs["g-r", "none"]) == looks_away
     assert costs["g-r", GESTURES[3]] > costs["g-r", GESTURES[2]]  # the arm is raised once more, wherever it is
+
+
+def test_in_a_narrow_terminal_the_numbers_that_find_room_are_whole_with_their_heads() -> None:
+    pair = PairConsidered(
+        gesture="none", phrase="the blue square piece", distractors=("a", "b"), channel=0.5, reliability=0.25,
+        minimum=0.85, cost=2.0, feasible=True, chosen=True, reason="the cheapest that is reliable enough",
+    )  # fmt: skip
+    choice = ReferenceChoice(
+        reference="r", target="t", gesture="none", phrase=pair.phrase, reliability=0.25, cost=2.0, pairs=(pair,)
+    )
+    out = io.StringIO()
+
+    show_tables([choice], Console(file=out, width=48))
+
+    for each in ("|D|", "Rmin", "0.50", "0.2500", "0.85"):
+        assert each in out.getvalue()

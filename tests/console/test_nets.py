@@ -15,6 +15,7 @@ from engage_hri.services.console import nets
 from engage_hri.services.console.live import LiveNets, NetLog
 from engage_hri.services.console.net_drawing import drawing, legend, picture
 from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
+from engage_hri.services.console.web.net_layout import laid_out
 from tests.random_cases import share_of
 
 AT = Stamp("clock", 0.0)
@@ -375,3 +376,13 @@ async def test_without_a_terminal_each_change_is_a_line() -> None:
         "  0:01.5  b: bml:start fired at 0.50 s (planned 0.00 s)",
         "  0:01.5  b: over",
     ]
+
+
+def test_an_instant_joins_the_rows_of_its_behaviors_and_one_of_no_behavior_none_but_the_block() -> None:
+    instants = (instant(0.0, ":start"), instant(0.5, "one:start", "two:start"), instant(0.7), instant(1.0, ":end"))
+    net = NetInView(block="b", transitions=instants, places=(), marked=frozenset(), fired={})
+
+    shown = laid_out(net, lambda at: at)
+
+    assert [row.name for row in shown.rows] == ["bml", "one", "two"]
+    assert [each.rows for each in shown.instants] == [(0, 0), (1, 2), (0, 0), (0, 0)]

@@ -159,6 +159,24 @@ class Homeless(SimulatedBody):
         await asyncio.sleep(0)
 
 
+class Wandering(SimulatedBody):
+    """Leaves the safe pose again, two seconds after it was called there from something."""
+
+    calls = 0
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        await super().home(parts)
+        self.calls += 1
+        if self.calls > 1:
+            self.tour = asyncio.create_task(self.look_around(), name="tour")
+
+    async def look_around(self) -> None:
+        await asyncio.sleep(2.0)
+        shift = GazeShift(id="tour", target="far-left")
+        async for _ in self.perform(shift, MovementAuthority(shift, "end")):
+            pass
+
+
 class Ticking(SimulatedBody):
     """Looks at its joints for ever, once it has moved."""
 

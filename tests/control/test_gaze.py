@@ -9,7 +9,7 @@ import pytest
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Head, PostureShift
 from engage_hri.schemas.units import Vector
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import Arrived, Reached
 from engage_hri.services.control.testing import WORLD, Stage, performed, recorded, stops, times, violations
 from engage_hri.services.control.torso.body import SimulatedBody
@@ -190,3 +190,16 @@ async def test_left_at_the_stroke_alone_it_stays_on_target():
     assert left.at == arrived.at
     stage.authority.extend("end")
     await stage.over()
+
+
+async def test_a_gaze_at_what_lies_where_the_head_rests_has_no_way_back():
+    near = Entity(id="near-human", kind="object", position=(1.3, 0.004, 1.2))  # a sixth of a degree beside the human
+    body = body_in(World(entities=(*WORLD.entities, near)))
+    await performed(body, GazeShift(id="base", target="human"))
+
+    points = {}
+    for target in ("near-human", "far-left"):
+        points[target] = times(await performed(body, Gaze(id="g", target=target)))
+
+    assert points["near-human"]["relax"] == points["near-human"]["end"]
+    assert points["far-left"]["relax"] < points["far-left"]["end"]

@@ -1,8 +1,11 @@
 """Mutations of a body: for each law of the contract a body that breaks it, and is caught. An honest one is not."""
 
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
 from inspect import signature
 from itertools import product
+from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
@@ -43,6 +46,7 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars.Stubborn, "an_aborted_hold_ends_at_once_and_safe", "it goes on"),
     (liars_by_deed.Clinging, "a_dropped_stream_ends_safe", "after its task was cancelled"),
     (liars_by_deed.Homeless, "home_is_reached_from_anything", "the safe pose as `home` returns"),
+    (liars_by_deed.Wandering, "home_is_reached_from_anything", "the safe pose some time later"),
     (liars_by_deed.Homeless, "leaves_no_task_once_it_is_disconnected", "these go on: way home"),
     (liars_by_deed.Ticking, "leaves_no_task_once_it_is_disconnected", "this is set anew: Ticking.tick"),
     (liars_by_deed.Abrupt, "brakes_within_the_limits_of_its_joints", "degrees/s^2"),
@@ -229,3 +233,27 @@ async def test_who_states_far_more_speed_than_it_ever_has_is_told_so() -> None:
 
     assert not told[SimulatedBody]
     assert "no joint was ever near the speed that it states" in told[liars_by_claim.Sprinting][0]
+
+
+def test_where_the_plugin_of_the_suite_is_not_loaded_it_fails_with_the_line_that_loads_it(tmp_path: Path) -> None:
+    (tmp_path / "test_body.py").write_text(
+        "from engage_hri.services.control.testing import BodyContract\n"
+        "from engage_hri.services.control.torso.body import SimulatedBody\n"
+        "class TestIt(BodyContract):\n"
+        "    make = SimulatedBody\n"
+    )
+    command = (
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "no:cacheprovider",
+        "--asyncio-mode=auto",
+        "-k",
+        "home_is_reached",
+    )
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    assert ended.returncode == 1
+    assert 'pytest_plugins = ["engage_hri.services.control.testing.plugin"]' in ended.stdout
+    assert "conftest.py" in ended.stdout

@@ -78,6 +78,17 @@ def test_it_goes_on_from_a_standstill():
     assert motion.at(motion.end).q == pytest.approx(HOME)
 
 
+def test_it_can_stop_where_its_brakes_bring_it_to_rest_and_nowhere_before():
+    motion, now = Motion(TWO, 0.0), 0.3
+    here = motion.s(now)
+    nearest = here + motion.rate(now) ** 2 / (2 * TWO.steepest_brake(here, motion.rate(now)))
+
+    assert here + 0.01 < nearest < TWO.length
+    assert motion.can_stop_at(nearest + 0.01, now)
+    assert not motion.can_stop_at(here + 0.1 * (nearest - here), now)
+    assert not motion.can_stop_at(here - 0.01, now)
+
+
 def test_a_slow_motion_takes_its_factor_longer():
     motion = Motion(TWO, 2.0, cruise=0.25)
 

@@ -12,9 +12,10 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.body import MovementAuthority, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.drivers import made
+from engage_hri.services.control.voice.alignment import FRAME, Loudness
 from engage_hri.services.control.voice.clauses import laid_out
 from engage_hri.services.control.voice.phrases import pieces
-from engage_hri.services.control.voice.synthesis import Said
+from engage_hri.services.control.voice.synthesis import Said, SynthesisFailed
 
 PAGE = (Path(__file__).parents[2] / "docs" / "control.md").read_text(encoding="utf-8")
 SENTENCES = (
@@ -54,6 +55,24 @@ def test_words_are_aligned_with_sound_alone_within_the_stated_error():
 
     assert np.median(errors) < 0.07
     assert np.quantile(errors, 0.9) < 0.22
+
+
+@pytest.mark.parametrize("after", range(6))
+def test_a_sound_ends_with_the_last_frame_that_is_heard(after: int):
+    frame = round(16000 * FRAME)
+    sound = np.concatenate([np.zeros(3 * frame), np.full(7 * frame, 8000.0), np.zeros(after * frame)])
+
+    loudness = Loudness(sound.astype(np.int16), 16000)
+
+    assert (loudness.begin, loudness.end) == pytest.approx((3 * FRAME, 10 * FRAME))
+
+
+def test_a_sample_of_which_half_is_missing_is_refused_with_what_is_expected():
+    with pytest.raises(SynthesisFailed) as refused:
+        laid_out("one", Said(bytes(2001)), 16000)
+
+    assert "an odd number of bytes" in refused.value.fault.reason
+    assert "16-bit integers" in refused.value.fault.advice
 
 
 WAITING = """

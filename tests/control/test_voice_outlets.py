@@ -397,3 +397,23 @@ async def test_the_lips_of_a_face_move_with_words_that_are_heard(voice: type[Voi
 
     assert (max(jaws) > 0.3) == (voice is Voice)
     assert any(isinstance(each, Spoke) for each in stage.progress)
+
+
+@pytest.mark.parametrize("has_failed", [False, True])
+def test_a_cut_behind_the_end_of_a_file_and_one_of_a_file_that_failed_change_nothing(
+    tmp_path: Path, has_failed: bool
+) -> None:
+    said, tail, path = bytes(range(200)), b"\x01\x02", tmp_path / "said.wav"
+    with path.open("wb", buffering=0) as file:
+        outlet = WavFile(file, "said.wav", 1000, 0.0, lambda: 0.0)
+        outlet.play(said, 0.0)
+        before = path.read_bytes()
+        if has_failed:
+            outlet.fault = Fault(reason="the file is full")
+        outlet.cut(0.05 if has_failed else 0.2, tail)
+        assert path.read_bytes() == before
+
+        outlet.revive()
+        outlet.cut(0.05, tail)
+        with wave.open(str(path)) as sound:
+            assert sound.readframes(sound.getnframes()) == said[:98] + tail

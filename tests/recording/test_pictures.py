@@ -16,7 +16,16 @@ from engage_hri.schemas.world import Entity
 from engage_hri.services.console.view import empty
 from engage_hri.services.console.web.scene import section as scene_section
 from engage_hri.services.recording.above import LEAST, frame, seen, together
-from engage_hri.services.recording.drawing import PERSON, POINT, ROBOT, draw, pictures, sheet, times_of_film, write_film
+from engage_hri.services.recording.drawing import (
+    PERSON,
+    POINT,
+    ROBOT,
+    draw,
+    pictures,
+    sheet,
+    times_of_film,
+    write_film,
+)
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.scenes import scenes, spread
 

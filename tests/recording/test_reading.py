@@ -221,7 +221,9 @@ def test_a_recording_of_nothing_opens(tmp_path: Path) -> None:
     assert (len(recording), recording.duration, recording.is_whole) == (0, 0.0, True)
 
 
-def test_a_chunk_is_read_up_to_the_largest_size_and_no_larger_one_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chunk_is_read_up_to_the_largest_size_and_no_larger_one_is_unpacked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     data = bytes_of(told(), chunk=100)
     summary = make_reader(io.BytesIO(data)).get_summary()
     assert summary is not None

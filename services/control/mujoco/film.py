@@ -174,10 +174,8 @@ def _write_animation(path: Path, frames: Sequence[Frame], pictures: Sequence[Pic
 
     images = [Image.fromarray(picture) for picture in pictures]
     spans = [round(1000 * (later.at - frame.at)) for frame, later in pairwise(frames)]
-    options: dict[str, Any] = {"quality": 80} if path.suffix == ".webp" else {"optimize": False}
-    images[0].save(
-        path, save_all=True, append_images=images[1:], duration=[*spans, round(1000 * last)], loop=0, **options
-    )
+    durations = [*spans, round(1000 * last)]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)
 
 
 def _write_mp4(path: Path, frames: Sequence[Frame], pictures: Iterator[Picture], interval: Seconds) -> None:

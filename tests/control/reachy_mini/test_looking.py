@@ -11,9 +11,15 @@ from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Post
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.body import BodyFailed, Reached
+from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.body import ReachyMini
+from engage_hri.services.control.reachy_mini.courses import Course
+from engage_hri.services.control.reachy_mini.estimates import FRAME, _settling
+from engage_hri.services.control.reachy_mini.moving import SHORTEST, Moves
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
+from engage_hri.services.control.reachy_mini.tracks import NEAR
 from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
+from engage_hri.services.control.torso.path import JointMotion, resting
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 
@@ -268,3 +274,27 @@ async def test_a_gaze_beside_its_target_says_that_it_rests_on_nothing(body: Reac
     stage.authority.extend("end")
     await stage.over()
     assert not body.estimate(replace(look, target="nobody"), None, WORLD).feasible
+
+
+@pytest.mark.parametrize("track", joints.TRACKS)
+def test_what_rests_where_it_is_to_go_takes_no_time_and_what_still_moves_there_some(track: str) -> None:
+    moves, here = Moves(ReachyMiniSettings()), resting(joints.HOME[track])
+
+    assert moves.way(track, here, joints.HOME[track]).length == 0.0
+    moving = JointMotion(here.q, here.v + 0.02, here.a)
+    assert moves.way(track, moving, joints.HOME[track]).length >= SHORTEST
+
+
+@pytest.mark.parametrize("lag", [0.1, 0.25, 0.4])
+@pytest.mark.parametrize("yaw", [0.1, 0.4, 0.9])
+def test_joints_that_follow_late_are_expected_at_their_goal_not_before_and_soon_after(yaw: float, lag: float) -> None:
+    home = joints.HOME["head"]
+    path = Moves(ReachyMiniSettings()).way("head", resting(home), (home[0] + yaw, *home[1:]))
+    limit = NEAR[joints.TRACKS["head"][0].joint]
+    places = [(step / 10_000, path.at(path.length - step / 10_000).q[0]) for step in range(int(lag * 10_000) + 1)]
+    near = max(before for before, place in places if abs(place - home[0] - yaw) <= limit)  # it only comes nearer
+
+    told = _settling(Course(track="head", legs=(), goal=(), instants=()), path, path.length, lag) - FRAME / 2
+
+    assert 0.0 < near < lag
+    assert lag - near - 1e-3 <= told <= lag - near + lag / 16 + 1e-3
