@@ -176,3 +176,17 @@ def test_a_full_queue_drops_of_the_loudest_and_never_who_comes_and_goes():
     assert [one.at for one in kept if one.life == "loud"] == [999.0]
     assert [one.at for one in kept if one.life == "quiet"] == [3.0]
     assert inbox.overflowed == 1002
+
+
+async def test_the_lag_of_the_loop_is_that_of_the_first_that_waited_whatever_came_after_it():
+    bridge, taken, loop = session.LoopBridge(lambda error, text: None), [], asyncio.get_running_loop()
+    until = loop.time() + 0.05
+
+    bridge._let_in(taken.append, 1)
+    while loop.time() < until:  # nothing runs on the loop meanwhile
+        pass
+    bridge._let_in(taken.append, 2)
+    await asyncio.sleep(0)
+
+    assert taken == [1, 2]
+    assert bridge.traffic.lag > 0.04

@@ -291,10 +291,12 @@ def test_joints_that_follow_late_are_expected_at_their_goal_not_before_and_soon_
     home = joints.HOME["head"]
     path = Moves(ReachyMiniSettings()).way("head", resting(home), (home[0] + yaw, *home[1:]))
     limit = NEAR[joints.TRACKS["head"][0].joint]
-    places = [(step / 10_000, path.at(path.length - step / 10_000).q[0]) for step in range(int(lag * 10_000) + 1)]
-    near = max(before for before, place in places if abs(place - home[0] - yaw) <= limit)  # it only comes nearer
+    places = [path.at(path.length - lag * step / 16_000).q[0] for step in range(16_001)]
+    near = max(
+        step for step, place in enumerate(places) if abs(place - home[0] - yaw) <= limit
+    )  # it only comes nearer
 
-    told = _settling(Course(track="head", legs=(), goal=(), instants=()), path, path.length, lag) - FRAME / 2
+    told = _settling(Course(track="head", legs=(), goal=(), instants=()), path, path.length, lag)
 
-    assert 0.0 < near < lag
-    assert lag - near - 1e-3 <= told <= lag - near + lag / 16 + 1e-3
+    assert 0 < near < 16_000
+    assert told == pytest.approx(lag * (1.0 - near // 1000 / 16) + FRAME / 2)  # in sixteenths, rounded up
