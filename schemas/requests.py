@@ -178,6 +178,11 @@ def is_life_of(life: str, run: str) -> bool:
     return not life.startswith("@") or life[1:].rpartition(".")[0] == run[:16]
 
 
+def are_of_one_run(life: str, other: str) -> bool:
+    """Tell whether two lives of a requester can belong to one run. False only for two made by `life_of`."""
+    return not other.startswith("@") or is_life_of(life, other[1:].rpartition(".")[0])
+
+
 def kind_meant(request: Request) -> str:
     """Kind of the request that is meant: of a cancellation that of the request to be ended, empty if not given."""
     return request.of if isinstance(request, Cancel) else kind_of(request)

@@ -103,9 +103,10 @@ class FragmentRunner:
         return Fault(reason=reason, where=id, advice="wait until one has ended; `generation.fragments` is the limit")
 
     def admit(self, request: PerformFragment, world: World) -> None:
-        """Queue a fragment. Raises InputRefused, and changes nothing, where it is illegal."""
+        """Queue a fragment. Raises InputRefused where it is illegal, and changes nothing that goes on."""
         fragment, lost = performable(request.fragment, world, self._bus.robot)
-        turn = self._turns.accept(fragment, fragment.addressee, request.requester)
+        self._abort(self._turns.begins_again(request.requester, request.life), self._bus.now())
+        turn = self._turns.accept(fragment, fragment.addressee, request.requester, request.life)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
         performance.warn(lost)
         performance.known = named_objects(fragment, world)

@@ -114,6 +114,33 @@ def test_nobody_goes_on_with_a_turn_of_another_client(status: TurnStatus) -> Non
     assert turns.accept(fragment("c", "end"), "alice", "v").turn == "a"
 
 
+@pytest.mark.parametrize(
+    ("requester", "life", "ends"),
+    [
+        ("v", "@run2.1", True),
+        ("v", "@run1.1", False),
+        ("v", "@run1.2", False),
+        ("v", "of another program", False),
+        ("w", "@run2.1", False),
+    ],
+)
+def test_a_client_that_was_restarted_finds_no_turn_of_its_own_open(requester: str, life: str, ends: bool) -> None:
+    turns = policy()
+    turns.accept(fragment("a", "beginning"), "alice", "v", "@run1.1")
+    turns.fragment_ended("a", complete=True, now=1.0)
+
+    ended = turns.begins_again(requester, life)
+
+    assert (turns.open_turn == "") == ends
+    assert (ended.why if ended else None) == (
+        Fault(reason="v was restarted", cause="restarted", whose="v") if ends else None
+    )
+    if ends:
+        with pytest.raises(InputRefused, match="'end' with no turn open any more: v was restarted"):
+            turns.accept(fragment("b", "end"), "alice", "v", life)
+        assert turns.accept(fragment("c", "full"), "alice", "v", life).turn == "c"
+
+
 def test_a_turn_cannot_change_whom_it_speaks_to() -> None:
     turns = policy()
     turns.accept(fragment("a", "beginning"), "alice")

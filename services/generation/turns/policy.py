@@ -14,6 +14,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.runtime.action_reports import FACE_GRACE
@@ -95,7 +96,7 @@ class TurnPolicy:
         self._config = config
         self._open: TurnPlan | None = None
         """The turn that the next fragment would continue."""
-        self._speaker = ""
+        self._speaker = self._life = ""
         """The client that has begun the open turn: nobody else goes on with it, or ends it."""
         self._broken_off: Fault | None = None
         """Why the turn before was aborted; None: it was not."""
@@ -134,10 +135,16 @@ class TurnPolicy:
         plans = self._turns_under_way
         return next((plan for plan in plans if not plan.backchannel and not self._begun.get(plan.turn)), None)
 
-    def accept(self, fragment: TurnFragment, addressee: str, requester: str = "") -> TurnPlan:
+    def begins_again(self, requester: str, life: str) -> Aborted | None:
+        """End the open turn of a client that was restarted since: nobody is there any more who would end it."""
+        if self._open is None or requester != self._speaker or are_of_one_run(life, self._life):
+            return None
+        return self._abort(self._open, Fault(reason=f"{requester} was restarted", cause="restarted", whose=requester))
+
+    def accept(self, fragment: TurnFragment, addressee: str, requester: str = "", life: str = "") -> TurnPlan:
         """Take a fragment into the conversation. Raises InputRefused, and changes nothing, where it is illegal.
 
-        addressee: may be empty for the rest of a turn. requester: the client that sends it.
+        addressee: may be empty for the rest of a turn. requester, life: of the client that sends it.
         """
         status = fragment.turn_status
         if fragment.id in {*self._live, *(plan.turn for plan in self._live.values()), self.open_turn}:
@@ -171,7 +178,7 @@ class TurnPolicy:
         self._live[fragment.id] = plan
         self._delay_target = fragment.delay_target if fragment.delay else ""
         if status == "beginning":
-            self._open, self._speaker, self._broken_off = plan, requester, None
+            self._open, self._speaker, self._life, self._broken_off = plan, requester, life, None
         elif status == "end":
             self._open = None
         self._silent_since = None

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import GoHome, PerformBehavior, PlannedInstant
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
@@ -47,13 +48,9 @@ class ControlLink:
         )
         return self._requests.send(keys.BEHAVIOR, perform)
 
-    def abort(self, behavior: str) -> None:
-        """Stop a behavior."""
-        self.cancel(behavior, "aborted")
-
-    def cancel(self, behavior: str, reason: str) -> None:
-        """Cancel the request for a behavior, to whatever service performs it."""
-        self._requests.cancel(self.id(behavior), reason)
+    def cancel(self, behavior: str, why: Fault | str) -> None:
+        """Cancel the request for a behavior, to whatever service performs it. why: what has happened."""
+        self._requests.cancel(self.id(behavior), why)
 
     def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
         """Send these parts home. behavior: the one that used them; empty: the whole block."""

@@ -16,17 +16,15 @@ async def all_ended(
     ending: Ending,
     within: Seconds,
 ) -> None:
-    """Abort what still runs, and return when all that the body does has ended, or `within` is over."""
+    """Cancel what still runs, and return when all that the body does has ended, or `within` is over."""
     moving = dict[asyncio.Task[None], str]()
     for id, run in runs.items():
         if run.pending is None or tasks[id].done():
             continue
         if run.is_by_body:
             moving[tasks[id]] = id
-            if ending.status != "done" and not run.pending.outcome.done():
-                body.abort(id)
-        elif ending.status != "done":
-            body.cancel(id, f"block {ending.status}")
+        if ending.status != "done" and not run.pending.outcome.done():
+            body.cancel(id, ending.fault or f"block {ending.status}")
     if moving:
         _, stuck = await asyncio.wait(moving, timeout=within)
         for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.

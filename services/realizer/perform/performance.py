@@ -159,7 +159,7 @@ class BlockPerformance:
         """End one behavior on request; the others go on. Returns once it has ended: True if it came to its end."""
         if (run := self._runs[behavior]).pending is not None and run.is_by_body:
             self.interrupted[behavior] = reason
-            self.body.abort(behavior)
+            self.body.cancel(behavior, reason or "interrupted")
             await asyncio.wait([self._tasks[behavior]])
         else:
             self._take_out({behavior: reason})
@@ -269,9 +269,10 @@ class BlockPerformance:
                     self.report.overdue(self.decisions, effect)
                 self.decisions.foresight.is_surprised = True
             case Stalled(behavior=id, sync=sync, overdue=overdue):
-                self.body.abort(id)
                 sync = self.report.spelling.sync(Point(id, sync))
-                self._runs[id].lose(self._stalled(f"stalled before {sync}, {overdue:.1f} s overdue", overdue))
+                fault = self._stalled(f"stalled before {sync}, {overdue:.1f} s overdue", overdue)
+                self.body.cancel(id, fault)
+                self._runs[id].lose(fault)
                 return True
         return False
 
@@ -395,7 +396,7 @@ class BlockPerformance:
             # Without the dropped ones, others may be too late now.
             if problem.behavior in plan.dropped and problem.behavior not in gone:
                 if self._runs[problem.behavior].pending is not None:
-                    self.body.abort(problem.behavior)
+                    self.body.cancel(problem.behavior, problem.message)
                 self.lose(problem.behavior, Fault(reason=problem.message), problem.kind)
 
     # -- parts of the body -------------------------------------------------------------------------------------------
