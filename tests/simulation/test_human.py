@@ -7,8 +7,22 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.client.utterances import speaking_time
 from engage_hri.services.simulation.appendix_b import rules
-from engage_hri.services.simulation.human import FACE, Begun, Ended, Human, LookAt, Pause, RobotDoes, Rule, Word
+from engage_hri.services.simulation.human import (
+    FACE,
+    Begun,
+    Ended,
+    Human,
+    LookAt,
+    Pause,
+    RobotDoes,
+    Rule,
+    Start,
+    Stop,
+    Word,
+)
+from engage_hri.services.simulation.speaking import speech
 
 AT = Stamp("loop", 0.0)
 
@@ -112,3 +126,13 @@ def test_every_step_of_appendix_b_in_which_the_person_acts_has_rules() -> None:
     assert {"step-1", "step-3", "step-4", "step-5", "step-18", "step-20-a", "step-20-b", "step-21"} <= written
     assert {"step-23-a", "step-24", "step-25"} <= written
     assert "step-2" not in written
+
+
+@pytest.mark.parametrize(("given", "seconds"), [(None, speaking_time("Yes, the cup.")), (2.5, 2.5)])
+def test_words_take_as_long_as_such_words_do_unless_another_time_is_given(
+    given: float | None, seconds: float
+) -> None:
+    acts = speech("Yes, the cup.", given)
+
+    begin, pause, end = acts[:3]
+    assert (begin, pause, end) == (Start("speak", words="Yes, the cup."), Pause(seconds), Stop("speak"))
