@@ -256,8 +256,9 @@ def test_a_look_after_a_point_starts_where_the_glance_has_led_the_head(
 
 def test_in_a_narrow_terminal_the_numbers_that_find_room_are_whole_with_their_heads() -> None:
     pair = PairConsidered(
-        gesture="none", phrase="the blue square piece", distractors=("a", "b"), channel=0.5, reliability=0.25,
-        minimum=0.85, cost=2.0, feasible=True, chosen=True, reason="the cheapest that is reliable enough",
+        gesture="directed_gaze_with_pointing", phrase="the blue square piece", distractors=("a", "b"),
+        channel=0.5, reliability=0.25, minimum=0.85, cost=2.0, feasible=True, chosen=True,
+        reason="the cheapest that is reliable enough",
     )  # fmt: skip
     choice = ReferenceChoice(
         reference="r", target="t", gesture="none", phrase=pair.phrase, reliability=0.25, cost=2.0, pairs=(pair,)
