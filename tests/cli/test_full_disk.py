@@ -6,6 +6,7 @@ import logging
 import os
 import resource
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -122,12 +123,11 @@ def test_what_a_robot_prints_may_find_no_room(monkeypatch: pytest.MonkeyPatch) -
             outputs.__exit__(None, None, None)
 
 
-def test_a_router_waits_for_no_reader(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_router_waits_for_no_reader() -> None:
     told: list[str] = []
     reading, writing = os.pipe()
-    with open(reading, "rb", buffering=0) as reader, open(writing, "w") as output:
-        monkeypatch.setattr(sys, "stdout", output)
-        lines = Patient("standard output", _without_waiting, told.append)
+    with open(reading, "rb", buffering=0) as reader, open(writing, "w"):
+        lines = Patient("standard output", partial(_without_waiting, writing), told.append)
         for number in range(1000):  # more than a pipe holds
             lines.write(f"{number:9999}\n" if number < 3 else f"{number:100}\n")
         written = reader.read(2**20)

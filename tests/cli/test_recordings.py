@@ -83,9 +83,9 @@ def _recorded(path: Path, count: int) -> bool:
 
 
 async def _soon() -> None:
-    done = asyncio.get_running_loop().create_future()
-    asyncio.get_running_loop().call_later(0.05, done.set_result, None)
-    await done
+    done = asyncio.Event()
+    asyncio.get_running_loop().call_later(0.05, done.set)
+    await done.wait()
 
 
 def test_a_folder_that_is_read_only_and_a_file_that_is_there_are_refused(run: Engage, tmp_path: Path) -> None:

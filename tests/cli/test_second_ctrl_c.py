@@ -20,9 +20,9 @@ pytestmark = pytest.mark.real_time
 
 async def later(seconds: float) -> None:
     """Let time pass, which is what a second signal is told by."""
-    passed = asyncio.get_running_loop().create_future()
-    asyncio.get_running_loop().call_later(seconds, passed.set_result, None)
-    await passed
+    passed = asyncio.Event()
+    asyncio.get_running_loop().call_later(seconds, passed.set)
+    await passed.wait()
 
 
 BLOCKING = """

@@ -179,9 +179,9 @@ async def _again(tell: Callable[[], None]) -> None:
     loop = asyncio.get_running_loop()
     while True:
         tell()
-        turn = loop.create_future()
-        loop.call_later(0.2, turn.set_result, None)
-        await turn
+        turn = asyncio.Event()
+        loop.call_later(0.2, turn.set)
+        await turn.wait()
 
 
 @pytest.mark.parametrize(
