@@ -162,8 +162,9 @@ class _Generation:
     def _serve(self, request: Request, now: Seconds) -> None:
         match request:
             case PerformFragment():
-                self._patience.set(request.id, now + self._config.world_patience)
                 self._admit(request, now)
+                if request.id in self._early:
+                    self._patience.set(request.id, now + self._config.world_patience)
             case Inhibit():
                 self._grant(request, now)
             case SetCondition():
