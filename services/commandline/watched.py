@@ -64,16 +64,15 @@ async def _piped(command: Sequence[str]) -> AsyncIterator[tuple[Process, asyncio
     """Run a process that has one more pipe to us, and its number as the last argument."""
     loop, lines = asyncio.get_running_loop(), asyncio.StreamReader()
     ours, its = os.pipe()
+    writing = os.fdopen(its, "wb", 0)
     reading, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), os.fdopen(ours, "rb", 0))
     try:
         async with spawned(_end, *command, str(its), shared=(its,)) as process:
-            os.close(its)  # it ends with the process
-            its = -1
+            writing.close()  # the pipe ends with the process
             yield process, lines
     finally:
         reading.close()
-        if its >= 0:
-            os.close(its)
+        writing.close()
 
 
 async def _listen(
