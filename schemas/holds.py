@@ -50,3 +50,8 @@ class BodyHeld(Struct, frozen=True, kw_only=True, tag="body_held", omit_defaults
 
     at: Stamp
     holds: tuple[Hold, ...] = ()
+
+    @property
+    def reasons(self) -> list[str]:
+        """Reasons of these holds in words, each once."""
+        return sorted({each.why.reason for each in self.holds if each.why is not None})

@@ -106,8 +106,7 @@ def _held(message: Held) -> Entry:
 
 
 def _body_held(message: BodyHeld) -> Entry:
-    reasons = sorted({each.why.reason for each in message.holds if each.why is not None})
-    text = "; ".join((f"held, since nobody renews it: {_names(message.holds)}", *reasons))
+    text = "; ".join((f"held, since nobody renews it: {_names(message.holds)}", *message.reasons))
     return WARNING if message.holds else DEBUG, text
 
 

@@ -68,9 +68,8 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return f"head: {wording.claim(message.owner)}" + (f"; waiting: {waiting}" if waiting else "")
         case Held():
             return "; ".join(holds(before, after, at)) or None
-        case BodyHeld(holds=waiting) if waiting:
+        case BodyHeld(holds=waiting, reasons=reasons) if waiting:
             named = ", ".join(wording.held(each) for each in waiting)
-            reasons = sorted({each.why.reason for each in waiting if each.why is not None})
             return f"! the body holds {named}: {'; '.join(reasons) or 'nobody renews it'}"
         case BodyFaults(faults=faults) if faults:
             return f"! faults of the body that are switched on: {', '.join(map(words, faults))}"
