@@ -118,12 +118,13 @@ async def test_a_reply_is_what_was_published_down_to_attachment_and_timestamp(to
 
 
 async def test_recent_events_and_commands_come_in_order_across_keys_unless_zenoh_is_let_merge_them(town: Town):
-    _, far, visitor = town
+    near, far, visitor = town
     there = far.join("there")
     ways = [keys.FEEDBACK, keys.request_state("there"), keys.BLOCK]
     for number in range(100):
         there.publish(ways[number % 3], state(number))
     there.publish(keys.WORLD, state(100))
+    await near.peers.round_trip(far.run, PATIENCE)  # the visitor's door knows now that there is a past
 
     everything = {"consolidation": zenoh.ConsolidationMode.NONE}
     both = await visitor.samples("engage/v1/evt/**", **everything)
