@@ -125,6 +125,10 @@ class FragmentRunner:
         self._live[request.id] = performance
         self._line.put_nowait(performance)
 
+    def refused(self, request: PerformFragment, why: Fault, now: Seconds) -> None:
+        """Draw the consequences, for its turn, of a fragment that was refused before it could be admitted."""
+        self._abort(self._turns.rest_refused(request.fragment, request.requester, why), now)
+
     def _accept(self, performance: FragmentPerformance) -> None:
         if not performance.accepted:
             performance.accepted = True
@@ -439,7 +443,7 @@ class FragmentRunner:
         self._follow_gaze(performance)
         self._discourse = self._discourse.without(fragment.id, performance.unmentioned)
         if performance.refusal is not None:
-            aborted = self._turns.fragment_refused(fragment.id, now)
+            aborted = self._turns.fragment_refused(fragment.id, now, performance.refusal)
         else:
             complete = performance.status == "done" or performance.lost_motions_only
             aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, why=performance.why)

@@ -211,14 +211,25 @@ class TurnPolicy:
         self._forget()
         return None
 
-    def fragment_refused(self, id: str, now: Seconds) -> Aborted | None:
-        """Take back a fragment that the realizer found impossible. Its turn goes on, unless the fragment began it."""
+    def rest_refused(self, fragment: TurnFragment, requester: str, why: Fault) -> Aborted | None:
+        """End the open turn if its rest was refused, before it was accepted, for what has happened to somebody."""
+        is_rest = fragment.turn_status in ("middle", "end") and requester == self._speaker
+        if self._open is None or not is_rest or not why.cause:
+            return None
+        return self._abort(self._open, _refused(fragment.id, why))
+
+    def fragment_refused(self, id: str, now: Seconds, why: Fault = _COMPLETE) -> Aborted | None:
+        """Take back a fragment that the realizer has refused.
+
+        Its turn goes on for another fragment, unless this one began it, or something has happened to somebody (`why`
+        has a cause): then the turn ends as if the fragment had failed a moment later.
+        """
         plan = self._live.get(id)
         if plan is None:
             return None
         other = self._open is not None and self._open.turn != plan.turn
-        if plan.turn == id or other:
-            return self.fragment_ended(id, complete=False, now=now, why=Fault(reason=f"{id} was refused"))
+        if plan.turn == id or other or why.cause:
+            return self.fragment_ended(id, complete=False, now=now, why=_refused(id, why))
         self._open = plan
         return self.fragment_ended(id, complete=True, now=now)
 
@@ -347,6 +358,11 @@ class TurnPolicy:
         self._interrupters.clear()
         self._listeners.clear()
         self._taken_by = ""
+
+
+def _refused(id: str, why: Fault) -> Fault:
+    refused = f"{id} was refused"
+    return why.following(refused, "") if why.reason else Fault(reason=refused)
 
 
 def in_vain(fragment: TurnFragment) -> tuple[str, ...]:
