@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -281,7 +281,8 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[tuple[Span, float
             await stage.signal("router", signal.SIGSTOP, its_child=True)
 
             async def heal() -> None:
-                await stage.signal("router", signal.SIGCONT, its_child=True)
+                with suppress(ProcessLookupError):  # whoever watches over it has ended it meanwhile
+                    await stage.signal("router", signal.SIGCONT, its_child=True)
         case "kill" | "router":
             name = "router" if fault.kind == "router" else fault.what
             await stage.signal(name, signal.SIGKILL)
