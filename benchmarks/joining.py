@@ -1,6 +1,6 @@
 """Clients that come to one robot at once, and leave at once: what each costs the router, and how the robot goes on.
 
-    python benchmarks/joining.py [--clients 1 10 50 100 200 500 1000] [--plain] [--keys] [--json]
+    python benchmarks/joining.py [--clients 1 10 50 100 200 500 1000] [--keys] [--json]
 
 A router and the four services, each a process. For each number so many clients of `connect()` come at once, in
 processes of a hundred, wait until they see all services, and go at once. Beside them one more client has short blocks
@@ -9,8 +9,7 @@ there. So the processor time for those who come and go is what is left once idle
 before and in between, are taken off: else a client would cost more the longer a busy machine takes. The last column
 says by how much the share of a client, who comes and who goes, has grown for each doubling of their number.
 
-`--plain`: clients are plain Zenoh sessions that declare what an idle client of ours does, for numbers for which this
-machine is too small. `--keys`: all have certificates, and a hundred clients share one. Linux only.
+`--keys`: all have certificates, and a hundred clients share one. Linux only.
 """
 
 import argparse
@@ -25,8 +24,6 @@ from math import log2
 from pathlib import Path
 from typing import Any
 
-import zenoh
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.bus_roundtrip import free_endpoint
@@ -38,10 +35,8 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.bus.zenoh.session import open_client
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.process import run
-from engage_hri.services.requests.ends import Requester
 
 ROBOT = "robot"
 TOGETHER = 100
@@ -62,45 +57,7 @@ async def comes(stack: AsyncExitStack, endpoint: str, own: Keys | None, name: st
             raise TimeoutError(name)
 
 
-async def comes_plain(stack: AsyncExitStack, endpoint: str, own: Keys | None, name: str) -> None:
-    """Come with the declarations of an idle client, and return once all services are in sight."""
-    session: Any = await open_client(ROBOT, [endpoint], own)
-    stack.callback(session.close)
-    run, loop, seen = str(session.zid()), asyncio.get_running_loop(), set[str]()
-    there = asyncio.Event()
-
-    def came(sample: zenoh.Sample) -> None:
-        seen.add(str(sample.key_expr).split("/")[6])
-        if not {*keys.SERVICES} - seen:
-            loop.call_soon_threadsafe(there.set)
-
-    def nothing(_: Any) -> None: ...
-
-    def handler(callback: Any) -> Any:
-        return zenoh.handlers.Callback(callback, indirect=False)
-
-    liveliness = session.liveliness()
-    name = name if own is None else own.holder.called(name)
-    kept = [
-        session.declare_queryable(keys.own(run, "clock"), handler(nothing)),
-        session.declare_queryable(keys.own(run, "flush/news"), handler(nothing)),
-        session.declare_subscriber(keys.own("*", "pulse/news"), handler(nothing)),
-        # What is about presence is in the tokens alone.
-        *(
-            session.declare_subscriber(each, handler(nothing))
-            for each in Requester.PATTERNS
-            if not keys.is_presence(each)
-        ),
-        liveliness.declare_subscriber(keys.own("*", "log/news"), handler(nothing), history=True),
-        liveliness.declare_token(keys.own(run, f"alive/client/{name}/boot")),
-        liveliness.declare_subscriber(keys.tokens(keys.ANY_ROBOT_ALIVE), handler(came), history=True),
-    ]
-    stack.callback(kept.clear)
-    async with asyncio.timeout(PATIENCE):
-        await there.wait()
-
-
-async def crowd(endpoint: str, ring: str, first: int, count: int, *, plain: bool) -> None:
+async def crowd(endpoint: str, ring: str, first: int, count: int) -> None:
     """Come when told to by a line of standard input, tell it, and go at the next line."""
     own = read_keys(ring, f"crowd{first // TOGETHER}") if ring else None
     loop, reader = asyncio.get_running_loop(), asyncio.StreamReader()
@@ -108,8 +65,7 @@ async def crowd(endpoint: str, ring: str, first: int, count: int, *, plain: bool
     print("ready", flush=True)
     await reader.readline()
     async with AsyncExitStack() as stack:
-        come = comes_plain if plain else comes
-        await asyncio.gather(*(come(stack, endpoint, own, f"c{first + each}") for each in range(count)))
+        await asyncio.gather(*(comes(stack, endpoint, own, f"c{first + each}") for each in range(count)))
         print("there", flush=True)
         await reader.readline()
     print("gone", flush=True)
@@ -157,7 +113,7 @@ def _answers(children: list[subprocess.Popen[str]], answer: str) -> None:
             raise RuntimeError(f"a crowd said {line!r} instead of {answer!r}")
 
 
-async def measure(numbers: list[int], *, plain: bool, with_keys: bool) -> list[dict[str, Any]]:
+async def measure(numbers: list[int], *, with_keys: bool) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with ExitStack() as stack:
         ring: list[str] = []
@@ -182,7 +138,7 @@ async def measure(numbers: list[int], *, plain: bool, with_keys: bool) -> list[d
             performing = asyncio.create_task(performs(robot, took, lost))
             try:
                 for number in numbers:
-                    options = [*(["--plain"] if plain else []), "--crowd", endpoint, "".join(ring[1:])]
+                    options = ["--crowd", endpoint, "".join(ring[1:])]
                     parts = [(first, min(TOGETHER, number - first)) for first in range(0, number, TOGETHER)]
                     children = [crowded(*options, str(first), str(count)) for first, count in parts]
                     await asyncio.to_thread(_answers, children, "ready")
@@ -230,16 +186,15 @@ def grown(before: dict[str, Any], now: dict[str, Any], what: str) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--clients", type=int, nargs="+", default=[1, 10, 50, 100, 200, 500, 1000])
-    parser.add_argument("--plain", action="store_true")
     parser.add_argument("--keys", action="store_true")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--crowd", nargs=4, metavar=("ENDPOINT", "KEYS", "FIRST", "COUNT"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.crowd:
         endpoint, ring, first, count = options.crowd
-        run(crowd(endpoint, ring, int(first), int(count), plain=options.plain))
+        run(crowd(endpoint, ring, int(first), int(count)))
         return
-    rows = run(measure(options.clients, plain=options.plain, with_keys=options.keys))
+    rows = run(measure(options.clients, with_keys=options.keys))
     if options.json:
         print(json.dumps(rows))
         return

@@ -1,19 +1,22 @@
 """Robots that run on one machine and one router, each with a manager that talks: memory, processor time, delay.
 
-    python benchmarks/robots_per_machine.py [--robots 10] [--seconds 20] [--way processes] [--json]
+    python benchmarks/robots_per_machine.py [--robots 10] [--seconds 20] [--way processes] [--watchers 0] [--json]
 
 All robots of a run start first, and are looked at while nobody speaks to them. Then each has a manager that performs
 one fragment and one block of speeches that wait for one another, again and again without pause; the managers are in
-one further process. Processor time is that of all processes of a robot between two looks, as the kernel counts it.
-Memory is what is resident (Rss), and the proportional share (Pss): what several processes have in common counts once.
-The delay is from the sync point that ends a speech to the command for the next one, by the times at which the robot
-sent them, which uvloop tells in whole milliseconds. What was not done is told on standard error. Linux only.
+one further process. `--watchers`: so many clients, a hundred in a process and spread over the robots, follow the sync
+points and connection events of their robot meanwhile; told are the fewest and the most messages that one has got.
+Processor time is that of all processes of a robot between two looks, as the kernel counts it. Memory is what is
+resident (Rss), and the proportional share (Pss): what several processes have in common counts once. The delay is from
+the sync point that ends a speech to the command for the next one, by the times at which the robot sent them, which
+uvloop tells in whole milliseconds. What was not done is told on standard error. Linux only.
 """
 
 import argparse
 import asyncio
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -30,7 +33,7 @@ from engage_hri.schemas.body import PerformBehavior, SyncPointReached
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import decode
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.interface import Bus, Tap
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.process import run
@@ -42,6 +45,9 @@ WAYS = {
     "pair": ("--together", "realizer,control"),
     "in-one": ("--in-one",),
 }
+TOGETHER = 100
+"""Watchers of one process."""
+SETTLE: Seconds = 2.0
 ROUND: Seconds = 4.0
 """Time that one fragment and one block take."""
 FRAGMENT = {"turn_status": "full", "parts": [{"say": "One moment please, I am going to have a look."}]}
@@ -82,7 +88,7 @@ def name(number: int) -> str:
     return f"measured-{number}"
 
 
-def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
+def measure(way: str, robots: int, seconds: float, watchers: int = 0) -> dict[str, float]:
     """Start a router and the robots, look, let the managers talk, and look again."""
     engage, endpoint = [sys.executable, "-m", "engage_hri"], free_endpoint()
     with ExitStack() as stack:
@@ -98,7 +104,7 @@ def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
             for line in process.stdout:
                 if text in line:
                     return line
-            raise RuntimeError(f"{process.args} ended without {text!r}")
+            raise RuntimeError(f"{process.args!r} ended without {text!r}")
 
         router = start(*engage, "router", "--listen", endpoint)
         began = time.monotonic()
@@ -111,6 +117,14 @@ def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
         families = [family(each.pid) for each in all_up]
         pids = [pid for each in families for pid in each]
         idle = percent(pids, min(seconds, 10.0))
+        firsts = range(0, watchers, TOGETHER)
+        counts = [str(min(TOGETHER, watchers - first)) for first in firsts]
+        crowd = [
+            start(sys.executable, __file__, "--follow", endpoint, str(robots), str(first), count, errors=None)
+            for first, count in zip(firsts, counts, strict=True)
+        ]
+        for each in crowd:
+            heard(each, "there")
         managers = start(sys.executable, __file__, "--talk", endpoint, str(robots), str(seconds), errors=None)
         heard(managers, "talking")
         time.sleep(ROUND)
@@ -118,6 +132,12 @@ def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
         talking = percent(pids, seconds)
         routed = 100 * (processor_seconds(family(router.pid)) - before) / seconds
         told = json.loads(heard(managers, "{"))
+        if crowd:
+            time.sleep(SETTLE)
+            for each in crowd:
+                each.terminate()
+            got = [number for each in crowd for number in json.loads(heard(each, "["))]
+            told |= {"watchers": watchers, "least_heard": min(got), "most_heard": max(got)}
         return {
             "robots": robots, "processes": len(pids) / robots, "all_up_s": up,
             "idle_percent": idle / robots, "talking_percent": talking / robots, "router_percent": routed / robots,
@@ -125,6 +145,28 @@ def measure(way: str, robots: int, seconds: float) -> dict[str, float]:
             "Pss_MB": mean(megabytes(each, "Pss") for each in families),
             "router_MB": megabytes(family(router.pid), "Rss"), **told,
         }  # fmt: skip
+
+
+async def follow(endpoint: str, robots: int, first: int, count: int) -> None:
+    """Be watchers, and tell how many messages each has got when told to end."""
+    heard = [0] * count
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
+
+    async def listen(number: int, tap: Tap) -> None:
+        async for _ in tap:
+            heard[number] += 1
+
+    async with AsyncExitStack() as stack:
+        for number in range(count):
+            robot = name((first + number) % robots)
+            hub = await stack.enter_async_context(await open_hub(robot, connect=[endpoint], mode="client"))
+            watcher = hub.join(f"watcher-{first + number}")
+            tap = stack.enter_context(watcher.tap(keys.SYNC_POINT, keys.ANY_CONNECTION_EVENT))
+            stack.callback(asyncio.create_task(listen(number, tap)).cancel)
+        print("there", flush=True)
+        await ended.wait()
+    print(json.dumps(heard), flush=True)
 
 
 async def talk(endpoint: str, robots: int, seconds: Seconds) -> None:
@@ -163,7 +205,7 @@ async def manage(bus: Bus, wait: Seconds, until: Seconds, ends: dict[str, int]) 
             for work in (robot.perform(FRAGMENT), robot.realize(CHAIN.format(id=f"chain-{number}"))):
                 try:
                     async with asyncio.timeout(60.0):
-                        status = (await work).status
+                        status: str = (await work).status
                 except (EngageError, TimeoutError) as error:
                     status = str(error)
                 ends["done" if status == "done" else "not_done"] += 1
@@ -189,15 +231,21 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=20.0, help="between two looks")
     parser.add_argument("--way", choices=WAYS, action="append", help="may be repeated; without it all of them")
+    parser.add_argument("--watchers", type=int, default=0)
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--follow", nargs=4, metavar=("ENDPOINT", "ROBOTS", "FIRST", "COUNT"), help=argparse.SUPPRESS)
     parser.add_argument("--talk", nargs=3, metavar=("ENDPOINT", "ROBOTS", "SECONDS"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.talk:
         endpoint, robots, seconds = options.talk
         run(talk(endpoint, int(robots), float(seconds)))
         return
+    if options.follow:
+        endpoint, *numbers = options.follow
+        run(follow(endpoint, *map(int, numbers)))
+        return
     for way in options.way or WAYS:
-        found = measure(way, options.robots, options.seconds)
+        found = measure(way, options.robots, options.seconds, options.watchers)
         if options.json:
             print(json.dumps({"way": way, **found}))
         else:

@@ -154,6 +154,10 @@ class _Queue(Reading[Item]):
                 self._waiting = None
                 if timer is not None:
                     timer.cancel()
+        return self.take()
+
+    def take(self) -> Item | None:
+        """Take the next message if it is there already."""
         return self._remove(0) if self._queue else None
 
     def close(self) -> None:

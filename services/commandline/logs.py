@@ -7,7 +7,7 @@ a file.
 import logging
 import sys
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime
 from io import FileIO
@@ -18,7 +18,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus import journal
-from engage_hri.services.commandline.patient import Patient
+from engage_hri.services.commandline.patient import Patient, without_waiting
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
 SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "peers", "up")))
@@ -53,7 +53,8 @@ class LogLine(Escaped):
 class StandardError(logging.Handler):
     """Handler that prints bugs, and warnings without a service's name, on the present standard error.
 
-    What cannot be printed there ends nobody.
+    What cannot be printed there ends nobody, and nobody waits for its reader, as of a terminal that is paused: all
+    that speaks to the robot would stand still. Such lines are lost, and their number is told when there is room.
     """
 
     def __init__(self, *, alerts: bool = False) -> None:
@@ -61,17 +62,30 @@ class StandardError(logging.Handler):
         super().__init__()
         self._alerts = alerts
         self._repeats = Repeats()
+        encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
+        self._lines = Patient("standard error", self._put, self.tell, encoding)
 
     def emit(self, record: logging.LogRecord) -> None:
         if record.levelno >= (logging.WARNING if record.name == "engage" else logging.ERROR):
-            self._print(self.format(record))
+            self.tell(self.format(record))
         elif self._alerts and getattr(record, journal.ALERT, False):
-            self._print(self._repeats.told(self.format(record), record.created))
+            self.tell(self._repeats.told(self.format(record), record.created))
 
-    def _print(self, text: str) -> None:
+    def tell(self, text: str) -> None:
+        """Print a line, if there is room."""
         if text:
             with suppress(OSError):
-                print(text, file=sys.stderr)
+                self._lines.write(f"{text}\n")
+
+    def _put(self, data: bytes) -> int | None:
+        if (stream := sys.stderr) is None:
+            return len(data)
+        try:
+            number = stream.fileno()
+        except (OSError, ValueError):  # somebody has put another in its place, which is not the system's
+            return len(data) if stream.write(data.decode(self._lines.encoding)) else 0
+        stream.flush()
+        return without_waiting(number, data)
 
 
 class Repeats:
@@ -100,11 +114,11 @@ class Repeats:
 class LogFile(logging.Handler):
     """Handler that appends to a file. What cannot be written is lost, and told on standard error."""
 
-    def __init__(self, path: Path) -> None:
-        """Raises OSError if the file cannot be opened."""
+    def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
+        """tell: prints on standard error. Raises OSError if the file cannot be opened."""
         super().__init__()
         self._file = FileIO(path, "a")
-        self._lines = Patient(f"--log {path}", self._file.write, self._tell)
+        self._lines = Patient(f"--log {path}", self._file.write, tell)
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
@@ -116,10 +130,6 @@ class LogFile(logging.Handler):
         with suppress(OSError):
             self._file.close()
         super().close()
-
-    def _tell(self, line: str) -> None:
-        with suppress(OSError):
-            print(line, file=sys.stderr)
 
 
 def configure(path: Path | None = None, levels: Sequence[str] = (), *, alerts: bool = False) -> None:
@@ -139,13 +149,14 @@ def configure(path: Path | None = None, levels: Sequence[str] = (), *, alerts: b
             advice = f"LEVEL or SOURCE=LEVEL; levels: {', '.join(LEVELS)}; sources: {', '.join(SOURCES)}"
             bad = name if name not in LEVELS else source
             raise InputRefused(Fault(reason=f"unknown {bad!r}", where="--log-level", advice=advice))
-    handlers: list[logging.Handler] = [StandardError(alerts=alerts)]
-    handlers[0].setFormatter(Escaped())
+    errors = StandardError(alerts=alerts)
+    errors.setFormatter(Escaped())
+    handlers: list[logging.Handler] = [errors]
     if path is not None:
         try:
             if path.is_fifo() or str(path) == "-":
                 raise OSError(0, "it is no file")
-            handlers.append(LogFile(path))
+            handlers.append(LogFile(path, errors.tell))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot be written: {error.strerror}", where=f"--log {path}")) from error
         handlers[-1].setFormatter(LogLine())

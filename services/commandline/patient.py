@@ -1,6 +1,8 @@
 """Output of what must go on on a full disk, too: what finds no room there is counted, and told once."""
 
 import logging
+import os
+import select
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -115,6 +117,15 @@ class PatientStream(Patient):
 
     def isatty(self) -> bool:
         return self._stream is not None and self._stream.isatty()
+
+
+def without_waiting(number: int, data: bytes) -> int | None:
+    """Write to a file by its number if there is room, else nothing: one who stops reading must stop nobody."""
+    try:
+        has_room = bool(select.select([], [number], [], 0)[1])
+    except (OSError, ValueError):  # Windows can ask sockets alone
+        has_room = True
+    return os.write(number, data[: getattr(select, "PIPE_BUF", 512)]) if has_room else None
 
 
 FORMAT = "utf-8"

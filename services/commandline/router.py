@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from select import PIPE_BUF, select
 from typing import Annotated
 
 import typer
@@ -18,7 +17,7 @@ from engage_hri.schemas.access import ROUTER
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import is_encrypted
 from engage_hri.services.bus.keyring import Keys, read_keys
-from engage_hri.services.commandline.patient import LOG, Patient, beneath, complain
+from engage_hri.services.commandline.patient import LOG, Patient, beneath, complain, without_waiting
 from engage_hri.services.commandline.process import FAILED, run_until_signal, until_closed
 from engage_hri.services.commandline.watched import EVERY, SIGN, watched
 from engage_hri.services.runtime.configuration import bus_config
@@ -128,17 +127,12 @@ def _command(options: Options, listen: list[str], connect: list[str]) -> list[st
 
 def _teller(name: str, number: int) -> Callable[[str], None]:
     """name, number: of the file to which lines go."""
-    out = Patient(name, partial(_without_waiting, number), LOG.warning)
+    out = Patient(name, partial(without_waiting, number), LOG.warning)
 
     def tell(line: str) -> None:
         out.write(f"{line}\n")
 
     return tell
-
-
-def _without_waiting(number: int, data: bytes) -> int | None:
-    """Write to a pipe if its reader takes it: one who stops reading must not stop the router."""
-    return os.write(number, data[:PIPE_BUF]) if select([], [number], [], 0)[1] else None
 
 
 async def _route(options: Options, keys: Keys | None) -> None:
@@ -149,7 +143,7 @@ async def _route(options: Options, keys: Keys | None) -> None:
 
     def sign() -> None:
         """Show a sign of life, in whatever thread: past what the loop has to write."""
-        _without_waiting(options.attended, f"{SIGN}\n".encode())
+        without_waiting(options.attended, f"{SIGN}\n".encode())
 
     _let_in_many()
     async with (

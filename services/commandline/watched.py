@@ -7,7 +7,9 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.commandline.supervisor import ended_in_order, ending, killed, spawned, without_threads
+from engage_hri.services.requests.deadlines import Silences
 
 SIGN = "\x06"
 """Line that is a sign of life, and not passed on."""
@@ -20,8 +22,8 @@ BEGINNING: Seconds = 30.0
 BRIEF: Seconds = 2.0
 """Life of a child after which the next one does not come at once, but after `PAUSE`."""
 PAUSE: Seconds = 0.5
-LONGEST = 2**16
-"""Bytes of a line that is passed on."""
+LONGEST = 2**17
+"""Bytes of a line that is passed on: a key in Zenoh's log has up to 2**16."""
 
 
 async def watched(
@@ -81,9 +83,10 @@ async def _listen(
     """Pass on the lines until they end. Returns whether there was a sign of life, and whether it fell silent."""
     assert process.stdout is not None
     loop, has_shown = asyncio.get_running_loop(), False
+    silences: Silences[str] = Silences(Sight(""))
 
     def is_alive() -> None:
-        silence.reschedule(loop.time() + (SILENCE if has_shown else BEGINNING))
+        silences.set(SIGN, loop.time() + (SILENCE if has_shown else BEGINNING))
 
     def take(line: bytes) -> None:
         nonlocal has_shown
@@ -97,13 +100,18 @@ async def _listen(
         if other(line):
             is_alive()
 
+    is_alive()
+    reading = asyncio.gather(_each(lines, take), _each(process.stdout, take_other))
     try:
-        async with asyncio.timeout(BEGINNING) as silence, asyncio.TaskGroup() as group:
-            group.create_task(_each(lines, take))
-            group.create_task(_each(process.stdout, take_other))
-    except TimeoutError:
-        return has_shown, True
-    return has_shown, False
+        while not reading.done():
+            await asyncio.wait([reading], timeout=min(SILENCE, silences.look - loop.time()))
+            if not reading.done() and silences.due(loop.time()):
+                return has_shown, True
+        reading.result()
+        return has_shown, False
+    finally:
+        reading.cancel()
+        await asyncio.wait([reading])
 
 
 async def _each(stream: asyncio.StreamReader, take: Callable[[bytes], None]) -> None:

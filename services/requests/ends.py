@@ -41,7 +41,7 @@ from engage_hri.schemas.requests import (
     Unreadable,
 )
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus, Containing, Received
+from engage_hri.services.bus.interface import Bus, Containing, Received, Subscription
 from engage_hri.services.bus.samples import sender_of
 from engage_hri.services.requests import asking_effects, serving_effects
 from engage_hri.services.requests.admission import borrowed, misplaced
@@ -60,8 +60,9 @@ _COMMANDS = (Request, KeepAlive)
 class Requester:
     """The asking side, for any number of requests at once.
 
-    `async with Requester(bus) as requests` listens by itself. A service that wants request states in order with
-    its other messages subscribes to `Requester.PATTERNS` itself and passes every message to `feed` instead.
+    `async with Requester(bus) as requests` listens by itself, from its first request on: a subscription that all
+    clients share costs the router a step for each two of them. A service that wants request states in order with its
+    other messages subscribes to `Requester.PATTERNS` itself and passes every message to `feed` instead.
     A request to a server that has not come yet waits for it. Raises ValueError if the bus' name can't be in a key.
     """
 
@@ -74,6 +75,7 @@ class Requester:
         self._asking = Asking(bus.name, self._life, patience or Patience(), bus.sight)
         self._pending: dict[str, Pending] = {}
         self._alarm = Alarm(self._tick)
+        self._listens = False
         self._listening: asyncio.Task[None] | None = None
         self._broken: EngageError | None = None
 
@@ -86,6 +88,8 @@ class Requester:
         """
         if self._broken is not None:
             return self._failed(key, request, self._broken)
+        if self._listens and self._listening is None:
+            self._listen()
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
             case [asking_effects.TellEnd(end=EngageError() as error)]:
@@ -183,11 +187,22 @@ class Requester:
         if self._broken is not None:
             raise self._broken
 
-    async def _listen(self) -> None:
-        with self._bus.subscribe(*self.PATTERNS) as inbox:
+    def _listen(self) -> None:
+        """Listen from now on, and learn at once which servers are there: the request that is sent next needs it."""
+        inbox, what = self._bus.subscribe(*self.PATTERNS), f"requests of {self._bus.name}"
+        while (received := inbox.take()) is not None:
+            self._feed_safely(received)
+        self._listening = asyncio.create_task(self._hear(inbox), name=what)
+        self._listening.add_done_callback(self._stopped_listening)
+
+    async def _hear(self, inbox: Subscription) -> None:
+        with inbox:
             async for received in inbox:
-                with self._bus.containing(received):
-                    self.feed(received)
+                self._feed_safely(received)
+
+    def _feed_safely(self, received: Received) -> None:
+        with self._bus.containing(received):
+            self.feed(received)
 
     def _stopped_listening(self, task: "asyncio.Task[None]") -> None:
         """Fail all requests if listening broke: their callers would wait for ever."""
@@ -198,9 +213,7 @@ class Requester:
         self._fail_all(RunFailed(Fault(reason=reason, advice="connect again", service=self._bus.name)))
 
     async def __aenter__(self) -> Self:
-        self._listening = asyncio.create_task(self._listen(), name=f"requests of {self._bus.name}")
-        self._listening.add_done_callback(self._stopped_listening)
-        await asyncio.sleep(0)
+        self._listens = True
         return self
 
     async def __aexit__(self, *raised: object) -> None:

@@ -1,6 +1,9 @@
 """What a router tells of Zenoh's log: what was refused, and nothing that was not."""
 
-from engage_hri.services.bus.zenoh.denials import MOST, Denials
+import pytest
+
+from engage_hri.schemas.limits import MOST_MESSAGES, MOST_QUESTIONS
+from engage_hri.services.bus.zenoh.denials import LONGEST, MOST, Denials
 
 TRACE = "\x1b[2m2026-11-22T22:21:26.150311Z\x1b[0m \x1b[35mTRACE\x1b[0m  rx-0 ThreadId({}) \x1b[2mzenoh::net::routing::interceptor::access_control\x1b[0m: {}"  # noqa: E501
 BOB = "107387840e15874f6e7b603029be66a0 on Interface(lo)+CertCommonName(robot/manager/bob)+Transport(Tls)+1073"
@@ -50,6 +53,34 @@ def test_a_denial_from_memory_is_told_with_the_name_that_was_heard_before() -> N
     cached = trace(f"Using cached result: 107387840e15874f6e7b603029be66a0 is unauthorized to Put (ingress) on {KEY}")
     assert told(checked("Query", un=""), cached) == [f"denied: robot/manager/bob may not put {KEY}"]
     assert told(cached) == [f"denied: process 107387840e15874f6e7b603029be66a0 may not put {KEY}"]
+
+
+@pytest.mark.parametrize(
+    ("what", "most", "words"), [("Put", MOST_MESSAGES, "messages"), ("Query", MOST_QUESTIONS, "questions")]
+)
+def test_who_sends_a_great_deal_that_is_allowed_is_told_by_name_in_the_first_tenth_and_hundredth_second(
+    what: str, most: int, words: str
+) -> None:
+    line = checked(what, un="")
+    seconds = [line.replace("22:21:26", f"22:{at // 60:02}:{at % 60:02}") for at in range(100)]
+    assert told(line, *[each for each in seconds for _ in range(most)]) == []
+    many = f"many: robot/manager/bob sends more than {most} {words} in a second"
+    assert told(line, *[each for each in seconds for _ in range(most + 1)]) == [
+        many, f"{many} (10 times)", f"{many} (100 times)",
+    ]  # fmt: skip
+
+
+def test_what_others_get_counts_for_nobody() -> None:
+    assert told(checked("Query", un=""), *[checked("Query", un="", flow="egress")] * 2 * MOST_QUESTIONS) == []
+
+
+def test_no_holder_makes_a_line_long_or_its_reading_slow() -> None:
+    """Keys of Zenoh may have 64 KiB. Each letter of these could begin the id of a process."""
+    caching = trace(f"ACL (ingress): caching permissions for `{'a' * 60_000}`")
+    lines = told(checked("Put", key="a" * 60_000), checked("Put", key="a" * 60_001), *[caching] * 100)
+    assert [line.rstrip("a.") for line in lines] == ["denied: robot/manager/bob may not put "]
+    assert lines[0].endswith("a...")
+    assert len(lines[0]) < LONGEST
 
 
 def test_who_is_not_let_in_is_named() -> None:

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.outputs import Outputs
-from engage_hri.services.commandline.patient import Patient, complain
-from engage_hri.services.commandline.router import _without_waiting
+from engage_hri.services.commandline.patient import Patient, complain, without_waiting
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage, start
 from tests.cli.test_processes import PATIENCE, line
@@ -127,7 +126,7 @@ def test_a_router_waits_for_no_reader() -> None:
     told: list[str] = []
     reading, writing = os.pipe()
     with open(reading, "rb", buffering=0) as reader, open(writing, "w"):
-        lines = Patient("standard output", partial(_without_waiting, writing), told.append)
+        lines = Patient("standard output", partial(without_waiting, writing), told.append)
         for number in range(1000):  # more than a pipe holds
             lines.write(f"{number:9999}\n" if number < 3 else f"{number:100}\n")
         written = reader.read(2**20)
@@ -142,6 +141,28 @@ def test_a_router_waits_for_no_reader() -> None:
         "standard output: cannot write: nobody reads; lines are lost until there is room",
         f"standard output is written again; {lines.lost} lines are lost",
     ]
+
+
+@pytest.mark.contained
+def test_a_warning_waits_for_no_reader(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a terminal that is paused: a service that waited for it would stand still, and the robot with it."""
+    reading, writing = os.pipe()
+    with open(reading, "rb", buffering=0) as reader, open(writing, "w") as stream:
+        os.set_blocking(writing, False)  # so that a writer who does not ask for room fails here, and does not hang
+        monkeypatch.setattr(sys, "stderr", stream)
+        logs.configure()
+        for number in range(1000):  # more than a pipe holds
+            logging.getLogger("engage").warning("%100d", number)
+        written = reader.read(2**20)
+        logging.getLogger("engage").warning("again")
+        written += reader.read(2**20)
+        monkeypatch.undo()
+
+    *kept, last, told = written.decode().splitlines()
+    assert [int(each) for each in kept] == list(range(len(kept)))
+    assert last == "again"
+    lost = 1000 - len(kept) + 1  # and the line that says so
+    assert told == f"standard error is written again; {lost} lines are lost"
 
 
 @has_full

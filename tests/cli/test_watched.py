@@ -5,7 +5,12 @@ import json
 import os
 import signal
 import sys
+import time
+from asyncio.subprocess import PIPE, Process
 from pathlib import Path
+from select import PIPE_BUF, select
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 import zenoh
@@ -147,6 +152,52 @@ os._exit(0)
     await asyncio.wait([task])
 
     assert (lines, warnings) == (["the end"], [])
+
+
+async def test_a_sign_that_came_while_the_watch_itself_stood_still_is_heard_before_it_judges(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "SILENCE", 0.05)
+    lines, other = asyncio.StreamReader(), asyncio.StreamReader()
+    process = cast(Process, SimpleNamespace(stdout=other))
+    lines.feed_data(f"{SIGN}\n".encode())
+    listening = asyncio.create_task(module._listen(process, lines, print, bool))
+    await asyncio.sleep(0.01)
+    asyncio.get_running_loop().call_later(0, lines.feed_data, f"{SIGN}\n".encode())
+    time.sleep(0.1)  # noqa: ASYNC251 - all in this process waits, and the time of the sign before is over
+    await asyncio.sleep(0.01)
+    lines.feed_eof()
+    other.feed_eof()
+
+    assert await listening == (True, False)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")
+async def test_a_router_whose_lines_nobody_reads_is_watched_over_all_the_same() -> None:
+    """As in a terminal that is paused: standard output and standard error are one, and it is full."""
+    endpoint = free_endpoint()
+    reading, full = os.pipe()
+    command = (sys.executable, "-m", "engage_hri", "router", "--listen", endpoint)
+    router = await asyncio.create_subprocess_exec(*command, stdin=PIPE, stdout=full, stderr=full)
+    try:
+        told = b""
+        while b"router is ready" not in told:
+            told += await asyncio.to_thread(os.read, reading, 2**16)
+        while select([], [full], [], 0)[1]:
+            os.write(full, bytes(PIPE_BUF))
+        (child,) = children(router.pid)
+        os.kill(child, signal.SIGSTOP)
+        await gone(child)
+
+        async with asyncio.timeout(PATIENCE):
+            while not children(router.pid):  # noqa: ASYNC110 - the system tells of no child of another
+                await asyncio.sleep(0.05)
+    finally:
+        code = await stopped(router)
+        os.close(reading)
+        os.close(full)
+
+    assert code == 0
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for children in /proc")

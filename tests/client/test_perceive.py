@@ -169,6 +169,7 @@ async def places(hub: MemoryHub) -> dict[str, tuple[float, float, float]]:
 async def test_two_people_sit_beside_one_another_in_one_world(hub: MemoryHub) -> None:
     async with scene(hub):
         async with perceive("ann", hub=hub) as ann, perceive("bob", hub=hub):
+            await asyncio.sleep(0.1)
             world = await places(hub)
             assert world.keys() == {"cup", "ball", "ann", "ann-hand", "bob", "bob-hand"}
             assert math.dist(world["ann"], world["bob"]) > 0.5

@@ -48,6 +48,24 @@ async def test_a_request_is_accepted_and_ends(hub: MemoryHub):
     await server.die(hub)
 
 
+async def test_a_requester_subscribes_with_its_first_request_and_knows_then_which_servers_are_there(hub: MemoryHub):
+    server = Server(hub)
+    client = hub.join("client")
+    subscribed: list[tuple[str, ...]] = []
+    subscribe = client.subscribe
+    client.subscribe = lambda *patterns: (subscribed.append(patterns), subscribe(*patterns))[1]  # type: ignore
+    async with Requester(client) as requests:
+        await asyncio.sleep(1.0)
+        assert subscribed == []
+
+        pendings = [requests.send(keys.BLOCK, block(name)) for name in ("b", "c")]
+        await asyncio.gather(*(pending.outcome for pending in pendings))
+
+    assert subscribed == [Requester.PATTERNS]
+    assert server.taken == [block("b"), block("c")]
+    await server.die(hub)
+
+
 async def test_a_server_that_comes_late_gets_the_request_at_once_and_once(hub: MemoryHub):
     client = hub.join("client")
     client.declare_alive()

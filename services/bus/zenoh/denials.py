@@ -1,5 +1,5 @@
 """Refusals of a router in plain lines: links without a good certificate, messages that no rule allows, and too large
-or too many ones.
+or too many ones. Who sends or asks a great deal is told too, though each message is allowed.
 
 Zenoh tells both only in its log, which it writes to the standard output of the process, each message that is allowed
 among them. Who watches over the router reads that, and picks out what was refused. The router itself must not: while
@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
+from engage_hri.schemas.limits import LONGEST_KEY, MOST_MESSAGES, MOST_QUESTIONS
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.often import is_told
 
@@ -20,10 +21,12 @@ MOST = 200
 WILD = 4
 """Most `$*` in a key of which nothing is told; of more it is told who sent it: each multiplies the time in which
 Zenoh matches it. Keys of ours have one."""
+LONGEST = 2 * LONGEST_KEY
+"""Bytes of a line that are read: a holder can send longer keys than ours, and all that is told is kept."""
 _COLOR = re.compile(rb"\x1b\[[0-9;]*m")
 _THREAD = re.compile(rb"ThreadId\((\d+)\)")
 _CHECKED = re.compile(
-    r"(?P<cached>Using cached result: )?(?P<zid>[0-9a-f]+)(?: on \S*?CertCommonName\((?P<name>.*?)\)\S*)?"
+    r"(?P<cached>Using cached result: )?\b(?P<zid>[0-9a-f]++)(?: on \S*?CertCommonName\((?P<name>.*?)\)\S*)?"
     r" is (?P<verdict>un)?authorized to (?P<what>[A-Z][A-Za-z/ ]*) \((?P<flow>ingress|egress)\) on (?P<key>\S+)"
 )
 _WHO = re.compile(rb" ([0-9a-f]+) (?:on|is) ")
@@ -32,11 +35,13 @@ _AFTER = b"interceptor"
 _CACHING = re.compile(r"ACL \((?P<flow>ingress|egress)\): caching permissions for `(?P<key>.*?)`")
 _LAST_CACHED = "Declare Liveliness Subscriber"
 _ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
-_NOBODY = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
+_NOBODY = re.compile(r"\b(?P<zid>[0-9a-f]++) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
 _TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
 _DROPPED = b"Msg intercepted!"
 """Last line about any message that is dropped, whatever the reason. It names nobody."""
+_INGRESS = re.compile(rb"(Put|Query) \(ingress\)")
+_MANY = {b"Put": (MOST_MESSAGES, "messages"), b"Query": (MOST_QUESTIONS, "questions")}
 _LEVEL = re.compile(r"\d{4}-\d\d-\d\dT\S+Z +(?P<level>[A-Z]+) ")
 
 
@@ -66,12 +71,17 @@ class Denials:
         """Processes that have a name."""
         self._before = b""
         """The last line."""
+        self._second = b""
+        self._sent: Counter[tuple[bytes, bytes]] = Counter()
+        """Numbers of what each process has sent in this second of the log, by kind."""
 
     def feed(self, line: bytes) -> bool:
         """Take a line of the log. Returns whether it shows that the router takes in something new.
 
         It does not while its tables are held; what others send one another may pass all the same.
         """
+        if len(line) > LONGEST:
+            line = line[:LONGEST] + b"..."
         before, self._before = self._before, line
         if line.endswith(_DROPPED):
             if b" is authorized to " in before:
@@ -113,12 +123,26 @@ class Denials:
         New is an allowance of a process without a name yet, or of a costly key.
         """
         if b" is authorized to " in line:
-            said = _WHO.search(line)
-            return said is not None and said[1] in self._zids and line.count(b"$*") <= WILD
+            if (said := _WHO.search(line)) is None or said[1] not in self._zids:
+                return False
+            if (what := _INGRESS.search(line)) is not None:
+                self._sends(said[1], what[1], line[: line.find(b".")])
+            return line.count(b"$*") <= WILD
         if (kind := self._kind_of.get(line[line.find(_AFTER) :])) is None:
             return False
         self._told_again(kind)
         return True
+
+    def _sends(self, zid: bytes, what: bytes, second: bytes) -> None:
+        """Count what is allowed, and tell of a process that sends more of it in a second than any of ours does."""
+        if second != self._second:
+            self._second = second
+            self._sent.clear()
+        self._sent[zid, what] += 1
+        most, words = _MANY[what]
+        if self._sent[zid, what] == most + 1:
+            who = self._names[zid.decode()]
+            self._say(f"many: {who} sends more than {most} {words} in a second", f"of what {who} does")
 
     def _drop(self, before: bytes, line: bytes) -> None:
         """Tell what was dropped though a rule allows it: it is too large. before: what was said of it on that thread.

@@ -226,7 +226,7 @@ class Traffic(Struct):
 class Arrived(Struct, frozen=True):
     """A sample, copied out of Zenoh's buffers: each that waits would keep all of the one that it came in.
 
-    sender: Zenoh id in its source info; empty: it has none. stamped_by: id in its timestamp; empty: it has none.
+    sender: Zenoh id in its source info; empty: it has none. stamped_by: then the id in its timestamp, if it has one.
     """
 
     key: str
@@ -239,7 +239,9 @@ class Arrived(Struct, frozen=True):
 
 
 def copied(sample: zenoh.Sample) -> Arrived:
-    attachment, source, stamp = sample.attachment, sample.source_info, sample.timestamp
+    attachment, source = sample.attachment, sample.source_info
+    # Each of these ids takes as long as all the rest, so the second is read only of who has no first.
+    stamp = sample.timestamp if source is None else None
     return Arrived(
         str(sample.key_expr),
         sample.payload.to_bytes(),

@@ -17,6 +17,8 @@ MOST_MEMORY = 150.0
 """Megabytes of a router that is attacked."""
 SLOWER = 1.5
 """Seconds by which the slowest fragment may take longer than in calm."""
+TOLD = 160
+"""Letters of what was told that are shown."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -49,7 +51,7 @@ async def trial(options: argparse.Namespace) -> int:
                         or one.restarts > 0
                     )
                     is_wrong |= wrong
-                    told = one.told[0] if one.told else ""
+                    told = one.told[0][:TOLD] if one.told else ""
                     print(
                         f"| {role} | {attack} | {one.times} | {one.refused} | {done} | {len(lost)} | {slow:.2f} |"
                         f" {one.memory:.0f} | {told} |{' WRONG' if wrong else ''}",

@@ -67,7 +67,9 @@ class Attacker:
 
     @property
     def questions(self) -> list[str]:
-        return [*self.may("asks"), *(keys.own("*", subject) for subject in ("past", "clock", "flush"))]
+        flows = {flow for key in self.may("publishes") for flow in keys.flows(key)}
+        own = ("past", "clock", *(f"flush/{flow}" for flow in sorted(flows)))
+        return [*self.may("asks"), *(keys.own("*", subject) for subject in own)]
 
     def next_of(self, them: list[str]) -> str:
         """One after the other of these, in each call."""

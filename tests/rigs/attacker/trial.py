@@ -142,6 +142,7 @@ async def attacked(siege: Siege, robot: Robot, role: str, attack: str, seconds: 
         nonlocal memory
         while True:
             memory = max(memory, siege.memory())
+            siege.router.drain()  # as the journal of a system would
             await asyncio.sleep(0.1)
 
     watching = asyncio.create_task(watch())
