@@ -45,7 +45,7 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
-def direct(callback: Callable[[Any], None]) -> Any:
+def direct(callback: Callable[[Any], object]) -> Any:
     return zenoh.handlers.Callback(callback, indirect=False)
 
 
@@ -151,7 +151,7 @@ async def connected(endpoint: str) -> zenoh.Session:
     """A session that reaches the raw server: its subscriptions are known."""
     session, _ = open_session(ROBOT, [endpoint], [], None)
     loop, matched = asyncio.get_running_loop(), asyncio.Event()
-    probe = session.declare_publisher(PING)
+    probe: Any = session.declare_publisher(PING)  # its stub says that the status is a bool
     probe.declare_matching_listener(direct(lambda status: loop.call_soon_threadsafe(matched.set)))
     if not probe.matching_status.matching:
         await matched.wait()

@@ -121,7 +121,7 @@ def slow(factor: float) -> Variability:
     return Variability(slow=tuple(Slow(part=part, factor=factor) for part in PARTS))
 
 
-SWEEP: Mapping[str, Variability] = {
+SWEEP: Mapping[str, "Variability | Physical"] = {
     "0.7x": slow(0.7), "1x": slow(1.0), "1.5x": slow(1.5), "2x": slow(2.0), "3x": slow(3.0), "4x": slow(4.0),
     "noise 20 %": Variability(noise=0.2),
     "stall 1 s": Variability(stall=(Stall(part="right_arm", before="stroke_start", seconds=1.0),)),

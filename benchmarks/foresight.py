@@ -29,7 +29,6 @@ from benchmarks.event_driven_against_fixed_schedule import (
     BLOCKS,
     block,
     in_closed_loop,
-    planned,
     skews,
     slow,
     stage,
@@ -42,6 +41,8 @@ from engage_hri.schemas.body import PerformBehavior, SyncPointArrived, SyncPoint
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.config import Stall, Variability
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.planning import planned_alone
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import Pending, Requester
@@ -125,8 +126,8 @@ class Waiting:
     def _fire(self, transition: int) -> Seconds | None:
         """Take up an instant if it may be; returns when it may if that is a matter of time."""
         members = self._plan.members[transition]
-        if transition not in self._instants and members and all(each.point in self.times for each in members):
-            self._instants[transition] = max(self.times[each.point] for each in members)
+        if transition not in self._instants and members and all(self._is_over(each.point) for each in members):
+            self._instants[transition] = max(self.times.get(each.point, self._bus.now()) for each in members)
         if transition and transition in self._instants:
             return None
         if any(source not in self._instants for source, _ in self._waits[transition]):
@@ -142,6 +143,16 @@ class Waiting:
         elif len(missing) == 1 and missing[0].can_wait:
             self._granted.add(missing[0].point)
         return None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing more comes of any point of the plan."""
+        return all(self._is_over(point) for point in self._plan.at if point.behavior)
+
+    def _is_over(self, point: Point) -> bool:
+        """Tell whether a point was reached, or never will be: its behavior has handed its part of the body over."""
+        pending = self.pending.get(point.behavior)
+        return point in self.times or (pending is not None and pending.outcome.done())
 
     def _tell(self, id: str) -> None:
         """Begin the behavior, or let it go on, as far as it may."""
@@ -170,7 +181,7 @@ class Run(Struct, frozen=True):
 
 async def run(executor: str, block: Block, variability: Variability) -> Run:
     async with stage(variability) as (bus, requests):
-        plan = await planned(block, bus)
+        plan = await planned_alone(bus, block, RealizerConfig())
         waiting = Waiting(plan, bus, requests)
         began = bus.now()
         with bus.subscribe(keys.SYNC_POINT) as inbox:
@@ -181,8 +192,7 @@ async def run(executor: str, block: Block, variability: Variability) -> Run:
                     while len(inbox) and (received := await inbox.next()):
                         waiting.take(received.message)
                 else:
-                    last = len([point for point in plan.at if point.behavior])
-                    while len(waiting.times) < last:
+                    while not waiting.is_over:
                         due = waiting.step()
                         received = await inbox.next(due)
                         if received is not None:

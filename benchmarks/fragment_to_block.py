@@ -47,11 +47,12 @@ from benchmarks.harness import percentile, stands
 from benchmarks.measuring import Measurer, SteppedLoop, Stopwatch
 from benchmarks.reference_policy import references, table
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Reference, Speech
+from engage_hri.schemas.behaviors import FragmentBehavior, Reference, Speech
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.fragments import PerformFragment, TurnFragment
 from engage_hri.schemas.perception import HeadPose
+from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Hub
@@ -144,7 +145,10 @@ class Trips:
 
     async def trip(self) -> Seconds:
         id = f"fragment-{next(self._names)}"
-        behaviors = (Speech(id="s", text="Take"), *asked(self._number, self._world, self._which))
+        behaviors: tuple[FragmentBehavior, ...] = (
+            Speech(id="s", text="Take"),
+            *asked(self._number, self._world, self._which),
+        )
         fragment = TurnFragment(id=id, addressee="human", behaviors=behaviors)
         request = PerformFragment(id=id, requester=self._bus.name, fragment=fragment)
         began = perf_counter()
@@ -268,7 +272,8 @@ async def measured(how: str, which: str, number: int, trips: int, watch: Stopwat
         while not {"generation", "control"} <= seen:
             received = await there.next()
             assert received is not None
-            seen.add(received.message.participant)  # type: ignore[attr-defined]
+            if isinstance(received.message, PeerAlive):
+                seen.add(received.message.participant)
         there.close()
         fragments = Trips(client, realizer, which, number)
         if how == "load":
@@ -307,7 +312,8 @@ def obey() -> None:
     stands()
     for line in sys.stdin:
         with asyncio.Runner(loop_factory=SteppedLoop) as runner:
-            print(json.dumps(runner.run(measured(*json.loads(line), watch))), flush=True)
+            how, which, number, trips = json.loads(line)
+            print(json.dumps(runner.run(measured(how, which, number, trips, watch))), flush=True)
 
 
 def summed_up(laps: Sequence[dict[str, Any]]) -> dict[str, Any]:

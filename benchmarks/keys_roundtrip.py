@@ -55,8 +55,8 @@ class Pings:
 
 async def hub_of(kind: str, holder: str, endpoint: str, ring: str) -> Hub:
     if kind == DIRECT:
-        ends = {"listen": [endpoint]} if holder == "control" else {"connect": [endpoint]}
-        return await open_hub("robot", **ends, mode="peer")
+        listens = holder == "control"
+        return await open_hub("robot", listen=[endpoint] * listens, connect=[endpoint] * (not listens), mode="peer")
     own = read_keys(ring, holder) if kind in WITH_KEYS else None
     return await open_hub("robot", connect=[endpoint], mode="client", keys=own)
 
@@ -103,7 +103,7 @@ async def measure(laps: int, trips: int, as_json: bool) -> None:
                 processes.enter_context(OtherSide(__file__, f"serve {kind}", endpoint, ring))
                 hub = await hubs.enter_async_context(await hub_of(kind, "realizer", endpoint, ring))
                 bus = hub.join("realizer", "realizer")
-                with bus.subscribe(keys.ANY_ALIVE) as who:
+                with bus.subscribe(keys.ANY_ROBOT_ALIVE) as who:
                     await who.next()
                 contenders.append(Pings(kind, bus))
             report(await compare(contenders, laps, trips), as_json)

@@ -19,16 +19,18 @@ import asyncio
 import gc
 import json
 import sys
+from collections.abc import Callable
+from contextvars import Context
 from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
 
 from msgspec import Struct, field, structs
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.harness import percentile
+from benchmarks.measuring import Given
 from benchmarks.sync_to_command import chain
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
@@ -79,13 +81,17 @@ class MeasuredLoop(asyncio.SelectorEventLoop):
         self._collected += taken
         self.longest_collection = max(self.longest_collection, taken)
 
-    def call_soon(self, callback: Any, *arguments: Any, context: Any = None) -> asyncio.Handle:
-        return super().call_soon(self._timed, callback, *arguments, context=context)
+    def call_soon(
+        self, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
+    ) -> asyncio.Handle:
+        return super().call_soon(self._timed, callback, *args, context=context)
 
-    def call_at(self, when: float, callback: Any, *arguments: Any, context: Any = None) -> asyncio.TimerHandle:
-        return super().call_at(when, self._timed, callback, *arguments, context=context)
+    def call_at(
+        self, when: float, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        return super().call_at(when, self._timed, callback, *args, context=context)
 
-    def _timed(self, callback: Any, *arguments: Any) -> None:
+    def _timed(self, callback: Callable[[*Given], object], *arguments: *Given) -> None:
         before = process_time() - self._collected
         callback(*arguments)
         self.longest_callback = max(self.longest_callback, process_time() - self._collected - before)

@@ -217,7 +217,7 @@ async def measure(loads: Sequence[str], seconds: Seconds, as_json: bool) -> None
 
 
 def _megabytes(services: int, router: int) -> tuple[float, float]:
-    return megabytes(family(services)), megabytes(family(router))
+    return megabytes(family(services), "Pss"), megabytes(family(router), "Pss")
 
 
 async def _under(

@@ -9,14 +9,16 @@ import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Generator, Sequence
+from contextvars import Context
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
 from time import process_time, thread_time
-from typing import Any
+from typing import Any, TypeVarTuple
 
 from engage_hri.schemas.units import Seconds
 
+Given = TypeVarTuple("Given")
 LONG: Seconds = 0.003
 """A step that takes longer is counted."""
 
@@ -44,16 +46,22 @@ class SteppedLoop(asyncio.SelectorEventLoop):
         else:
             self._collected += thread_time() - self._since
 
-    def call_soon(self, callback: Any, *arguments: Any, context: Any = None) -> asyncio.Handle:
-        return super().call_soon(self._timed, callback, *arguments, context=context)
+    def call_soon(
+        self, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
+    ) -> asyncio.Handle:
+        return super().call_soon(self._timed, callback, *args, context=context)
 
-    def call_soon_threadsafe(self, callback: Any, *arguments: Any, context: Any = None) -> asyncio.Handle:
-        return super().call_soon_threadsafe(self._timed, callback, *arguments, context=context)
+    def call_soon_threadsafe(
+        self, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
+    ) -> asyncio.Handle:
+        return super().call_soon_threadsafe(self._timed, callback, *args, context=context)
 
-    def call_at(self, when: float, callback: Any, *arguments: Any, context: Any = None) -> asyncio.TimerHandle:
-        return super().call_at(when, self._timed, callback, *arguments, context=context)
+    def call_at(
+        self, when: float, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        return super().call_at(when, self._timed, callback, *args, context=context)
 
-    def _timed(self, callback: Any, *arguments: Any) -> None:
+    def _timed(self, callback: Callable[[*Given], object], *arguments: *Given) -> None:
         task = getattr(callback, "__self__", callback)
         before = thread_time() - self._collected
         callback(*arguments)

@@ -20,7 +20,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.event_driven_against_fixed_schedule import EXECUTORS, FIGURE_4_4, Physical, planned, stage
+from benchmarks.event_driven_against_fixed_schedule import EXECUTORS, FIGURE_4_4, Physical, stage
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Pointing, PostureShift
 from engage_hri.schemas.body import SyncPointReached
@@ -31,6 +31,8 @@ from engage_hri.services.control.body import Body, BodyFailed, MovementAuthority
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.pulse import Pulse
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.planning import planned_alone
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.tangram.table import tangram_table
@@ -144,7 +146,7 @@ async def turns(body: DescribedBody) -> list[float]:
     asyncio.Handle._run = timed  # type: ignore[method-assign]
     try:
         for entity in WORLD.entities:
-            asked = [Gaze(id="g", target=entity.id), Pointing(id="p", target=entity.id)]
+            asked: list[BlockBehavior] = [Gaze(id="g", target=entity.id), Pointing(id="p", target=entity.id)]
             if (preparing := body.prepare(asked)) is not None:
                 await preparing
             for behavior in asked:
@@ -219,7 +221,7 @@ async def told(executor: str, physical: Physical) -> Told:
     module.MujocoBody.__init__ = noted  # type: ignore[method-assign]
     try:
         async with stage(physical) as (bus, requests):
-            plan = await planned(FIGURE_4_4, bus)
+            plan = await planned_alone(bus, FIGURE_4_4, RealizerConfig())
             times: dict[Point, Seconds] = {}
             trace: list[tuple[Seconds, float, float]] = []
             body = bodies[-1]

@@ -20,6 +20,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
+from typing import TypeVar, TypeVarTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 with warnings.catch_warnings():
@@ -32,6 +33,8 @@ from engage_hri.services.realizer.net.petri_net import PetriNet, Place, Transiti
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 
+Given = TypeVarTuple("Given")
+Made = TypeVar("Made")
 SIZES = (100, 1000, 10000)
 PER_PAIR = 8
 """Transitions of a pointing gesture and the phrase that begins with its stroke."""
@@ -149,29 +152,27 @@ def measure(size: int, laps: int) -> dict[str, dict[str, float]]:
     block = references(size)
     taken: dict[str, dict[str, list[float]]] = {}
 
-    def clock(name: str, what: str, act: Callable[[], object]) -> object:
+    def clock(name: str, what: str, act: Callable[[*Given], Made], *given: *Given) -> Made:
         gc.collect()
         began = time.perf_counter()
-        result = act()
+        result = act(*given)
         taken.setdefault(name, {}).setdefault(what, []).append(time.perf_counter() - began)
         return result
 
     for _ in range(laps):
-        plan = clock("Engage", "plan", lambda: plan_block(block))
+        plan = clock("Engage", "plan", plan_block, block)
         assert isinstance(plan, Plan)
-        net = clock("Engage", "build", lambda plan=plan: build(plan.net))
-        assert isinstance(net, PetriNet)
-        run = clock("Engage", "fire", lambda net=net: fire_once_each(net, net.initial))
-        stepped = clock("Engage, marking by marking", "fire", lambda net=net: step(net))
-        assert run.marking == net.initial  # type: ignore[attr-defined]
+        net = clock("Engage", "build", build, plan.net)
+        run = clock("Engage", "fire", fire_once_each, net, net.initial)
+        stepped = clock("Engage, marking by marking", "fire", step, net)
+        assert run.marking == net.initial
         everything = set(range(len(net.transitions)))
-        assert set(run.fired) == stepped == everything  # type: ignore[attr-defined]
+        assert set(run.fired) == stepped == everything
         for contender in (Timed(), Black()):
-            built = clock(contender.name, "build", lambda it=contender, net=net: it.build(net))
-            seconds = clock(contender.name, "fire", lambda it=contender, net=net, built=built: it.run(net, built))
-            assert isinstance(seconds, dict)
+            built = clock(contender.name, "build", contender.build, net)
+            seconds = clock(contender.name, "fire", contender.run, net, built)
             assert set(seconds) == everything
-            assert {place.name for place in built.place() if place.tokens} == {  # type: ignore[attr-defined]
+            assert {place.name for place in built.place() if place.tokens} == {
                 f"p{number}" for number, tokens in enumerate(net.initial) if tokens
             }
             if isinstance(contender, Timed):

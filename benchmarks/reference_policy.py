@@ -48,7 +48,7 @@ from engage_hri.services.generation.references.motions import (
     onward,
     onward_told,
 )
-from engage_hri.services.generation.references.pairs import ReferenceScene, considered, shown
+from engage_hri.services.generation.references.pairs import ReferenceScene, considered, minimum_of, shown
 from engage_hri.services.generation.references.policy import choose
 from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.generation.references.sequence import Movements
@@ -165,7 +165,7 @@ class BruteForce(Choosing):
         seems = shown([reference.target for reference in self.references], scene, self.motions)
         tables = [
             [pair for pair in considered(reference, seems[reference.target], scene, self.motions, CONFIG)
-             if not pair.ruled_out and pair.reliability >= reference.minimum_reliability]
+             if not pair.ruled_out and pair.reliability >= minimum_of(reference, CONFIG)]
             for reference in self.references
         ]  # fmt: skip
         movements = [Movements(reference.target, self.motions, CONFIG) for reference in self.references]

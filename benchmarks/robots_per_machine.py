@@ -104,7 +104,7 @@ def measure(way: str, robots: int, seconds: float, watchers: int = 0) -> dict[st
             for line in process.stdout:
                 if text in line:
                     return line
-            raise RuntimeError(f"{process.args} ended without {text!r}")
+            raise RuntimeError(f"{process.args!r} ended without {text!r}")
 
         router = start(*engage, "router", "--listen", endpoint)
         began = time.monotonic()
@@ -205,7 +205,7 @@ async def manage(bus: Bus, wait: Seconds, until: Seconds, ends: dict[str, int]) 
             for work in (robot.perform(FRAGMENT), robot.realize(CHAIN.format(id=f"chain-{number}"))):
                 try:
                     async with asyncio.timeout(60.0):
-                        status = (await work).status
+                        status: str = (await work).status
                 except (EngageError, TimeoutError) as error:
                     status = str(error)
                 ends["done" if status == "done" else "not_done"] += 1

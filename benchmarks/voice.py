@@ -8,6 +8,7 @@ import json
 import resource
 import sys
 import time
+from collections.abc import Callable
 from statistics import median, quantiles
 
 from engage_hri.schemas.behaviors import Speech
@@ -27,7 +28,7 @@ def sentence(number: int) -> Speech:
     return Speech(id="s", text=f"Now move {first} number {number} so that it touches the {second}, please.")
 
 
-def timed(count: int, act) -> list[float]:
+def timed(count: int, act: Callable[[Speech], object]) -> list[float]:
     taken = []
     for number in range(count):
         begin = time.perf_counter()

@@ -24,7 +24,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 from tests.console.browser import waited
-from tests.console.test_window import URL, engage
+from tests.console.windows import URL, engage
 
 BROWSERS = 5
 SECONDS = 30.0
@@ -117,4 +117,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

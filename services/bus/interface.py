@@ -224,8 +224,7 @@ class Bus(ABC):
             deadline = self.now() + timeout
             if (told := await self._query(key, message, deadline)) is not None:
                 return told
-            self.sight.look(self.now(), deadline)
-            if self.sight.woke_at < deadline:
+            if not self.sight.look(self.now(), deadline):
                 break
         raise self.unanswered(key, timeout)
 

@@ -31,14 +31,15 @@ class Sight:
         self.woke_at = self.asleep_at = NEVER
         self.slept: Seconds = 0.0
 
-    def look(self, now: Seconds, due: Seconds) -> None:
-        """Take in the time. due: when this was to happen."""
+    def look(self, now: Seconds, due: Seconds) -> bool:
+        """Take in the time. due: when this was to happen. True: this comes so late that others are heard first."""
         late = now - max(due, self.woke_at)
-        if late > LATE:
-            self.woke_at = now
         if late >= STANDSTILL:
             self.asleep_at = now
             self.slept += late
+        if is_late := late > LATE:
+            self.woke_at = now
+        return is_late
 
     def misses(self, whose: str, where: str, since: Seconds, now: Seconds, advice: str = "") -> Fault:
         """Fault of something that ends because somebody is not seen. since: time since which it is not."""

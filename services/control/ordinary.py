@@ -24,6 +24,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.control.body import (
     Arrived,
     BehaviorRefused,
@@ -38,6 +39,7 @@ from engage_hri.services.control.body import (
 from engage_hri.services.control.driven import Angles, DrivenBody, by_instant
 from engage_hri.services.control.driven import Way as Way
 from engage_hri.services.control.refusals import infeasible
+from engage_hri.services.requests.deadlines import Silences
 
 
 class _Doing:
@@ -63,6 +65,7 @@ class OrdinaryBody(DrivenBody):
 
     def __init__(self) -> None:
         super().__init__()
+        self._sight = Sight("control")
         self._settled: BlockBehavior | None = None
         """The shift that has set where it rests; None: it rests at home."""
         self._shifts = 0
@@ -246,7 +249,7 @@ class OrdinaryBody(DrivenBody):
             raise Revoked
         if self._off(goal()) is None and self._goal is None:
             return None
-        self._look, to = None, None
+        self._look, to, time = None, None, Silences[str](self._sight)
         seconds = began = 0.0
         while to is None or _apart(to, goal()) > self.near or self._off(goal()) is not None:
             if authority is not None and authority.revoked:
@@ -256,8 +259,9 @@ class OrdinaryBody(DrivenBody):
             if to is None or _apart(to, goal()) > self.near:
                 to, began = goal(), _now()
                 seconds = self._command(to)
-            elif (waited := _now() - began) > self.patience * seconds + 1.0:
-                raise BodyFailed(self._short(goal(), sync, waited, seconds))
+                time.set(sync, began + self.patience * seconds + 1.0)
+            elif time.due(_now()) is not None:
+                raise BodyFailed(self._short(goal(), sync, _now() - began, seconds))
             await asyncio.sleep(1.0 / self.rate)
         self._goal = None
         return _now()

@@ -48,8 +48,11 @@ from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, C
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
 from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import Pending, RequestDesk, Requester, RequestRefused
 from engage_hri.services.requests.serving import GRACE
+
+_RECOGNITION_AWAY = ("away", "recognition")
 
 
 class FragmentRunner:
@@ -73,10 +76,10 @@ class FragmentRunner:
         self._arbiter = arbiter
         self._leases = leases
         self._changed = changed
-        self._turns = TurnPolicy(bus.robot, config)
+        self._turns = TurnPolicy(bus.robot, config, bus.sight)
         self._events = TurnEvents()
         self._heard = HeardWords()
-        self._outcomes = TurnOutcomes(self._events, self._heard, config)
+        self._outcomes = TurnOutcomes(self._events, self._heard, config, bus.sight)
         self._gazes = GazesOfFragments()
         self._body = BodyLink(bus, config.body_patience)
         self._world: World | None = None
@@ -91,7 +94,8 @@ class FragmentRunner:
         self._session = f"{bus.name}@{bus.now():.6f}"
         """Part of each request id, so that the ids differ after a restart."""
         self._signals = 0
-        self._recognition_lost_at: Seconds | None = None
+        self._waits = Silences[tuple[str, str]](bus.sight)
+        """Times until which recognition may be away, and until which it is to decide the events of a request."""
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
@@ -120,6 +124,10 @@ class FragmentRunner:
         # the block impossible, the fragment is refused, too.
         self._live[request.id] = performance
         self._line.put_nowait(performance)
+
+    def refused(self, request: PerformFragment, why: Fault, now: Seconds) -> None:
+        """Draw the consequences, for its turn, of a fragment that was refused before it could be admitted."""
+        self._abort(self._turns.rest_refused(request.fragment, request.requester, why), now)
 
     def _accept(self, performance: FragmentPerformance) -> None:
         if not performance.accepted:
@@ -163,10 +171,10 @@ class FragmentRunner:
 
     def recognition_gone(self, now: Seconds) -> None:
         """Start the grace after which the open events are lost: recognition may only be cut off."""
-        self._recognition_lost_at = now + GRACE
+        self._waits.set(_RECOGNITION_AWAY, now + GRACE)
 
     def recognition_there(self, session: str) -> None:
-        self._recognition_lost_at = None
+        self._waits.clear(_RECOGNITION_AWAY)
         self._events.lose(session)
 
     def body_lost(self) -> None:
@@ -203,16 +211,17 @@ class FragmentRunner:
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [self._turns.deadline, self._outcomes.deadline, self._recognition_lost_at]
-        due += [performance.deadline for performance in self._live.values()]
+        due = (self._turns.deadline, self._outcomes.deadline, self._waits.earliest)
         return min((each for each in due if each is not None), default=None)
 
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
         self._news.set()
-        if self._recognition_lost_at is not None and now >= self._recognition_lost_at:
-            self._recognition_lost_at = None
+        for id, performance in self._live.items():
+            self._waits.keep(("undecided", id), performance.deadline, now)
+        due = {*iter(lambda: self._waits.due(now), None)}
+        if _RECOGNITION_AWAY in due:
             self._events.lose()
         while (aborted := self._turns.tick(now)) is not None:
             self._abort(aborted, now)
@@ -220,11 +229,11 @@ class FragmentRunner:
         for performance in list(self._live.values()):
             self._enforce_inhibitions(performance, permits)
             if performance.refusal is not None:
-                del self._live[performance.request.id]
+                self._forget(performance)
                 self._outcomes.refuse(performance.fragment.id, performance.turn)
                 refused.append((performance.request.id, performance.refusal))
-            elif (outcome := performance.outcome(self._events, now)) is not None:
-                del self._live[performance.request.id]
+            elif outcome := performance.outcome(self._events, is_due=("undecided", performance.request.id) in due):
+                self._forget(performance)
                 self._outcomes.end(outcome, performance.turn, now)
                 self._desk.end(replace(outcome, heard=self._heard.of_turn(performance.turn.turn)))
                 if not performance.turn.backchannel:  # that is said in the other's turn
@@ -235,6 +244,10 @@ class FragmentRunner:
         self._events.forget({*going, *self._outcomes.turns})
         self._heard.forget({*going, *self._outcomes.turns})
         return refused
+
+    def _forget(self, performance: FragmentPerformance) -> None:
+        del self._live[performance.request.id]
+        self._waits.clear(("undecided", performance.request.id))
 
     def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:
         block = performance.fragment.id
@@ -430,7 +443,7 @@ class FragmentRunner:
         self._follow_gaze(performance)
         self._discourse = self._discourse.without(fragment.id, performance.unmentioned)
         if performance.refusal is not None:
-            aborted = self._turns.fragment_refused(fragment.id, now)
+            aborted = self._turns.fragment_refused(fragment.id, now, performance.refusal)
         else:
             complete = performance.status == "done" or performance.lost_motions_only
             aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, why=performance.why)

@@ -301,15 +301,15 @@ class FragmentPerformance:
 
     @property
     def deadline(self) -> Seconds | None:
-        """Time when to stop waiting for events to be decided; None before the block has ended."""
+        """Time when to stop waiting for events to be decided, as far as no one has stood still; None: none yet."""
         return self._ended.at + self._patience if self._ended else None
 
-    def outcome(self, events: TurnEvents, now: Seconds) -> FragmentOutcome | None:
-        """The outcome; None until the block has ended and its directed and facial gazes are decided, or too late."""
+    def outcome(self, events: TurnEvents, *, is_due: bool) -> FragmentOutcome | None:
+        """The outcome; None until the block has ended and its directed and facial gazes are decided, or it is due."""
         if self._ended is None:
             return None
         undecided = [id for id in sorted(self._started) if not self._decided(id, events)]
-        if undecided and self.deadline is not None and now < self.deadline:
+        if undecided and not is_due:
             return None
         mine = [event for event in events.of_turn(self.turn.turn) if event.block == self.fragment.id]
         made = references_made(self.acts, mine)

@@ -277,6 +277,7 @@ class _Generation:
             since, name = now - self._config.world_patience, self._perception.name or "perception"
             fault = self._bus.sight.misses(name, id, since, now).following("the world is unknown", id)
             self._refuse(id, replace(fault, advice="is perception running?"))
+            self._runner.refused(request, fault, now)
         for id, fault in self._runner.settle(now):
             self._refuse(id, fault)
         self._rule(now)

@@ -42,6 +42,7 @@ from engage_hri.services.realizer.plan.past import LASTING, Past
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
+from engage_hri.services.requests.silence import unfinished
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -228,8 +229,7 @@ class _Realizer:
             self._send_home(live, replaced)
             if self.homing:
                 # Among them are parts sent home by a block that was itself replaced before it began.
-                _, lost = await asyncio.wait(self.homing, timeout=self.config.abort)
-                self.homing -= lost
+                self.homing -= await unfinished(self.homing, self.config.abort, self.bus)
         await self.planning.planned(live.block, self.live.values())
         try:
             live.unsettle()

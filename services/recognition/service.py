@@ -1,5 +1,6 @@
 """The recognition service: feeds recognition from the bus and publishes what comes out. It decides nothing."""
 
+import asyncio
 from collections.abc import Iterable
 from math import isfinite
 
@@ -9,6 +10,7 @@ from engage_hri.schemas.recognition import RequestEvent, SignalTurn, session_of
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Answer, Input, Intake, Mistake, Output, Publish, Withdraw, reads
 from engage_hri.services.recognition.ledger import Ledger, StepClock, step_of
@@ -32,7 +34,11 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
         recognition.begin()
         try:
             while not inbox.is_over:
-                received = await inbox.next(None if len(inbox) else recognition.deadline)
+                since, due = bus.now(), recognition.deadline
+                received = await inbox.next(None if len(inbox) else due)
+                if received is None and due is not None and bus.sight.look(bus.now(), max(since, due)):
+                    await asyncio.sleep(LATE)  # What people did meanwhile comes first: it has its own time.
+                    continue
                 with bus.containing(received or "what is due by now"):
                     if received is None:
                         recognition.advance()

@@ -212,7 +212,7 @@ class Asking:
             if event is None:
                 self._renew(name, now)
             elif event is Event.CANCELLED:
-                self._cancel(name, Fault(reason="it has taken too long", cause="late", whose=self._late(name)), now)
+                self._give_up(name, now)
             elif (asked := self._asked.get(name)) is not None:
                 self._step(asked, event, now)
         return self._new_effects()
@@ -347,8 +347,11 @@ class Asking:
     def _fail(self, asked: Asked, error: EngageError) -> None:
         self._effects.append(TellEnd(asked.request.id, error))
 
-    def _late(self, id: str) -> str:
-        return self._asked[id].server if id in self._asked else ""
+    def _give_up(self, id: str, now: Seconds) -> None:
+        if (asked := self._asked.get(id)) is not None:
+            since = now if asked.sent_at is None else asked.sent_at
+            late = self._sight.fault("it has taken too long", "", "late", asked.server, "", since)
+            self._cancel(id, late, now)
 
     def _cancellation(self, asked: Asked, why: Fault) -> Cancel:
         return Cancel(

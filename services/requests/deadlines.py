@@ -94,15 +94,34 @@ class Silences(Deadlines[K]):
         self._is_own = is_own
         self._slept: dict[K, Seconds] = {}
         """For each that can still be put off: for how long this process had stood still when it was set."""
+        self._kept: dict[K, Seconds] = {}
+        """For each that `keep` has set: what was asked for."""
 
     def clear(self, name: K) -> None:
         super().clear(name)
         self._slept.pop(name, None)
+        self._kept.pop(name, None)
 
     def set(self, name: K, at: Seconds | None) -> None:
         if at is not None and at != self[name]:
             self._slept[name] = self._sight.slept
         super().set(name, at)
+
+    def keep(self, name: K, at: Seconds | None, now: Seconds) -> None:
+        """Set a deadline that is computed anew again and again: as long as it comes out the same, it stays put off.
+
+        If it has passed when it first comes out so, it is due now: nobody has stood still meanwhile.
+        """
+        if at is None:
+            self.clear(name)
+        elif at != self._kept.get(name):
+            self.set(name, max(at, now))
+            self._kept[name] = at
+
+    def standing(self, name: K, at: Seconds) -> Seconds:
+        """The deadline that stands for `at`: later, if `keep` has it and it was put off."""
+        kept = self[name] if self._kept.get(name) == at else None
+        return at if kept is None else kept
 
     def due(self, now: Seconds) -> K | None:
         while (at := self.earliest) is not None and at <= now:
@@ -110,10 +129,11 @@ class Silences(Deadlines[K]):
             name = super().due(now)
             assert name is not None
             before = self._slept.pop(name, None)
-            if before is None or self._is_own(name):
-                return name
-            later = max(at + self._sight.slept - before, self._sight.woke_at + LATE)
+            later = now
+            if before is not None and not self._is_own(name):
+                later = max(at + self._sight.slept - before, self._sight.woke_at + LATE)
             if later <= now:
+                self._kept.pop(name, None)
                 return name
             super().set(name, later)
         return super().due(now)

@@ -30,7 +30,7 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ended import Ended
 from engage_hri.services.requests.names import Names
@@ -291,8 +291,12 @@ class Serving:
         self._heard(record, sent, now)
 
     def _heard(self, record: Record, sent: Seconds, now: Seconds) -> None:
-        """Let a request go on for as long as it may without being renewed again, from when it was renewed."""
+        """Let a request go on for as long as it may without being renewed again, from when it was renewed.
+
+        The time in which a late server hears first what came is part of that: the body is held no later for it.
+        """
         unheard, clock = record.request.unheard, (_UNHEARD, record.name)
+        unheard -= min(LATE, unheard / 3)
         if not 0.0 < unheard < inf or sent + unheard <= now:
             return
         self._deadlines.set(clock, max(self._deadlines[clock] or 0.0, sent + unheard))

@@ -113,7 +113,7 @@ class SharedPlace(ZenohPlace):
     async def close(self) -> None:
         await super().close()
         if self._program is not None:
-            self._program.close()  # type: ignore[no-untyped-call]
+            self._program.close()
 
 
 class GroupPlace(ZenohPlace):
@@ -154,7 +154,7 @@ async def matched(hub: ZenohHub, key: str) -> None:
     """Wait until what the hub publishes on the key goes to somebody."""
     loop, match = asyncio.get_running_loop(), asyncio.Event()
     publisher: Any = hub.session.declare_publisher(key)
-    handler = zenoh.handlers.Callback(lambda status: loop.call_soon_threadsafe(match.set), indirect=False)
+    handler: Any = zenoh.handlers.Callback(lambda status: loop.call_soon_threadsafe(match.set), indirect=False)
     publisher.declare_matching_listener(handler)
     if not publisher.matching_status.matching:
         await asyncio.wait_for(match.wait(), PATIENCE)
@@ -163,7 +163,7 @@ async def matched(hub: ZenohHub, key: str) -> None:
 
 async def take(subscription: Subscription, count: int = 1) -> list[Received]:
     """The next `count` messages. Fails when they do not come."""
-    taken = []
+    taken: list[Received] = []
     for _ in range(count):
         received = await subscription.next(asyncio.get_running_loop().time() + PATIENCE)
         assert received is not None, f"{len(taken)} of {count} messages came: {taken}"

@@ -2,6 +2,7 @@
 
 import io
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +134,19 @@ def test_a_wide_table_names_the_distractors(engage: Engage, two: Path, monkeypat
     assert "red-square" in out
     assert "and 5 more" in out
     assert max(map(len, out.splitlines())) <= 140
+
+
+def test_a_terminal_of_any_width_gets_every_letter_of_the_table(
+    engage: Engage, two: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def letters(width: int) -> Counter[str]:
+        monkeypatch.setenv("COLUMNS", str(width))
+        out = engage("explain", two).out
+        assert max(map(len, out.splitlines())) <= width
+        return Counter("".join(out.split()))
+
+    whole = letters(109)
+    assert {width: lost for width in range(12, 109) if (lost := whole - letters(width))} == {}
 
 
 def test_the_world_decides_what_may_be_meant(engage: Engage, tmp_path: Path, two: Path) -> None:

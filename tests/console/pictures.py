@@ -7,7 +7,7 @@ from pathlib import Path
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import waited
-from tests.console.test_window import URL, engage
+from tests.console.windows import URL, engage
 
 FOLDER = Path(__file__).parents[2] / "docs" / "console"
 PLACE = 27.5

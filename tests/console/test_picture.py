@@ -21,7 +21,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console import view
 from engage_hri.services.console.web.lanes import KEPT
-from engage_hri.services.console.web.picture import BLOCK, NET, Picture
+from engage_hri.services.console.web.picture import BLOCK, MEASURES, NET, Picture
 from tests.console.scenes import SCENE, Timed, at, event
 
 BEGAN = 10.0
@@ -279,24 +279,41 @@ def test_courses_are_thinned_but_end_with_the_newest() -> None:
     ]  # fmt: skip
     made = picture(*messages)
 
-    (ann,) = section(made, "measures")["people"]
+    made.advance(12.0)
+    ann = section(made, f"{MEASURES}ann")
 
     assert [time for time, _ in ann["mtbce"]] == [0.0, 0.2, 0.9, 1.0]
     assert ann["mtbce"][-1] == [1.0, 11.0]
 
 
+def measured(person: str, time: float) -> Timed:
+    none = WindowStatistics()
+    return Statistics(actor=person, at=at(time), session=none, recent=none, engagement=0.5), time
+
+
 def test_measures_are_told_once_a_second_at_most() -> None:
-    made = picture()
-    before = made.versions["measures"]
-    message = Statistics(actor="", at=at(10.0), session=WindowStatistics(), recent=WindowStatistics())
-
-    for time in (10.0, 10.3, 10.6, 10.9):
-        made.feed(message, time, time)
-        made.advance(time)
-    assert made.versions["measures"] == before
-
+    made = picture(measured("", 10.0))
     made.advance(11.0)
-    assert made.versions["measures"] > before
+    before = made.versions[MEASURES]
+
+    for time in (11.0, 11.3, 11.6, 11.9):
+        made.feed(*measured("", time), time)
+        made.advance(time)
+    assert made.versions[MEASURES] == before
+
+    made.advance(12.0)
+    assert made.versions[MEASURES] > before
+
+
+def test_of_all_people_only_those_are_told_anew_whose_measures_have_changed() -> None:
+    made = picture(*(measured(person, 10.0) for person in ("", "ann", "ben", "eve")))
+    made.advance(11.0)
+    before = dict(made.versions)
+
+    made.feed(*measured("ben", 12.0), 12.0)
+    made.advance(13.0)
+
+    assert {name for name, version in made.versions.items() if before.get(name) != version} == {f"{MEASURES}ben"}
 
 
 def test_a_reference_has_the_table_behind_it() -> None:
@@ -413,5 +430,6 @@ def test_what_is_over_goes_and_who_has_gone_is_forgotten_though_nobody_looks() -
             made.feed(message, now, now)
 
     assert len([each for each in made.versions if each.startswith((BLOCK, NET))]) < 10
-    people = {each["actor"] for each in section(made, "measures")["people"]}
-    assert people == {f"track-{number}" for number in range(20, 50)}
+    made.advance(49 * 20.0 + 1.0)
+    people = {each for each in made.versions if each.startswith(MEASURES)}
+    assert people == {f"{MEASURES}track-{number}" for number in range(20, 50)}

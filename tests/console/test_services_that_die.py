@@ -1,7 +1,6 @@
 """What a service told stands no longer once it has been killed, and goes on if it was only cut off."""
 
 import asyncio
-from typing import Any
 
 import pytest
 
@@ -12,6 +11,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console import view
+from engage_hri.services.console.web.picture import MEASURES
 from tests.console.scenes import Timed, at, fed
 from tests.console.test_picture import net, picture, section
 from tests.console.test_seats import give, news, visitors
@@ -75,7 +75,7 @@ def test_no_engagement_is_known_without_recognition() -> None:
     def levels(*messages: Timed) -> dict[str, tuple[str, list[str]]]:
         made = picture(alive("recognition", "1"), engaged("ann", 12.0), engaged("ben", 12.0), *messages)
         made.advance(60.0)
-        shown: list[dict[str, Any]] = section(made, "measures")["people"]
+        shown = [section(made, name) for name in made.versions if name.startswith(MEASURES)]
         return {each["actor"]: (each["level"], each["reasons"]) for each in shown}
 
     known, unknown = ("engaged", ["pace"]), ("unknown", ["recognition has left the bus"])

@@ -24,6 +24,7 @@ from engage_hri.services.requests.deadlines import SLACK
 from engage_hri.services.requests.names import KEPT as NAMES_KEPT
 from tests.growth.lives import CALM, life
 from tests.growth.reach import Growth, grown, modules, running, sizes
+from tests.random_cases import share_of
 
 LIMITS = {
     "_carriers": KEYS_KEPT, "_wanting": KEYS_KEPT, "_used": NAMES_KEPT, "_told": UTTERANCES_KEPT, "_told_of": PEOPLE,
@@ -37,27 +38,33 @@ LIMITS = {
 The last two drop what is outdated once there is much of it."""
 STEPS = 6
 """Steps of life between two measures; of each, whatever leaks keeps at least one thing."""
+HALF_A_DAY, QUIET = 120, 165.0
+"""Steps of life before the first measure, and again before the second: 6 hours each, with so many seconds of quiet
+after each step."""
 REST: Seconds = 20.0
 """Time after which all that was begun is over."""
 
 
-async def growth(folder: Path, *, windows: bool) -> list[Growth]:
+async def growth(folder: Path, steps: int, quiet: Seconds = 0.0, *, windows: bool) -> list[Growth]:
     """What is larger after 2 N steps of life than after N, each time after a calm, one more step, and a rest."""
     found = []
     async with life(folder, windows=windows) as step:
         for stretch in range(2):
-            for number in range(STEPS + 1):
-                if number == STEPS:
+            for number in range(steps + 1):
+                if number == steps:
                     await asyncio.sleep(CALM)
-                await step(stretch * (STEPS + 1) + number)
+                await step(stretch * (steps + 1) + number)
+                await asyncio.sleep(quiet)
             await asyncio.sleep(REST)
             found.append(sizes({**running(), **modules()}, LIMITS))
     return grown(found[0], found[1], slack=STEPS // 2)
 
 
 async def test_a_robot_and_its_clients_keep_nothing_of_those_who_have_gone(tmp_path: Path) -> None:
-    assert [str(one) for one in await growth(tmp_path, windows=False)] == []
+    assert [str(one) for one in await growth(tmp_path, STEPS, windows=False)] == []
 
 
 async def test_a_window_keeps_nothing_of_what_is_over_whether_somebody_looks_or_not(tmp_path: Path) -> None:
-    assert [str(one) for one in await growth(tmp_path, windows=True)] == []
+    """For half a day; in `make test` for an hour."""
+    steps = share_of(HALF_A_DAY, HALF_A_DAY // STEPS)
+    assert [str(one) for one in await growth(tmp_path, steps, QUIET, windows=True)] == []

@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -272,8 +272,8 @@ def draw(chance: random.Random, stage: Stage, kinds: Sequence[str]) -> Broken:
 
 
 @asynccontextmanager
-async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
-    """Break something for its time, and heal it. The body is run with the time of both."""
+async def broken(stage: Stage, fault: Broken) -> AsyncIterator[tuple[Span, float]]:
+    """Break something for its time, and heal it. The body is run with the time of both, and when it was in force."""
     began = time.monotonic()
     heal: Callable[[], Awaitable[Any]]
     match fault.kind:
@@ -281,7 +281,8 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
             await stage.signal("router", signal.SIGSTOP, its_child=True)
 
             async def heal() -> None:
-                await stage.signal("router", signal.SIGCONT, its_child=True)
+                with suppress(ProcessLookupError):  # whoever watches over it has ended it meanwhile
+                    await stage.signal("router", signal.SIGCONT, its_child=True)
         case "kill" | "router":
             name = "router" if fault.kind == "router" else fault.what
             await stage.signal(name, signal.SIGKILL)
@@ -313,12 +314,13 @@ async def broken(stage: Stage, fault: Broken) -> AsyncIterator[Span]:
                 await machine.boot()
                 await stage.start(*stage.layout[machine.number])
 
+    in_force = time.monotonic()  # a busy host may take a while to kill a process
     await asyncio.sleep(fault.seconds)
     over = time.monotonic()
     await heal()
     begins_anew = fault.kind in ("kill", "reboot", "clock") or fault.what == "killed"
     healed = time.monotonic() if begins_anew else over
-    yield Span(began, healed)
+    yield Span(began, healed), in_force
 
 
 async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
@@ -332,7 +334,7 @@ async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
     fault = draw(chance, stage, kinds)
     stage.read()
     control = stage.ids["control"]
-    async with broken(stage, fault) as span:
+    async with broken(stage, fault) as (span, in_force):
         await stage.until(lambda: bool(stage.words_since(span.healed)) or _has_ended(stage), 12.0)
         # Who was frozen or cut off learns late that others have missed it: what counts is the last time.
         is_back = await stage.until(lambda: stage.back_since() is not None, 20.0)
@@ -350,7 +352,8 @@ async def one(stage: Stage, chance: random.Random, kinds: Sequence[str]) -> Run:
     if back is None or back > BACK_WITHIN:
         wrong.append(f"back after {back} s")
     if fault.stops:
-        wrong += [f"not held: {each}" for each in verdict.unheld(stage.events, control, span, HELD_WITHIN)]
+        within = in_force - span.began + HELD_WITHIN
+        wrong += [f"not held: {each}" for each in verdict.unheld(stage.events, control, span, within)]
     wrong += [f"hung: {each}" for each in verdict.unanswered(stage.events, stage.living(), before)]
     if any(since < time.monotonic() and span.began < to for since, to in stage.stood_still):
         print("the host stood still: not counted:", "; ".join(wrong) or "nothing was wrong", flush=True)
@@ -387,12 +390,14 @@ async def play(
         wrong += [f"lost: {each}" for each in lost]
         slow = [(since - 1.0, to + ENDS_WITHIN) for since, to in stage.slow]
         # What the host itself did is in no log of ours: ends that may come of it are not judged.
-        judged = [each for each in stage.events if not any(since <= each["t"] <= to for since, to in slow)]
+        judged = [
+            each
+            for each in stage.events
+            if each["what"] not in ("answer", "told") or not any(since <= each["t"] <= to for since, to in slow)
+        ]
         wrong += [f"untrue: {each}" for each in verdict.untrue(judged, stage.injuries, ENDS_WITHIN)]
         if len(stage.slow):
-            print(
-                f"the host stood still {len(stage.slow)} times; {len(stage.events) - len(judged)} events not judged"
-            )
+            print(f"the host stood still {len(stage.slow)} times; {len(stage.events) - len(judged)} ends not judged")
         wrong += [f"doubled: {each}" for each in verdict.doubled(stage.events)]
         wrong += [f"spoken twice: {each}" for each in verdict.spoken_twice(stage.events, "collaboration")]
         stage.close()

@@ -17,6 +17,7 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.requests import Accepted, Outcome, Refused
 from engage_hri.services.bus.zenoh.hub import ZenohHub
+from engage_hri.services.bus.zenoh.links import Router, RouterNews
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.requests.ends import Pending, Requester
 
@@ -76,8 +77,9 @@ def _why(fault: Fault | None) -> dict[str, str]:
 
 
 def tap(record: Record) -> None:
-    """Let the record hear all that this process publishes, asks, is told, and whom it sees."""
+    """Let the record hear all that this process publishes, asks, is told, whom it sees, and its links to routers."""
     publish, send, note = ZenohHub.publish, Requester.send, Peers.note
+    came, went = RouterNews.came, RouterNews.went
 
     def publishing(hub: ZenohHub, bus: Any, key: str, message: Any) -> None:
         record.message(key, message)
@@ -103,6 +105,17 @@ def tap(record: Record) -> None:
         note(peers, part, name, run, there)
         record("sees" if name in peers.names else "misses", name=name)
 
+    def coming(news: RouterNews, router: Router, now: float) -> str | None:
+        record("linked")
+        return came(news, router, now)
+
+    def going(news: RouterNews, zid: str, now: float) -> str | None:
+        line = went(news, zid, now)
+        if not news._here:
+            record("unlinked")
+        return line
+
+    RouterNews.came, RouterNews.went = coming, going  # type: ignore[method-assign]
     ZenohHub.publish = publishing  # type: ignore[method-assign]
     Requester.send = sending  # type: ignore[method-assign]
     Peers.note = noting  # type: ignore[method-assign]

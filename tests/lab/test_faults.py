@@ -112,6 +112,11 @@ def end(t: float, cause: str, blamed: str, reason: str = "it ended", status: str
     return event(t, "answer", service="generation", whose="x", status=status, **why)
 
 
+def lost(since: float, to: float, service: str = "generation") -> list[dict[str, Any]]:
+    """Reports of a service's link to the router."""
+    return [event(since, "unlinked", service=service), event(to, "linked", service=service)]
+
+
 @pytest.mark.parametrize(
     ("injury", "true", "untrue"),
     [
@@ -133,11 +138,30 @@ def test_a_cause_that_was_not_in_force_or_not_theirs_is_found(
     injuries = [Injury(kind, hit, 10.0, 12.0)]
 
     for cause, blamed in true:
-        assert verdict.untrue([end(13.0, cause, blamed)], injuries, 8.0) == []
-        assert len(verdict.untrue([end(9.0, cause, blamed)], injuries, 8.0)) == 1
-        assert len(verdict.untrue([end(21.0, cause, blamed)], injuries, 8.0)) == 1
+        assert verdict.untrue([*lost(10.5, 12.0), end(13.0, cause, blamed)], injuries, 8.0) == []
+        assert len(verdict.untrue([*lost(10.5, 12.0), end(9.0, cause, blamed)], injuries, 8.0)) == 1
+        assert len(verdict.untrue([*lost(10.5, 12.0), end(21.0, cause, blamed)], injuries, 8.0)) == 1
     for cause, blamed in untrue:
-        assert len(verdict.untrue([end(13.0, cause, blamed)], injuries, 8.0)) == 1
+        assert len(verdict.untrue([*lost(10.5, 12.0), end(13.0, cause, blamed)], injuries, 8.0)) == 1
+
+
+def test_a_lost_router_is_a_cause_for_whoever_had_lost_its_link_as_long_as_it_was_waited_for() -> None:
+    injuries = [Injury("router", frozenset(("router",)), 10.0, 12.0)]
+    asked = event(9.0, "asked", service="collaboration", whose="x")
+    late, refused = end(27.0, "unlinked", "router"), end(27.0, "unlinked", "router", status="Refused")
+
+    def flaws(*events: dict[str, Any], injuries: list[Injury] = injuries) -> int:
+        return len(verdict.untrue(events, injuries, 8.0))
+
+    assert flaws(asked, *lost(10.5, 12.0), late) == 0
+    assert flaws(event(13.0, "asked", whose="x"), *lost(10.5, 12.0), late) == 1  # it waited for nothing then
+    assert flaws(*lost(10.5, 12.0), refused) == 0  # for what was before, as an open turn is
+    assert flaws(*lost(10.5, 12.0), {**refused, "t": 33.0}) == 1
+    assert flaws(asked, late) == 1  # its link was whole
+    assert flaws(asked, *lost(10.5, 12.0, "realizer"), late) == 1  # another's was not
+    assert flaws(asked, *lost(15.0, 16.0), late) == 1  # nobody had taken the router away
+    assert flaws(asked, *lost(10.5, 12.0), late, injuries=[]) == 1
+    assert flaws(event(10.5, "unlinked", service="generation"), {**late, "t": 13.0}) == 0  # it is still away
 
 
 def test_an_end_without_a_reason_is_found_and_one_that_somebody_asked_for_must_say_who() -> None:

@@ -45,6 +45,40 @@ class Injury(NamedTuple):
     over: Seconds
 
 
+class Links(NamedTuple):
+    """Times in which services had no router, as their own links reported it, and when requests were made."""
+
+    gone: Mapping[str, Sequence[Span]]
+    asked: Mapping[str, Seconds]
+
+    @staticmethod
+    def of(events: Iterable[Event]) -> "Links":
+        gone, asked, since = defaultdict[str, list[Span]](list), dict[str, Seconds](), dict[str, Seconds]()
+        for each in events:
+            if each["what"] == "unlinked":
+                since.setdefault(each["service"], each["t"])
+            elif each["what"] in ("linked", "began") and each["service"] in since:
+                gone[each["service"]].append(Span(since.pop(each["service"]), each["t"]))
+            elif each["what"] == "asked":
+                asked.setdefault(each["whose"], each["t"])
+        for service, at in since.items():
+            gone[service].append(Span(at, float("inf")))
+        return Links(gone, asked)
+
+    def were_lost(self, end: Event, injuries: Sequence[Injury], after: Seconds) -> bool:
+        """True if who says so had no router while this was asked for, or lately, and a fault had taken that away.
+
+        A request of long ago may wait for as long as its server takes patience: it ends for what was then.
+        """
+        since = min(self.asked.get(end["whose"], end["t"]), end["t"] - after)
+        return any(
+            span.began <= end["t"] and since <= span.healed and each.began <= span.healed and span.began <= each.over
+            for span in self.gone.get(end["speaker"], ())
+            for each in injuries
+            if "router" in each.injured
+        )
+
+
 TRUE_CAUSES: Mapping[str, frozenset[str]] = {
     "kill": frozenset(("restarted", "gone", "silent", "unrenewed", "forgotten", "late")),
     "freeze": frozenset(("frozen", "gone", "silent", "unrenewed", "late")),
@@ -70,12 +104,15 @@ NOT_DONE = ("failed", "interrupted", "unknown", "refused", "lapsed", "aborted", 
 def untrue(events: Iterable[Event], injuries: Sequence[Injury], after: Seconds) -> list[str]:
     """Ends other than done, of whatever request and as whoever knows them, that give no true cause.
 
-    after: seconds after everything is whole again in which an end still comes of a fault.
+    after: seconds after everything is whole again in which an end still comes of a fault. Of a router that was gone
+    it comes as long as what was asked for meanwhile goes on: whoever says so must have lost its own link to it.
     """
+    events = list(events)
+    links = Links.of(events)
     return [
         f"{each.get('status') or each.get('told')} of {each['whose']} at {each['t']:.2f} in {each['service']}: {why}"
         for each in events
-        if each["what"] in ("answer", "told") and is_not_done(each) and (why := _flaw(each, injuries, after))
+        if each["what"] in ("answer", "told") and is_not_done(each) and (why := _flaw(each, injuries, links, after))
     ]
 
 
@@ -84,7 +121,7 @@ def is_not_done(end: Event) -> bool:
     return how in NOT_DONE or ": " in how
 
 
-def _flaw(end: Event, injuries: Sequence[Injury], after: Seconds) -> str:
+def _flaw(end: Event, injuries: Sequence[Injury], links: Links, after: Seconds) -> str:
     cause, blamed = end["cause"], end["blamed"]
     if not end["reason"] or not end["speaker"]:
         return f"names no cause ({end['reason'] or 'nothing is said'}), or nobody who says it"
@@ -97,6 +134,11 @@ def _flaw(end: Event, injuries: Sequence[Injury], after: Seconds) -> str:
         if not now or any(hit & each.injured for each in before):
             return ""
         return f"no cause, while {', '.join(each.kind for each in now)}: {end['reason']}"
+    if (cause, blamed) == ("unlinked", "router"):
+        is_refused = "Refused" in (end.get("status") or end.get("told") or "")
+        if links.were_lost(end, injuries, REMEMBERED if is_refused else after):
+            return ""
+        return f"unlinked, says {end['speaker']}, whose link to the router was whole: {end['reason']}"
     is_unseen = blamed == PERSON and cause == "gone"  # and nobody can know more of a person
     if any(blamed in each.injured and (is_unseen or cause in TRUE_CAUSES[each.kind]) for each in now):
         return ""

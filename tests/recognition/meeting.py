@@ -8,6 +8,7 @@ import random
 from collections.abc import Iterator
 from heapq import merge
 from itertools import count
+from typing import Literal
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import Claim, HeadOwner
@@ -123,5 +124,5 @@ def _block(block: str, turn: str, name: str, chance: random.Random, at: Seconds)
     yield at, passes("speech-1", "end")
     signal = TurnSignal(id="turn-end", turn=turn, signal="ended", actor=name)
     yield at, SignalTurn(id=f"{block}/end", requester="realizer", signal=signal, at=stamp(at), block=block)
-    status = chance.choice(("done", "done", "done", "interrupted"))
+    status: Literal["done", "interrupted"] = chance.choice(("done", "done", "done", "interrupted"))
     yield at, BlockProgress(block=block, progress="end", at=stamp(at), status=status)

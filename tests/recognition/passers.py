@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-from msgspec import Struct, field
-
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
 from engage_hri.schemas.recognition import ConnectionEvent
@@ -24,21 +22,15 @@ EVERY: Seconds = 8.0
 """Between two visits."""
 
 
-class Lobby(Struct):
+class Lobby:
     """All of recognition but the bus, driven as the service does."""
 
-    config: RecognitionConfig
-    events: list[ConnectionEvent] = field(default_factory=list)
-    keeps_events: bool = False
-    recognizer: Recognizer = field(default=None)  # type: ignore[arg-type]
-    published: PublishedStatistics = field(default=None)  # type: ignore[arg-type]
-    book: OpenEventTracker = field(default=None)  # type: ignore[arg-type]
-    reporters: Reporters = field(default=None)  # type: ignore[arg-type]
-    tracker: OngoingActionTracker = field(default_factory=OngoingActionTracker)
-
-    def __post_init__(self) -> None:
-        self.recognizer = Recognizer(ROBOT, self.config)
-        self.published = PublishedStatistics(ROBOT, self.config)
+    def __init__(self, config: RecognitionConfig) -> None:
+        self.events: list[ConnectionEvent] = []
+        self.keeps_events = False
+        self.tracker = OngoingActionTracker()
+        self.recognizer = Recognizer(ROBOT, config)
+        self.published = PublishedStatistics(ROBOT, config)
         self.book = OpenEventTracker(ROBOT, "session")
         self.reporters = Reporters(ROBOT, REPORT_GRACE, "loop", lambda stamp: stamp.seconds)
         self.feed(world("host"), 0.0)

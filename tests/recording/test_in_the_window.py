@@ -9,7 +9,7 @@ import pytest
 
 from engage_hri.services.console.web import played
 from engage_hri.services.console.web.frames import HEARTBEAT, Viewer
-from engage_hri.services.console.web.picture import Picture
+from engage_hri.services.console.web.picture import MEASURES, Picture
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.recording.reading import Recording
 from tests.console import browser
@@ -17,7 +17,7 @@ from tests.console.browser import waited
 from tests.console.test_window import URL, engage, needs_browser
 from tests.recording.conftest import Anchor
 
-WHOLE = ("scene", "head", "references", "events", "words", "measures")
+WHOLE = ("scene", "head", "references", "events", "words", "delays")
 """Sections that tell the same, once all before is known."""
 
 
@@ -27,7 +27,8 @@ def all_before(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def sections(picture: Picture) -> dict[str, object]:
-    return {name: msgspec.json.decode(picture.section(name)) for name in WHOLE}
+    names = [*WHOLE, *(name for name in picture.versions if name.startswith(MEASURES))]
+    return {name: msgspec.json.decode(picture.section(name)) for name in names}
 
 
 @pytest.mark.usefixtures("all_before")

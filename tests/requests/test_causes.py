@@ -80,11 +80,11 @@ MOVES = PerformBehavior(
 
 
 def held(unlinked_at: float, *, leaves: bool) -> Fault:
-    """The reason of a hold, half a second after the last renewal, or when the requester leaves."""
+    """The reason of a hold, about half a second after the last renewal, or when the requester leaves."""
     serving = Serving("control", sight=Sight("control", lambda: unlinked_at))
     serving.requester_there("me", "r1", 9.0)
     serving.take(MOVES, 10.0)
-    (hold,) = serving.requester_gone("me", 10.3) if leaves else serving.tick(10.51)
+    (hold,) = serving.requester_gone("me", 10.3) if leaves else serving.tick(10.5 - LATE)
     assert isinstance(hold, Hold)
     assert hold.why is not None
     return hold.why
@@ -93,9 +93,9 @@ def held(unlinked_at: float, *, leaves: bool) -> Fault:
 @pytest.mark.parametrize(
     ("unlinked_at", "leaves", "cause", "whose", "told"),
     [
-        (2.0, False, "unrenewed", "me", "me has not renewed it for 0.5 s: it, its machine or the network"),
+        (2.0, False, "unrenewed", "me", "me has not renewed it for 0.4 s: it, its machine or the network"),
         (2.0, True, "gone", "me", "me has not been seen for 0.3 s: it, its machine or the network"),
-        (10.2, False, "unlinked", "router", "me has not renewed it for 0.5 s: control has had no router"),
+        (10.2, False, "unlinked", "router", "me has not renewed it for 0.4 s: control has had no router"),
         (10.2, True, "unlinked", "router", "me has not been seen for 0.3 s: control has had no router"),
     ],
 )

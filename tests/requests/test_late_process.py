@@ -15,17 +15,10 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+from tests.standing_still import stand_still
 
 TERM: Seconds = 2.0
 BLOCK = PerformBlock(id="a", requester="client", life="1", block=Block(id="b"))
-
-
-def stand_still(until: Seconds) -> None:
-    """Do nothing until then, as a process that the system has stopped."""
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, VirtualTimeLoop)
-    loop._virtual_now = until
 
 
 async def test_a_question_that_was_slept_through_is_asked_again(hub: MemoryHub) -> None:

@@ -14,6 +14,7 @@ from engage_hri.schemas.faults import EngageError, Fault, ServerRestarted
 from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_effects import Publish, Renew, TellEnd
 from engage_hri.services.requests.ends import RequestDesk
@@ -45,10 +46,10 @@ def test_what_is_not_renewed_is_held_goes_on_when_it_is_and_ends_with_its_lease(
     serving.take(MOVES, 10.0)
     serving.answer("a", Accepted(id="a"), 10.0)
     assert holds(pulse(serving, 10.4, 10.4)) == []
-    assert holds(serving.tick(10.89)) == []
-    assert holds(serving.tick(10.9)) == [14.4]
+    assert holds(serving.tick(10.9 - LATE - 0.01)) == []
+    assert holds(serving.tick(10.9 - LATE)) == [14.4]
     assert holds(pulse(serving, 12.0, 12.1)) == [None]
-    assert holds(serving.tick(12.5)) == [16.0]
+    assert holds(serving.tick(12.5 - LATE)) == [16.0]
     (end,) = handed(serving.tick(16.0))
     assert isinstance(end, Cancel)
     assert end.cause == "unrenewed"
@@ -57,9 +58,26 @@ def test_what_is_not_renewed_is_held_goes_on_when_it_is_and_ends_with_its_lease(
 def test_a_renewal_that_was_long_on_its_way_lets_nothing_go_on() -> None:
     serving = Serving("control")
     serving.take(MOVES, 10.0)
-    assert holds(serving.tick(10.5)) == [14.0]
+    assert holds(serving.tick(10.5 - LATE)) == [14.0]
     assert holds(pulse(serving, 10.6, 11.2)) == []
     assert holds(pulse(serving, 11.1, 11.3)) == [None]
+
+
+@pytest.mark.parametrize("again", [False, True])
+@pytest.mark.parametrize("late", [ms / 1000 for ms in (0, 1, 20, 49, 51, 70, 99, 101, 200, 900)])
+def test_a_body_is_held_later_only_by_the_lateness_of_its_server_and_not_for_what_that_hears_first(
+    late: float, again: bool
+) -> None:
+    """`held_after` is 0.5 s. The server looks late once, or each time."""
+    serving = Serving("control")
+    serving.take(MOVES, 10.0)
+    at, told, lateness = 10.0, list[float | None](), [late, late if again else 0.0]
+    while not told:
+        assert serving.deadline is not None
+        at = max(serving.deadline, at) + lateness.pop(0)
+        told = holds(serving.tick(at))
+
+    assert at <= 10.5 + (0.0 if late < LATE else 2 * late if again else late) + 1e-9
 
 
 def test_a_requester_that_goes_holds_it_at_once_and_one_without_held_after_goes_on() -> None:

@@ -1,13 +1,13 @@
 """Courses of what is measured: engagement and MTBCE of each person, delays of connection events. Pure."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.lanes import Zero
-from engage_hri.services.console.web.sections import Level, MeasuresSection, PersonMeasures
+from engage_hri.services.console.web.sections import Level, PersonMeasures
 
 KEPT = 600
 """Values of a course that are kept."""
@@ -29,8 +29,13 @@ class Measures:
         self._left: dict[str, tuple[Level, tuple[str, ...]]] = {}
         """Levels and reasons that recognition told last, while it is not there."""
 
+    @property
+    def people(self) -> Collection[str]:
+        """All who are measured."""
+        return self._people.keys()
+
     def feed(self, message: Statistics | ConnectionEvent, at: Seconds) -> bool:
-        """Take a message; at: its local instant. Returns whether anything has changed."""
+        """Take a message; at: its local instant. Returns whether it told of anything that is shown."""
         match message:
             case Statistics(actor=actor, session=session, engagement=engagement):
                 person = self._people.setdefault(actor, _Person())
@@ -69,19 +74,20 @@ class Measures:
         for actor, (level, reasons) in told.items():
             self._people[actor].level, self._people[actor].reasons = level, reasons
 
-    def shown(self, zero: Zero) -> MeasuresSection:
-        """All courses, with their instants in seconds of the picture."""
-        people = [
-            PersonMeasures(
-                actor=actor,
-                level=person.level,
-                reasons=person.reasons,
-                engagement=tuple((zero(at), value) for at, value in person.engagement),
-                mtbce=tuple((zero(at), value) for at, value in person.mtbce),
-            )
-            for actor, person in self._people.items()
-        ]
-        return MeasuresSection(tuple(people), tuple((zero(at), delay, kind) for at, delay, kind in self._delays))
+    def shown(self, actor: str, zero: Zero) -> PersonMeasures:
+        """The courses of a person, with their instants in seconds of the picture."""
+        person = self._people[actor]
+        return PersonMeasures(
+            actor=actor,
+            level=person.level,
+            reasons=person.reasons,
+            engagement=tuple((zero(at), value) for at, value in person.engagement),
+            mtbce=tuple((zero(at), value) for at, value in person.mtbce),
+        )
+
+    def delays(self, zero: Zero) -> list[tuple[float, float, str]]:
+        """Each delay, with the instant and the kind of its event."""
+        return [(zero(at), delay, kind) for at, delay, kind in self._delays]
 
 
 class _Person:

@@ -47,18 +47,18 @@ SECTIONS = (
     "events",
     "nets",
     "tokens",
-    "measures",
+    "delays",
     "references",
     "health",
     "notes",
     "switched",
 )
 """Names of the sections that are always there; `sections.py` has their fields."""
-BLOCK, NET = "block/", "net/"
-"""Beginnings of the names of the sections that each block, and each net, has for itself: `block/step-3`."""
+BLOCK, NET, MEASURES = "block/", "net/", "measures/"
+"""Beginnings of the names of sections that each block, net and person has for itself, as `block/step-3`."""
 SETTLED_EVERY: Seconds = 1.0
 """Longest time, while messages come, until what is over is forgotten, whether or not somebody looks."""
-SLOWLY: dict[str, Seconds] = {"measures": 1.0}
+SLOWLY: tuple[Seconds, tuple[str, ...]] = (1.0, (MEASURES, "delays"))
 """Sections that are told at most so often: they are large, and nobody sees the difference."""
 
 
@@ -155,12 +155,12 @@ class Picture:
                 self._changed("head")
             case ConnectionEvent(retold=False):
                 self._events.feed(message, at)
-                self._changed("events", *(("measures",) if self._measures.feed(message, at) else ()))
+                self._changed("events", *(("delays",) if self._measures.feed(message, at) else ()))
             case Statistics(actor=actor):
                 self._measures.feed(message, at)
                 if actor:
                     self._people.hear(actor, self.now)
-                self._changed("measures")
+                self._changed(f"{MEASURES}{actor}")
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
                 self._people.hear(message.actor, self.now)
             case BlockProgress() | SyncPointProgress() | PredictionFeedback():
@@ -195,7 +195,7 @@ class Picture:
         """Take news of who is on the bus: what a participant tells is over without it."""
         self._changed("switched", *(f"{BLOCK}{id}" for id in self._blocks.presence(message, at)))
         if self._measures.presence(message):
-            self._changed("measures")
+            self._changed(*(f"{MEASURES}{person}" for person in self._measures.people))
         if (left := nets.feed(self._nets, message, at, self.now)) is not self._nets:
             self._nets = left
             self._changed("tokens")
@@ -281,7 +281,7 @@ class Picture:
         for person in self._people.forgotten(self.now):
             self._measures.forget(person)
             self.reporters.pop(person, None)
-            self._changed("measures")
+            self._drop(f"{MEASURES}{person}")
         for id in self._blocks.forget(now):
             self._drop(f"{BLOCK}{id}")
         left = self._latest_shown(nets.without_old(self._nets, now))
@@ -317,6 +317,8 @@ class Picture:
             return self._blocks.shown(name.removeprefix(BLOCK), self.zero)
         if name.startswith(NET):
             return net_layout.laid_out(self._nets[name.removeprefix(NET)], self.zero)
+        if name.startswith(MEASURES):
+            return self._measures.shown(name.removeprefix(MEASURES), self.zero)
         made: dict[str, Callable[[], Any]] = {
             "scene": lambda: scene.section(self._scene, self._world, self._state, self._body),
             "words": self._words,
@@ -324,7 +326,7 @@ class Picture:
             "events": lambda: self._events.shown(self.zero),
             "nets": lambda: list(self._nets),
             "tokens": lambda: [net_layout.tokens(net) for net in self._nets.values()],
-            "measures": lambda: self._measures.shown(self.zero),
+            "delays": lambda: self._measures.delays(self.zero),
             "references": lambda: list(self._choices),
             "health": self._health.shown,
             "notes": lambda: list(self._notes),
@@ -362,13 +364,15 @@ class Picture:
         return told.sentence if told is not None and told.is_told else ""
 
     def _changed(self, *names: str) -> None:
+        pause, slow = SLOWLY
         for name in names:
-            if (pause := SLOWLY.get(name)) is not None:
+            if name.startswith(slow):
                 self._late.setdefault(name, self.now + pause)
                 continue
             self._number += 1
             self.versions[name] = self._number
 
     def _drop(self, name: str) -> None:
+        self._late.pop(name, None)
         self.versions.pop(name, None)
         self._encoded.pop(name, None)

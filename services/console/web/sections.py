@@ -257,20 +257,16 @@ class Choice(Struct, frozen=True):
 
 
 class PersonMeasures(Struct, frozen=True):
-    """Engagement of a person and its course. actor: empty: all people. mtbce: mean time between connection events."""
+    """Engagement of a person, and courses over time: each is a row of instant and value.
+
+    actor: empty: all people. mtbce: mean time between connection events.
+    """
 
     actor: str
     level: Level
     reasons: tuple[str, ...]
     engagement: tuple[Point, ...]
     mtbce: tuple[Point, ...]
-
-
-class MeasuresSection(Struct, frozen=True):
-    """Courses over time, each a row of instant and value. delays: with the kind of the event."""
-
-    people: tuple[PersonMeasures, ...]
-    delays: tuple[tuple[float, float, str], ...]
 
 
 class Health(Struct, frozen=True):

@@ -10,9 +10,11 @@ from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
+from engage_hri.services.requests.deadlines import Silences
 
 
 class TurnEvents:
@@ -84,12 +86,12 @@ class _Record(Struct):
 class TurnOutcomes:
     """Outcomes of the robot's turns; backchannels have none. `deadline`: when to call `close_due` again."""
 
-    def __init__(self, events: TurnEvents, heard: HeardWords, config: GenerationConfig) -> None:
+    def __init__(self, events: TurnEvents, heard: HeardWords, config: GenerationConfig, sight: Sight) -> None:
         self._events = events
         self._heard = heard
         self._config = config
         self._records: dict[str, _Record] = {}
-        self._given_up: dict[str, Seconds] = {}
+        self._given_up = Silences[str](sight)
         """Turns that are over, and when to stop waiting for the answer."""
 
     @property
@@ -125,12 +127,13 @@ class TurnOutcomes:
 
     @property
     def deadline(self) -> Seconds | None:
-        return min(self._given_up.values(), default=None)
+        return self._given_up.earliest
 
     def close_due(self, going: Collection[str], now: Seconds) -> tuple[TurnClosed, ...]:
         """Close the turns that are over by now. going: turns that are open, or have a fragment without an outcome."""
-        over = [turn for turn in self._records if turn not in going and now >= self._due_at(turn)]
-        self._given_up = {turn: self._due_at(turn) for turn in self._records.keys() - {*going, *over}}
+        for turn in self._records:
+            self._given_up.keep(turn, None if turn in going else self._due_at(turn), now)
+        over = iter(lambda: self._given_up.due(now), None)
         return tuple(closed for turn in over if (closed := self._close(turn)).fragments)
 
     def _due_at(self, turn: str) -> Seconds:
@@ -159,6 +162,7 @@ class TurnOutcomes:
 
     def _close(self, turn: str) -> TurnClosed:
         record = self._records.pop(turn)
+        self._given_up.clear(turn)
         for pair in self._events.pairs(turn):
             if pair.state == "completed" and pair.response == "speak" and not pair.words:
                 self._heard.missed(pair.responder)

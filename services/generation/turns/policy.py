@@ -16,7 +16,9 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.runtime.action_reports import FACE_GRACE
 from engage_hri.services.text.listening import is_listening
 
@@ -91,8 +93,11 @@ def plan_turn(fragment: TurnFragment, turn: str, addressee: str) -> TurnPlan:
 class TurnPolicy:
     """The robot's turns, over streamed fragments. `deadline`: when to call `tick` at the latest."""
 
-    def __init__(self, robot: str, config: GenerationConfig) -> None:
+    def __init__(self, robot: str, config: GenerationConfig, sight: Sight | None = None) -> None:
         self._robot = robot
+        self._sight = sight or Sight("generation")
+        self._waits = Silences[tuple[str, str]](self._sight)
+        """The `_limits`, since `tick` was called."""
         self._config = config
         self._open: TurnPlan | None = None
         """The turn that the next fragment would continue."""
@@ -206,14 +211,25 @@ class TurnPolicy:
         self._forget()
         return None
 
-    def fragment_refused(self, id: str, now: Seconds) -> Aborted | None:
-        """Take back a fragment that the realizer found impossible. Its turn goes on, unless the fragment began it."""
+    def rest_refused(self, fragment: TurnFragment, requester: str, why: Fault) -> Aborted | None:
+        """End the open turn if its rest was refused, before it was accepted, for what has happened to somebody."""
+        is_rest = fragment.turn_status in ("middle", "end") and requester == self._speaker
+        if self._open is None or not is_rest or not why.cause:
+            return None
+        return self._abort(self._open, _refused(fragment.id, why))
+
+    def fragment_refused(self, id: str, now: Seconds, why: Fault = _COMPLETE) -> Aborted | None:
+        """Take back a fragment that the realizer has refused.
+
+        Its turn goes on for another fragment, unless this one began it, or something has happened to somebody (`why`
+        has a cause): then the turn ends as if the fragment had failed a moment later.
+        """
         plan = self._live.get(id)
         if plan is None:
             return None
         other = self._open is not None and self._open.turn != plan.turn
-        if plan.turn == id or other:
-            return self.fragment_ended(id, complete=False, now=now, why=Fault(reason=f"{id} was refused"))
+        if plan.turn == id or other or why.cause:
+            return self.fragment_ended(id, complete=False, now=now, why=_refused(id, why))
         self._open = plan
         return self.fragment_ended(id, complete=True, now=now)
 
@@ -273,25 +289,17 @@ class TurnPolicy:
         return (*self._live.values(), *([self._open] if self._open else []))
 
     @property
-    def _left_at(self) -> tuple[TurnPlan, Seconds] | None:
-        """The turn whose addressee is out of sight, and when that has lasted so long that the person has left."""
-        return next(
-            (
-                (plan, self._away[plan.addressee] + FACE_GRACE)
-                for plan in self._turns_under_way
-                if plan.addressee in self._away
-            ),
-            None,
-        )
+    def _limits(self) -> dict[tuple[str, str], Seconds]:
+        """Times until which others may go on as they do: be away or talk, by person, and be silent, by turn."""
+        limits = {("talks", each): self._takes_floor_at(each, began) for each, began in self._talked_into.items()}
+        if self._silent_since is not None:
+            limits["silent", self.open_turn] = self._silent_since + self._config.turn_silence
+        people = {plan.addressee for plan in self._turns_under_way}
+        return limits | {("away", each): at + FACE_GRACE for each, at in self._away.items() if each in people}
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [self._takes_floor_at(actor, began) for actor, began in self._talked_into.items()]
-        if self._silent_since is not None:
-            due.append(self._silent_since + self._config.turn_silence)
-        if (left := self._left_at) is not None:
-            due.append(left[1])
-        return min(due, default=None)
+        return min((self._waits.standing(*each) for each in self._limits.items()), default=None)
 
     @property
     def _talked_into(self) -> dict[str, Seconds]:
@@ -305,15 +313,22 @@ class TurnPolicy:
 
     def tick(self, now: Seconds) -> Aborted | None:
         """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
-        if (left := self._left_at) is not None and now >= left[1]:
-            gone = left[0].addressee
-            return self._abort(left[0], Fault(reason=f"{gone} has left", cause="gone", whose=gone))
-        if self._silent_since is not None and now >= self._silent_since + self._config.turn_silence:
+        limits = self._limits
+        for name in [name for name in self._waits if name not in limits]:
+            self._waits.clear(name)
+        for name, at in limits.items():
+            self._waits.keep(name, at, now)
+        why, who = self._waits.due(now) or ("", "")
+        if why == "away":
+            left = next(plan for plan in self._turns_under_way if plan.addressee == who)
+            return self._abort(left, self._sight.fault(f"{who} has left", "", "gone", who, "", self._away[who]))
+        if why == "silent":
             assert self._open is not None
+            assert self._silent_since is not None
             silence = f"silence for {self._config.turn_silence:g} s"
-            return self._abort(self._open, Fault(reason=silence, cause="late", whose=self._speaker))
-        by_voice = (each for each, began in self._talked_into.items() if now >= self._takes_floor_at(each, began))
-        if actor := self._taken_by or next(by_voice, ""):
+            since, speaker = self._silent_since, self._speaker
+            return self._abort(self._open, self._sight.fault(silence, "", "late", speaker, "", since))
+        if actor := self._taken_by or (who if why == "talks" else ""):
             current = self._current
             self._forget_interrupters()
             taken = Fault(reason=f"{actor} took the floor", cause="cancelled", whose=actor)
@@ -343,6 +358,11 @@ class TurnPolicy:
         self._interrupters.clear()
         self._listeners.clear()
         self._taken_by = ""
+
+
+def _refused(id: str, why: Fault) -> Fault:
+    refused = f"{id} was refused"
+    return why.following(refused, "") if why.reason else Fault(reason=refused)
 
 
 def in_vain(fragment: TurnFragment) -> tuple[str, ...]:

@@ -4,9 +4,11 @@ import asyncio
 from collections.abc import Mapping
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.live import Ending
+from engage_hri.services.requests.silence import unfinished
 
 
 async def all_ended(
@@ -15,6 +17,7 @@ async def all_ended(
     body: ControlLink,
     ending: Ending,
     within: Seconds,
+    bus: Bus,
 ) -> None:
     """Cancel what still runs, and return when all that the body does has ended, or `within` is over."""
     moving = dict[asyncio.Task[None], str]()
@@ -25,7 +28,6 @@ async def all_ended(
             moving[tasks[id]] = id
         if ending.status != "done" and not run.pending.outcome.done():
             body.cancel(id, ending.fault or f"block {ending.status}")
-    if moving:
-        _, stuck = await asyncio.wait(moving, timeout=within)
-        for task in stuck:  # Its request is not to be kept alive: it is over, though the body does not say so.
-            body.cancel(moving[task], "its block has ended")
+    for task in await unfinished(moving, within, bus):
+        # Its request is not to be kept alive: it is over, though the body does not say so.
+        body.cancel(moving[task], "its block has ended")

@@ -211,7 +211,7 @@ class BlockPerformance:
     async def _end_behaviors(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
-        await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort)
+        await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort, bus=self.bus)
         if self._outcome.status == "done":
             self.decisions.net.let_go()
         else:

@@ -15,6 +15,7 @@ from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import Pending, RequestRefused, ServerRestarted
 
 UNPROMISED: Seconds = 30.0
@@ -60,6 +61,7 @@ class RecognitionLink:
         is not counted. facts: those of the block, as they grow.
         """
         began = deed = facts.reached[Point(event.id, "start")]
+        time = Silences[str](self._bus.sight)
         while True:
             if pending is not None and pending.outcome.done():
                 try:
@@ -79,13 +81,15 @@ class RecognitionLink:
                 due = event_deadline(event, block, facts.reached)
             else:
                 due = deed + (UNPROMISED if pending.within is None else pending.within)
-            remaining = due + facts.held_between(began, now, event.id) - now
-            if remaining <= EPSILON:
+            time.keep("decision", due + facts.held_between(began, now, event.id), now)
+            if time.due(now + EPSILON) is not None:
                 if pending is not None:
-                    self._requests.cancel(pending.request.id, "no decision in time")
+                    late = self._bus.sight.fault("no decision in time", "", "late", "recognition", "", deed)
+                    self._requests.cancel(pending.request.id, late)
                 return Decision(self._bus.now(), False)
+            assert time.earliest is not None
             # The deadline is computed again after this: meanwhile points were reached, or the promise was heard.
             news: list[asyncio.Future[Any]] = [self._peers.changed]
             if pending is not None:
                 news += [each for each in (pending.outcome, pending.accepted) if not each.done()]
-            await asyncio.wait(news, timeout=remaining, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(news, timeout=time.earliest - now, return_when=asyncio.FIRST_COMPLETED)

@@ -10,11 +10,17 @@ import { wizard } from "./wizard.js";
 import { player } from "./player.js";
 import { away, head, health, notes, references, switched, words } from "./lists.js";
 
-const EACH = ["block/", "net/"]; // sections that there are several of
+const EACH = { "block/": "blocks", "net/": "layouts", "measures/": "measures" }; // sections that there are several of
+
+// Where the state keeps a section that there are several of, and under which id.
+function place(name) {
+  const end = name.indexOf("/") + 1;
+  return [EACH[name.slice(0, end)], name.slice(end)];
+}
 
 export function begin(root, robot) {
   const at = (id) => root.querySelector(`#${id}`);
-  const state = { robot, blocks: new Map(), layouts: new Map(), now: () => 0, away: "" };
+  const state = { robot, blocks: new Map(), layouts: new Map(), measures: new Map(), now: () => 0, away: "" };
   const order = (what) => link.send(what);
   const drawn = [
     space(at("scene"), order), map(at("above"), order), part(at("part"), order), wizard(at("wizard"), order), words(at("said")), head(at("head")), eventLanes(at("events")),
@@ -31,25 +37,20 @@ export function begin(root, robot) {
     clock.hear(frame.now, Boolean(frame.place));
     const changed = new Set();
     if (isFirst || (frame.place && frame.place.visit !== state.place?.visit)) {
-      state.blocks.clear();
-      state.layouts.clear();
-      changed.add("blocks").add("layouts");
+      for (const kept of Object.values(EACH)) {
+        state[kept].clear();
+        changed.add(kept);
+      }
     }
     if (frame.place) {
       state.place = frame.place;
       changed.add("place");
     }
     for (const [name, value] of Object.entries(frame.sections ?? {})) {
-      if (name.startsWith(EACH[0])) {
-        state.blocks.set(name.slice(EACH[0].length), value);
-        changed.add("blocks");
-      } else if (name.startsWith(EACH[1])) {
-        state.layouts.set(name.slice(EACH[1].length), value);
-        changed.add("layouts");
-      } else {
-        state[name] = value;
-        changed.add(name);
-      }
+      const [kept, id] = place(name);
+      if (kept) state[kept].set(id, value);
+      else state[name] = value;
+      changed.add(kept ?? name);
     }
     if (frame.you) {
       state.you = frame.you;
@@ -60,9 +61,9 @@ export function begin(root, robot) {
       changed.add("told");
     }
     for (const name of frame.gone ?? []) {
-      const [kept, what] = name.startsWith(EACH[0]) ? [state.blocks, "blocks"] : [state.layouts, "layouts"];
-      kept.delete(name.slice(name.indexOf("/") + 1));
-      changed.add(what);
+      const [kept, id] = place(name);
+      state[kept].delete(id);
+      changed.add(kept);
     }
     for (const part of [...drawn, warning]) alone(part, () => part.take(state, changed));
     root.dataset.frames = Number(root.dataset.frames ?? 0) + 1;

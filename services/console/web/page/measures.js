@@ -11,15 +11,16 @@ export function measures(panel) {
   let theme = null;
   return {
     take(state, changed) {
+      if (changed.has("delays")) stale = true;
       if (!changed.has("measures")) return;
       stale = true;
-      const people = state.measures.people.filter((each) => each.actor);
+      const people = [...state.measures.values()].filter((each) => each.actor);
       reasons.textContent = people.map((each) => `${each.actor}: ${each.level}${each.reasons.length ? ` (${each.reasons.join("; ")})` : ""}`).join(". ");
     },
     tick(state) {
       const dark = document.body.classList.contains("body--dark");
       if (dark !== theme) stale = true;
-      if (!stale || !state.measures || panel.offsetParent === null) return;
+      if (!stale || !state.delays || panel.offsetParent === null) return;
       stale = false;
       theme = dark;
       draw(canvas, state);
@@ -29,9 +30,9 @@ export function measures(panel) {
 
 function draw(canvas, state) {
   const { context, width, height } = sized(canvas);
-  const { people, delays } = state.measures;
-  const everyone = people.find((each) => !each.actor);
-  const persons = people.filter((each) => each.actor);
+  const { delays } = state;
+  const everyone = state.measures.get("");
+  const persons = [...state.measures.values()].filter((each) => each.actor);
   const end = Math.max(10, state.now());
   const part = height / 3;
   context.font = "12px system-ui, sans-serif";

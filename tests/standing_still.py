@@ -1,0 +1,13 @@
+"""A process that the system has stopped for a while, in virtual time."""
+
+import asyncio
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
+
+
+def stand_still(until: Seconds) -> None:
+    """Do nothing until then."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    loop._virtual_now = until
