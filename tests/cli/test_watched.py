@@ -5,7 +5,6 @@ import json
 import os
 import signal
 import sys
-import time
 from asyncio.subprocess import PIPE, Process
 from pathlib import Path
 from select import PIPE_BUF, select
@@ -162,10 +161,15 @@ async def test_a_sign_that_came_while_the_watch_itself_stood_still_is_heard_befo
     process = cast(Process, SimpleNamespace(stdout=other))
     lines.feed_data(f"{SIGN}\n".encode())
     listening = asyncio.create_task(module._listen(process, lines, print, bool))
-    await asyncio.sleep(0.01)
-    asyncio.get_running_loop().call_later(0, lines.feed_data, f"{SIGN}\n".encode())
-    time.sleep(0.1)  # noqa: ASYNC251 - all in this process waits, and the time of the sign before is over
-    await asyncio.sleep(0.01)
+    for _ in range(9):
+        await asyncio.sleep(0)
+    loop = asyncio.get_running_loop()
+    loop.call_later(0, lines.feed_data, f"{SIGN}\n".encode())
+    until = loop.time() + 0.1
+    while loop.time() < until:
+        pass  # all in this process waits, and the time of the sign before is over
+    for _ in range(9):
+        await asyncio.sleep(0)
     lines.feed_eof()
     other.feed_eof()
 
@@ -191,7 +195,7 @@ async def test_a_router_whose_lines_nobody_reads_is_watched_over_all_the_same() 
 
         async with asyncio.timeout(PATIENCE):
             while not children(router.pid):  # noqa: ASYNC110 - the system tells of no child of another
-                await asyncio.sleep(0.05)
+                await asyncio.sleep(0)
     finally:
         code = await stopped(router)
         os.close(reading)
