@@ -26,8 +26,9 @@ from engage_hri.services.bus.zenoh.volume import Listening, place, sockets
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""
-TOGETHER: Seconds = 0.1
-"""Time in which links that are to be ended are gathered: to find them all sockets are looked at."""
+TOGETHER: Seconds = 0.01
+"""Time in which links that are to be ended are gathered, for all sockets are looked at. It is short: so long one who
+is kept out is heard."""
 SHOWN: Seconds = 1.0
 """Time after which it is shown again that something is served."""
 
