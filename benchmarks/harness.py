@@ -28,7 +28,7 @@ class OtherSide:
     def __enter__(self) -> Self:
         self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
-        if self._process.stdout.readline().strip() != "stands":
+        if "stands\n" not in iter(self._process.stdout.readline, ""):  # Zenoh may say something before
             raise RuntimeError(f"{' '.join(self._command)} did not start")
         return self
 

@@ -9,9 +9,11 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, GazeShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.sight import LATE
 from engage_hri.services.control.body import Body, BodyFailed, Reached, TakenOver
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage
 from tests.control.test_docs import driver
+from tests.standing_still import stand_still
 
 SCATTER = 0.0052
 """Radians: 0.3 degrees, a standard deviation."""
@@ -166,3 +168,32 @@ async def test_the_eyes_follow_who_walks_and_say_so_only_while_they_are_there(be
 
     assert max(offs) < 10.0
     assert told > 90
+
+
+class Delayed(driver().PanTilt):  # type: ignore[misc]
+    """Its measurements come over a network: after a standstill the old ones stand until new ones are read."""
+
+    unread_until = 0.0
+
+    def angles(self) -> dict[str, float]:
+        is_old = asyncio.get_running_loop().time() < self.unread_until
+        return {"pan": 0.0, "tilt": 0.0} if is_old else dict(super().angles())
+
+
+@pytest.mark.parametrize(("read_after", "is_stuck"), [(0.5 * LATE, False), (2.0 * LATE, True)])
+async def test_motors_that_moved_while_the_process_stood_still_are_not_stuck(
+    read_after: float, is_stuck: bool
+) -> None:
+    body = Delayed()
+    async with body.connected():
+        body.see(WORLD)
+        body.unread_until = 10.0 + read_after
+        stage = Stage(body, Gaze(id="g", target="far-left"), "end")
+        await asyncio.sleep(0.1)
+        asyncio.get_running_loop().call_soon(stand_still, 10.0)
+        if is_stuck:
+            with pytest.raises(BodyFailed, match="short of its goal"):
+                await stage.over()
+        else:
+            await stage.over()
+            assert stage.passed[-1] == "end"

@@ -91,6 +91,7 @@ TRUE_CAUSES: Mapping[str, frozenset[str]] = {
 CONTENT = {
     "the world has no ": ("simulation", "control"), "the world does not know ": ("simulation",),
     "$.turn_status: ": ("collaboration", "generation"), " of this id goes on": ("collaboration",),
+    "out of reach where the torso is now": ("realizer", "control"),  # it was planned before the body went home
 }  # fmt: skip
 """Refusals of what was asked, by their words, and who must have been hit: else it would not ask for that."""
 REMEMBERED: Seconds = 20.0

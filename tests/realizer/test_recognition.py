@@ -7,10 +7,12 @@ import pytest
 from engage_hri.schemas.behaviors import Event, Speech, TurnSignal
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import running
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import FakeRecognition, Stage, after, block, stage
+from tests.standing_still import stand_still
 
 EVENT = Event(id="e", kind="backchannel", responder="human", limit=2.0)
 WAITING = block((EVENT, Speech(id="s", text="so")), after("e:end", "s:start"))
@@ -114,3 +116,13 @@ async def test_who_is_there_is_told_of_a_turn_also_if_the_link_was_cut_just_then
 
     assert [each.signal.signal for each in recognition.signals] == ["ended"]
     assert {each.block for each in recognition.signals} == {"b"}
+
+
+@pytest.mark.parametrize(("came", "by"), [(0.5 * LATE, "body"), (2.0 * LATE, "clock")])
+async def test_a_decision_that_came_while_the_realizer_stood_still_is_heard_first(came: float, by: str) -> None:
+    """It is promised for 12.0; the realizer stands still from 11.9 to 12.5."""
+    async with stage(recognition=FakeRecognition({"e": 12.5 + came})) as seen:
+        asyncio.get_running_loop().call_at(asyncio.get_running_loop().time() + 11.9, stand_still, 12.5)
+        await seen.perform(WAITING)
+
+    assert source(seen)[1] == by

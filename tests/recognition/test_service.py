@@ -14,6 +14,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Reques
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
+from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import Requester, RequestRefused
@@ -21,6 +22,7 @@ from engage_hri.services.runtime.action_reports import REPORT_GRACE
 from engage_hri.services.runtime.service import Service, running
 from tests.commanding import command
 from tests.recognition.observations import HUMAN, ROBOT, world
+from tests.standing_still import stand_still
 
 
 def recognition(**config: object) -> dict[str, Service]:
@@ -278,3 +280,21 @@ async def test_where_a_person_looks_is_known_again_once_perception_is_back(hub: 
 
     assert isinstance(outcome, EventOutcome)
     assert (outcome.state, outcome.delay) == ("succeeded", 0.0)
+
+
+@pytest.mark.parametrize(("came", "state"), [(0.5 * LATE, "succeeded"), (2.0 * LATE, "failed")])
+async def test_what_a_person_did_while_recognition_stood_still_is_heard_before_its_limit_is_judged(
+    hub: MemoryHub, came: float, state: str
+):
+    """The look is at 0.75, the limit at 2.0; recognition stands still from 0.5 to 5."""
+    bus, loop = hub.join("realizer"), asyncio.get_running_loop()
+    async with running(hub, recognition()), Requester(bus) as requests:
+        bus.publish(keys.WORLD, world())
+        pending = requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square", limit=2.0))
+        await pending.accepted
+        loop.call_at(loop.time() + 0.5, stand_still, 5.0)
+        loop.call_at(5.0 + came, perceive, bus, "blue-square", loop.time() + 0.75)
+        outcome = await pending.outcome
+
+    assert isinstance(outcome, EventOutcome)
+    assert outcome.state == state

@@ -11,7 +11,7 @@ from engage_hri.schemas.requests import Accepted, Cancel
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import TellEnd
+from engage_hri.services.requests.asking_effects import Publish, TellEnd
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.requests.serving_effects import Hand, Hold
@@ -156,3 +156,22 @@ async def test_a_question_without_an_answer_tells_how_long_it_has_waited_and_for
         ("gone", "control"),
         ("silent", "control"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("unlinked_at", "cause", "whose"), [(2.0, "late", "generation"), (13.0, "unlinked", "router")]
+)
+def test_what_takes_too_long_is_cancelled_for_its_server_unless_the_requester_itself_had_no_router(
+    unlinked_at: float, cause: Cause, whose: str
+) -> None:
+    asking = Asking("me", "1", Patience(), Sight("me", lambda: unlinked_at))
+    asking.server_there("generation", "r1", 9.0)
+    asking.send(keys.FRAGMENT, PLEASE, 10.0, within=5.0)
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_fragment"), 10.1, "generation")
+    effects = []
+    while asking.deadline is not None and asking.deadline <= 15.01:
+        effects += asking.tick(asking.deadline)
+    (cancel,) = [each.message for each in effects if isinstance(each, Publish) and isinstance(each.message, Cancel)]
+
+    assert (cancel.cause, cancel.whose) == (cause, whose)
+    assert cancel.reason.startswith("it has taken too long")

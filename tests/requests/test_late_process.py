@@ -15,6 +15,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.ends import RequestDesk
+from engage_hri.services.requests.silence import unfinished
 from tests.standing_still import stand_still
 
 TERM: Seconds = 2.0
@@ -59,3 +60,26 @@ async def test_a_renewal_that_came_while_the_server_stood_still_is_heard_first(
     await asyncio.sleep(10.0)
 
     assert [each.id for each in ended] == (["a"] if is_ended else [])
+
+
+@pytest.mark.parametrize(("done", "is_left"), [(5.0 + 0.5 * LATE, False), (5.0 + 2.0 * LATE, True)])
+async def test_what_others_have_done_while_one_stood_still_is_not_unfinished(
+    hub: MemoryHub, done: Seconds, is_left: bool
+) -> None:
+    """It has 2 s, and the process stands still from 1.9 to 5."""
+    bus, loop = hub.join("realizer"), asyncio.get_running_loop()
+    theirs, others = loop.create_future(), loop.create_future()
+    loop.call_at(1.0, others.set_result, None)
+    loop.call_at(1.9, stand_still, 5.0)
+    loop.call_at(done, theirs.set_result, None)
+
+    assert await unfinished([theirs, others], 2.0, bus) == ({theirs} if is_left else set())
+
+
+async def test_who_has_all_its_time_and_has_not_finished_is_told_when_that_is_over(hub: MemoryHub) -> None:
+    bus, loop = hub.join("realizer"), asyncio.get_running_loop()
+
+    assert await unfinished([never := loop.create_future()], 2.0, bus) == {never}
+    assert loop.time() == 2.0
+    assert await unfinished([], 2.0, bus) == set()
+    assert loop.time() == 2.0
