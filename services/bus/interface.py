@@ -170,13 +170,16 @@ class Bus(ABC):
         except Exception:
             self.log.exception("%s: the fault could not be told", self.name)
 
-    def publish(self, key: str, message: Message) -> None:
+    def publish(self, key: str, message: Message, *, again: bool = False) -> None:
         """Send to all subscribers of `key`, this process' own included. It is no error if there are none.
+
+        again: it was sent before, to one who may not have heard it; the log has its line.
 
         Raises InputRefused for a message that is larger than its key allows (schemas/limits.py). One of a stream, of
         which any may be lost, is not sent then, and the first such of a participant is told in the log.
         """
-        journal.note(self.log, key, message)
+        if not again:
+            journal.note(self.log, key, message)
         try:
             self._send(key, message)
         except InputRefused as error:

@@ -53,7 +53,7 @@ async def _begin(options: Options, config: Config) -> None:
 
     name = "" if options.name == NONE else options.name
     async with (
-        await options.open(config.bus, "operator") as hub,
+        await options.open(config.bus, "operator", patience=PATIENCE) as hub,
         Robot.on(hub.join(unique_name("condition"), "operator")) as robot,
     ):
         await robot.set_condition(name, speech_only=options.speech_only, by=options.by, timeout=PATIENCE)
@@ -64,7 +64,7 @@ async def _show(options: Options, config: Config) -> None:
     from engage_hri.services.client.robot import Robot
 
     async with (
-        await options.open(config.bus, "viewer") as hub,
+        await options.open(config.bus, "viewer", patience=PATIENCE) as hub,
         Robot.on(hub.join(unique_name("condition"), "observer")) as robot,
     ):
         now = await robot.condition(PATIENCE)

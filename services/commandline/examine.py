@@ -19,7 +19,7 @@ from typing import Any, Literal
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.access import PARTICIPANTS, ROUTER, Holder
+from engage_hri.schemas.access import PARTICIPANTS, ROUTER, Holder, role_of
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.status import AskStatus, ProcessFacts, Status
@@ -126,8 +126,15 @@ async def _participants(hub: ZenohHub, bus: Bus) -> tuple[Known, ...]:
     await asyncio.sleep(AGAIN)
     later = await asyncio.gather(*(_status(bus, name) for name, one in first.items() if one.status is not None))
     afterwards = {status.participant: status for status in later if status is not None}
-    known = [msgspec.structs.replace(one, later=afterwards.get(name)) for name, one in first.items()]
-    known += [Known(name=name, seen=False, lives=0, answers=name in PARTICIPANTS) for name in hidden]
+    parts = {name: part for part, name in hub.peers.participants}
+    known = [
+        msgspec.structs.replace(one, part=parts.get(name, one.part), later=afterwards.get(name))
+        for name, one in first.items()
+    ]
+    known += [
+        Known(name=name, part=keys.part_of(role_of(name)), seen=False, lives=0, answers=name in PARTICIPANTS)
+        for name in hidden
+    ]
     order = {name: number for number, name in enumerate(PARTICIPANTS)}
     return tuple(sorted(known, key=lambda one: (order.get(one.name, len(order)), one.name)))
 

@@ -49,7 +49,7 @@ async def _switch(options: Options, config: Config) -> None:
     from engage_hri.services.client.robot import Robot
 
     async with (
-        await options.open(config.bus, "operator") as hub,
+        await options.open(config.bus, "operator", patience=PATIENCE) as hub,
         Robot.on(hub.join(unique_name("fault"), "operator")) as robot,
     ):
         if options.kind == LIST:

@@ -7,6 +7,7 @@ import os
 from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -144,17 +145,25 @@ class Connected(Configured):
         return (*super().overrides, *own)
 
     async def open(
-        self, bus: "BusConfig", holder: str, listen: Sequence[str] = (), beside: "Hub | None" = None
+        self,
+        bus: "BusConfig",
+        holder: str,
+        listen: Sequence[str] = (),
+        beside: "Hub | None" = None,
+        patience: float = inf,
     ) -> "Hub":
         """Open the Zenoh hub. Raises EngageError if an endpoint is bad or taken.
 
         holder: whose keys to take, where the folder of keys is that of several. beside: another hub of this process.
+        patience: seconds in which somebody has to be reached, for a command that asks once.
         """
         from engage_hri.services.bus.keyring import read_keys
         from engage_hri.services.bus.zenoh.hub import open_hub
 
         keys = read_keys(bus.keys, holder) if bus.keys else None
-        return await open_hub(bus.robot, connect=bus.connect, listen=listen, mode=bus.mode, keys=keys, beside=beside)
+        return await open_hub(
+            bus.robot, connect=bus.connect, listen=listen, mode=bus.mode, keys=keys, beside=beside, patience=patience
+        )
 
     @asynccontextmanager
     async def hubs(self, bus: "BusConfig", names: Iterable[str], beside: "Hub") -> AsyncIterator[dict[str, "Hub"]]:

@@ -172,7 +172,7 @@ async def _embedded(job: Job, config: Config, world: World) -> int:
 
 
 async def _remote(job: Job, config: Config) -> int:
-    async with await job.options.open(config.bus, "manager") as hub:
+    async with await job.options.open(config.bus, "manager", patience=PATIENCE) as hub:
         await _somebody_there(hub, job.servers, config)
         async with connect(hub=hub) as robot:
             world = await world_with_people(robot, job.things, config.robot, config.generation.world_patience)

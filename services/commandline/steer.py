@@ -35,7 +35,7 @@ async def _steer(options: Options, config: Config) -> None:
     from engage_hri.services.client.robot import Robot
 
     async with (
-        await options.open(config.bus, "operator") as hub,
+        await options.open(config.bus, "operator", patience=PATIENCE) as hub,
         Robot.on(hub.join(unique_name("steer"), "operator")) as robot,
     ):
         steer = {"hold": robot.hold, "continue": robot.resume, "stop": robot.stop}[options.to]

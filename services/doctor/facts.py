@@ -5,6 +5,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.keys import Part
 from engage_hri.schemas.status import ClockOffset, ProcessFacts, Status
 from engage_hri.schemas.units import Seconds
 
@@ -41,13 +42,14 @@ class Certificate(Struct, frozen=True, kw_only=True):
 class Known(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A participant on the bus.
 
-    seen: it is seen from here. lives: number of processes that have its name. answers: whether it should answer
-    questions for its status. status: its answer; None: none came in time. later: a second answer, a second later.
-    trip: the quickest round trip from here to its process. wall: by how much its machine's wall clock is ahead of
-    the one here.
+    part: as it shows itself. seen: it is seen from here. lives: number of processes that have its name. answers:
+    whether it should answer questions for its status. status: its answer; None: none came in time. later: a second
+    answer, a second later. trip: the quickest round trip from here to its process. wall: by how much its machine's
+    wall clock is ahead of the one here.
     """
 
     name: str
+    part: Part = "robot"
     seen: bool = True
     lives: int = 1
     answers: bool = True

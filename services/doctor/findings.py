@@ -124,8 +124,11 @@ def _services(facts: Facts) -> Iterator[Finding]:
         for name in facts.services:
             if name not in there:
                 yield Finding(
-                    severity="wrong", where=name, what="nobody sees this service",
-                    do=f"start `engage run {name}` with the same --robot and --connect; it prints why it ended",
+                    severity="wrong", where=name,
+                    what="nobody sees this service: it has ended, stands still, or is cut off",
+                    do=f"look for its process. If there is none, what it printed says why; start `engage run {name}`"
+                    " with the same --robot and --connect. If it is stopped (state T in `ps`), `kill -CONT` lets it"
+                    " go on. If it runs, look at its network, and whether its --connect names the same router",
                 )  # fmt: skip
     for version in facts.protocols:
         if version != facts.protocol:

@@ -44,16 +44,15 @@ def _cells(facts: Facts) -> Iterator[Cell]:
             elif viewer.status is None:
                 sees = "unknown"
             else:
-                hidden: Sees = "no" if _needs(viewer.name, other.name) else "needless"
+                hidden: Sees = "no" if _needs(viewer.name, other.part) else "needless"
                 sees = "yes" if other.name in viewer.status.bus.peers else hidden
                 if sees == "yes" and (clock := clock_of(viewer.status, other.status)) is not None:
                     trip = clock.trip
             yield Cell(viewer=viewer.name, other=other.name, sees=sees, trip=trip)
 
 
-def _needs(viewer: str, other: str) -> bool:
-    """True if one participant has to see another: everybody sees the robot, and services see their clients."""
-    part = keys.part_of(access.role_of(other))
+def _needs(viewer: str, part: keys.Part) -> bool:
+    """True if one has to see participants of this part: everybody sees the robot, and services see their clients."""
     heard = access.rows(access.role_of(viewer), "subscribes")
     return part == "robot" or keys.alive("*", part) in heard
 

@@ -355,7 +355,7 @@ class RequestDesk:
         handed: Request | None = None
         for effect in effects:
             if isinstance(effect, serving_effects.Publish):
-                self._bus.publish(self._answers, effect.answer)  # type: ignore[arg-type]
+                self._bus.publish(self._answers, effect.answer, again=effect.again)  # type: ignore[arg-type]
             elif isinstance(effect, serving_effects.Hand):
                 if effect.is_asked:
                     handed = effect.request

@@ -142,7 +142,8 @@ class Serving:
         if record is not None and record.state is not _ENDED:
             return [Complain(fault, False)]
         known = None if record is None else record.answer
-        return [Publish(answering(request, known or Refused(id=request.id, fault=fault)))]
+        answer = answering(request, known or Refused(id=request.id, fault=fault))
+        return [Publish(answer, again=known is not None)]
 
     def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds, sender: str = "") -> list[Effect]:
         """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`.
@@ -333,7 +334,7 @@ class Serving:
     def _repeat(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Answer again: the request that comes now, since a cancellation of no kind may have come before it."""
         asks = cause if isinstance(cause, Request) and not isinstance(cause, Cancel) else record.request
-        self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name))))
+        self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name)), again=True))
 
     def _refuse_unheard(self, record: Record, now: Seconds, cause: _Cause) -> None:
         reason = f"cancelled before {self._server} had heard of it; it is refused should it come yet"

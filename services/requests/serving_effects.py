@@ -8,9 +8,10 @@ from engage_hri.schemas.units import Seconds
 
 
 class Publish(Struct, frozen=True):
-    """Publish this answer."""
+    """Publish this answer. again: it has been given before."""
 
     answer: Answer
+    again: bool = False
 
 
 class Hand(Struct, frozen=True):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.limits import MOST_MESSAGES, MOST_QUESTIONS
+from engage_hri.schemas.limits import MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
 from engage_hri.services.bus.zenoh.denials import LONGEST, MOST, Denials
 
 TRACE = "\x1b[2m2026-11-22T22:21:26.150311Z\x1b[0m \x1b[35mTRACE\x1b[0m  rx-0 ThreadId({}) \x1b[2mzenoh::net::routing::interceptor::access_control\x1b[0m: {}"  # noqa: E501
@@ -152,13 +152,29 @@ def test_what_a_rule_allows_and_is_dropped_is_too_large() -> None:
     assert len(told(checked("Put"), DROPPED)) == 1
 
 
-def test_what_comes_too_fast_is_told_with_the_name() -> None:
-    many = TRACE.replace("access_control", "downsampling").format(
-        "08", f"Message dropped by the downsampling interceptor: Push({KEY}) from:south:0:client/10738784:1"
-    )
+def too_soon(second: int, process: str = "10738784", key: str = KEY) -> list[str]:
+    text = f"Message dropped by the downsampling interceptor: Push({key}) from:south:0:client/{process}:1"
+    line = TRACE.replace("access_control", "downsampling").format("08", text)
+    return [line.replace("21:26.150311Z", f"21:{second:02}.150311Z"), DROPPED]
+
+
+def test_what_comes_too_fast_is_told_with_the_name_once_for_each_second() -> None:
     news = f"dropped: robot/manager/bob sends more on {KEY} than may come in a second"
-    assert told(checked("Put", un=""), *[many, DROPPED] * 10) == [news, f"{news} (10 times)"]
-    assert told(many)[0].startswith("dropped: somebody sends more on")
+    flood = [line for second in range(10) for line in too_soon(second) * 100]
+
+    assert told(checked("Put", un=""), *flood) == [news, f"{news} (10 times)"]
+    assert told(*too_soon(1) * 100)[0].startswith("dropped: somebody sends more on")
+
+
+def test_messages_that_waited_together_are_no_flood() -> None:
+    """The router drops what follows too soon. Nobody is named before it was too much in one second on one key."""
+    few = [line for second in range(10) for line in too_soon(second) * MOST_PULSES]
+    of_many = [
+        line for number in range(100) for line in too_soon(1, f"{number:08}") + too_soon(1, key=f"key/{number}")
+    ]
+
+    assert told(checked("Put", un=""), *few, *of_many) == []
+    assert len(told(checked("Put", un=""), *few, *too_soon(9))) == 1
 
 
 def test_a_log_that_lies_about_threads_fills_no_memory() -> None:

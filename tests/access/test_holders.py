@@ -4,7 +4,7 @@ import pytest
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.access import Holder, may_have_sent
+from engage_hri.schemas.access import Does, Holder, may_have_sent
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.zenoh.rights import Rights
 
@@ -71,3 +71,21 @@ def test_what_the_router_would_drop_is_refused_by_name() -> None:
         rights.check("viewer-1", "subscribes", keys.EVERYTHING)
     with pytest.raises(InputRefused, match="ask"):
         rights.check("viewer-1", "asks", keys.ESTIMATE)
+
+
+@pytest.mark.parametrize(
+    ("does", "key", "advice"),
+    [
+        ("publishes", keys.command(keys.ROBOT, "observer", "viewer-1"), "an operator or a wizard may"),
+        ("publishes", keys.command(keys.FRAGMENT, "observer", "viewer-1"), "a manager or a wizard may"),
+        ("publishes", keys.command(keys.BEHAVIOR, "observer", "viewer-1"), "generation or realizer may"),
+        ("publishes", keys.PERCEIVED_ACTION, "perception or a wizard may"),
+        ("asks", keys.ESTIMATE, "generation or realizer may"),
+        ("subscribes", keys.EVERYTHING, "nobody may"),
+    ],
+)
+def test_a_refusal_names_the_roles_that_may(does: Does, key: str, advice: str) -> None:
+    rights = Rights(Holder(robot="robot", role="observer", name="viewer"))
+    with pytest.raises(InputRefused) as refused:
+        rights.check("viewer-1", does, key)
+    assert refused.value.fault.advice == advice

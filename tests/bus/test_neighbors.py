@@ -67,7 +67,7 @@ async def test_who_speaks_another_version_of_the_protocol_is_named_and_whoever_s
 
     nobody, first, unseen_here, second = lines
     assert nobody == "no robot 'robot' here yet; waiting (`engage up --robot robot` starts one)"
-    assert unseen_here == "nobody here sees generation, realizer, recognition yet; waiting"
+    assert unseen_here == "nobody here sees generation, realizer, recognition; waiting"
     assert (
         first
         == second
@@ -119,7 +119,7 @@ def test_what_others_see_is_told_with_the_reason_why_it_cannot_be_seen_from_here
     )
     assert "engage router" in loopback
     assert unreachable.endswith("it listens on tcp/192.0.2.7:7447, which cannot be reached from here")
-    assert nobody == "nobody here sees generation yet; waiting"
+    assert nobody == "nobody here sees generation; waiting"
     assert told([Unseen("control", ("realizer",))]) == [
         "control cannot be seen from here, though realizer can see it: it is a client of a router that this process"
         " has no link to"
@@ -131,7 +131,7 @@ def test_on_one_machine_who_is_not_in_sight_is_only_slow() -> None:
     control = status("control", "realizer", host="here", realizer="tcp/127.0.0.1:41111")
 
     assert told(unseen(["realizer"], [control], "here")) == [
-        "realizer is not in sight yet, though control can see it; waiting"
+        "realizer is not in sight, though control can see it; waiting"
     ]
     (elsewhere,) = told(unseen(["realizer"], [control], "there"))
     assert "127.0.0.1 only" in elsewhere

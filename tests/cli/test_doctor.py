@@ -75,7 +75,12 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
         "robot",
         "no service of this robot is on the bus; there are: melvin",
     ),
-    "a service is missing": (well(known=without("realizer")), "wrong", "realizer", "nobody sees this service"),
+    "a service is missing": (
+        well(known=without("realizer")),
+        "wrong",
+        "realizer",
+        "nobody sees this service: it has ended, stands still, or is cut off",
+    ),
     "another protocol": (well(protocols=(keys.PREFIX, "engage/v9")), "wrong", "robot", "somebody speaks engage/v9"),
     "a path is cut": (
         hidden("tcp/10.0.0.3:7448"),
@@ -237,6 +242,22 @@ def test_the_matrix_has_a_row_for_each_that_answers_and_a_column_for_all() -> No
     assert cells[HERE, "watch-1"].trip == 0.004
     silent = well(known=(*without("control"), Known(name="control")))
     assert {cell.sees for cell in matrix(silent) if cell.viewer == "control"} == {"unknown", "itself"}
+
+
+def test_services_need_to_see_their_clients_and_no_observer_whatever_its_name_is() -> None:
+    """With keys `up` is an observer, and without them a client."""
+    up, client, simulation = (
+        Known(name="up-1234abcd", part="observer", answers=False),
+        Known(name="up-5678abcd", part="client", answers=False),
+        known("simulation"),
+    )
+    facts = well(known=(*without("simulation"), simulation, up, client))
+    cells = {(cell.viewer, cell.other): cell.sees for cell in matrix(facts)}
+
+    assert {cells[name, up.name] for name in NAMES} == {"needless"}
+    assert {cells[name, client.name] for name in keys.SERVICES} == {"no"}
+    assert cells["simulation", client.name] == "needless"
+    assert [each.where for each in findings(facts)] == [client.name]
 
 
 @pytest.mark.parametrize("width", [60, 80, 120, 200])

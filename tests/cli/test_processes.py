@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.process import UNREADY
 from engage_hri.services.commandline.roster import NAMES, ROBOT
 from tests.bus.places import free_endpoint
@@ -335,9 +336,10 @@ async def test_playing_to_nobody_fails_readably(endpoint: str, tmp_path: Path, t
     (tmp_path / "it.xml").write_text(text)
     (tmp_path / "it-again.xml").write_text(text)
     files = (tmp_path / "it.xml", tmp_path / "it-again.xml")
-    play = await start("play", "--robot", "nobody", "--connect", endpoint, *files)
-    async with asyncio.timeout(PATIENCE):
-        _, err = await play.communicate()
+    async with await open_hub("somebody", listen=[endpoint]):
+        play = await start("play", "--robot", "nobody", "--connect", endpoint, *files)
+        async with asyncio.timeout(PATIENCE):
+            _, err = await play.communicate()
 
     assert play.returncode == 3
     assert b"is %s running?" % server in err

@@ -4,14 +4,17 @@ import asyncio
 import re
 from asyncio.subprocess import Process
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import connect
+from engage_hri.services.commandline import condition, fault, play, steer
+from engage_hri.services.commandline.process import UNREADY
 from tests.bus.places import free_endpoint
-from tests.cli.command import start
+from tests.cli.command import GOOD_BLOCK, Engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped
 from tests.realizer.fake_body import FakeBody
 
@@ -23,6 +26,26 @@ async def said(process: Process) -> tuple[int, str, str]:
     out, err = await asyncio.wait_for(process.communicate(), PATIENCE)
     assert process.returncode is not None
     return process.returncode, out.decode().strip(), err.decode().strip()
+
+
+@pytest.mark.parametrize("module", [condition, fault, play, steer], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    ("mode", "reason"), [("auto", "no process answers at {}"), ("client", "no router answers at {}")]
+)
+def test_who_asks_a_running_robot_once_names_what_cannot_be_reached_and_may_try_again(
+    engage: Engage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: ModuleType, mode: str, reason: str
+) -> None:
+    monkeypatch.setattr(module, "PATIENCE", 0.1)
+    endpoint, file = free_endpoint(), tmp_path / "block.xml"
+    file.write_text(GOOD_BLOCK)
+    name = module.__name__.rpartition(".")[2]
+    asked: dict[str, list[object]] = {"condition": ["a"], "fault": ["list"], "play": [file], "steer": ["hold"]}
+
+    told = engage(name, *asked[name], "--connect", endpoint, "--mode", mode)
+
+    assert (told.code, told.out) == (UNREADY, "")
+    (line,) = told.err.splitlines()
+    assert line.startswith(reason.format(endpoint))
 
 
 async def test_a_robot_is_held_goes_on_and_is_stopped_from_the_command_line() -> None:

@@ -83,5 +83,5 @@ async def test_a_peer_that_nobody_can_reach_is_named_with_the_reason(tmp_path: P
         realizer = await engage(one, "run", "realizer", "--connect", address, "--mode", "peer")
         await until(realizer, "realizer is ready")
         generation = await engage(two, "run", "generation", "--connect", address, "--mode", "peer")
-        told = await until(generation, "nobody here sees recognition yet")
+        told = await until(generation, "nobody here sees recognition")
         assert "realizer cannot be seen from here, though control can see it: it listens on 127.0.0.1 only" in told

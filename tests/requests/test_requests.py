@@ -110,6 +110,29 @@ async def test_a_refusal_ends_both_futures_with_the_servers_fault(hub: MemoryHub
                 await future
 
 
+async def test_an_answer_that_is_given_again_has_one_line_in_the_log(
+    hub: MemoryHub, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("WARNING", logger="engage.realizer")
+    server, client = hub.join("realizer"), hub.join("client")
+    desk = RequestDesk(server, "realizer", lambda cancel: None)
+    inbox = server.subscribe(*RequestDesk.patterns("realizer"))
+    answers = client.subscribe(keys.request_state("realizer"))
+    for _ in range(3):
+        command(client, keys.BLOCK, block())
+        received = await inbox.next()
+        assert received is not None
+        if desk.take(received) is not None:
+            desk.refuse("b", Fault(reason="no such target"))
+        answer = await answers.next()
+        assert answer is not None
+        assert isinstance(answer.message, Refused)
+
+    assert [record.message for record in caplog.records] == [
+        "refused perform_block b of client: no such target",
+    ]
+
+
 async def test_a_cancelled_request_ends_as_interrupted(hub: MemoryHub):
     server = Server(hub)
     async with Requester(hub.join("client")) as requests:

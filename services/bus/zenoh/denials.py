@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
-from engage_hri.schemas.limits import LONGEST_KEY, MOST_MESSAGES, MOST_QUESTIONS
+from engage_hri.schemas.limits import LONGEST_KEY, MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.often import is_told
 
@@ -38,6 +38,8 @@ _ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$"
 _NOBODY = re.compile(r"\b(?P<zid>[0-9a-f]++) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
 _TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
+_PACING = b"::downsampling"
+"""The same part of Zenoh in a line: it drops a message that follows another too soon, though there may be few."""
 _DROPPED = b"Msg intercepted!"
 """Last line about any message that is dropped, whatever the reason. It names nobody."""
 _INGRESS = re.compile(rb"(Put|Query) \(ingress\)")
@@ -72,8 +74,8 @@ class Denials:
         self._before = b""
         """The last line."""
         self._second = b""
-        self._sent: Counter[tuple[bytes, bytes]] = Counter()
-        """Numbers of what each process has sent in this second of the log, by kind."""
+        self._sent: Counter[int] = Counter()
+        """Numbers of what each process has sent in this second of the log, by hashes of its id with kind or key."""
 
     def feed(self, line: bytes) -> bool:
         """Take a line of the log. Returns whether it shows that the router takes in something new.
@@ -87,7 +89,10 @@ class Denials:
             if b" is authorized to " in before:
                 self._drop(before, line)
             return False
-        if not self._caching and b"caching permissions" not in line and self._is_known(line):
+        if line.startswith(_PACING, (after := line.find(_AFTER)) + len(_AFTER)):
+            if not self._exceeds(hash(line[after:]), line, MOST_PULSES):
+                return False
+        elif not self._caching and b"caching permissions" not in line and self._is_known(line):
             return False  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
         if (level := _LEVEL.match(text)) is None:
@@ -101,7 +106,7 @@ class Denials:
         elif (many := _TOO_MANY.search(text)) is not None:
             who = next((name for zid, name in self._names.items() if zid.startswith(many["zid"])), "somebody")
             news = f"dropped: {who} sends more on {many['key']} than may come in a second"
-            self._remember(line, self._say(news, f"of what {who} does"))
+            self._say(news, f"of what {who} does")
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
         elif (nobody := _NOBODY.search(text)) is not None:
@@ -126,23 +131,27 @@ class Denials:
             if (said := _WHO.search(line)) is None or said[1] not in self._zids:
                 return False
             if (what := _INGRESS.search(line)) is not None:
-                self._sends(said[1], what[1], line[: line.find(b".")])
+                self._sends(said[1], what[1], line)
             return line.count(b"$*") <= WILD
         if (kind := self._kind_of.get(line[line.find(_AFTER) :])) is None:
             return False
         self._told_again(kind)
         return True
 
-    def _sends(self, zid: bytes, what: bytes, second: bytes) -> None:
+    def _sends(self, zid: bytes, what: bytes, line: bytes) -> None:
         """Count what is allowed, and tell of a process that sends more of it in a second than any of ours does."""
-        if second != self._second:
-            self._second = second
-            self._sent.clear()
-        self._sent[zid, what] += 1
         most, words = _MANY[what]
-        if self._sent[zid, what] == most + 1:
+        if self._exceeds(hash((zid, what)), line, most):
             who = self._names[zid.decode()]
             self._say(f"many: {who} sends more than {most} {words} in a second", f"of what {who} does")
+
+    def _exceeds(self, what: int, line: bytes, most: int) -> bool:
+        """Count it; true at the first that is more than that in the second in which this line was logged."""
+        if (second := line[: line.find(b".")]) != self._second:
+            self._second = second
+            self._sent.clear()
+        self._sent[what] += 1
+        return self._sent[what] == most + 1
 
     def _drop(self, before: bytes, line: bytes) -> None:
         """Tell what was dropped though a rule allows it: it is too large. before: what was said of it on that thread.

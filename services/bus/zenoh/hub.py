@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from itertools import count
+from math import inf
 from typing import Any, TypeVar
 
 import msgspec
@@ -54,6 +55,8 @@ OPENING: Seconds = 0.5
 """Time that `open_hub` waits for the first other process: one that leaves before is heard by nobody."""
 ASK_AGAIN: Seconds = 0.5
 """Time without an answer after which a question is asked once more."""
+POLL: Seconds = 0.05
+"""Time between two looks for a first link."""
 VACANCY: Seconds = 4.0
 """Time that a dead participant may seem to be there: the lease of a silent link, and as long again."""
 Reader = TypeVar("Reader", Subscription, Tap)
@@ -70,23 +73,26 @@ async def open_hub(
     rendezvous: str | None = RENDEZVOUS,
     keys: Keys | None = None,
     beside: "Hub | None" = None,
+    patience: Seconds = inf,
 ) -> "ZenohHub":
     """Join the bus of `robot`. Processes may start in any order: this waits for others for `OPENING` at most.
 
-    A client waits for a router for as long as it takes.
+    A client waits for a router, at most for `patience`.
 
     connect, listen: Zenoh endpoints (`tcp/HOST:PORT`). Without any, the processes of this machine find one another
     at `rendezvous`. keys: those of this process; it is then a client of a router, with its holder's role and name.
     beside: a hub of this process, on Zenoh too: its participants and those of the new one hear each other in memory.
-    Raises InputRefused when an endpoint is misspelled or does not go with the keys, RunFailed when it is taken.
+    Raises InputRefused when an endpoint is misspelled or does not go with the keys, RunFailed when it is taken,
+    NotReady when patience has an end and there is no link to anybody by then.
     """
+    until = asyncio.get_running_loop().time() + patience
     if keys is not None:
         connect = connect or (ROUTER_WITH_KEYS,)
         check_keys(keys, robot, connect, listen, mode)
     # Both block the loop for a moment, before its work has started: Zenoh has no async API, and we start no thread.
     places: tuple[str, ...] = ()
     if keys is not None or mode_of(mode, connect, listen) == "client":
-        session, calls = await open_client(robot, connect, keys), True
+        session, calls = await open_client(robot, connect, keys, patience), True
     else:
         session, calls = open_session(robot, connect, listen, None if connect or listen else rendezvous)
         places = tuple(listen) or (LOOPBACK,)
@@ -100,6 +106,11 @@ async def open_hub(
     hub = ZenohHub(robot, session, places, rights, link, beside if isinstance(beside, ZenohHub) else None)
     if calls and beside is None:
         await hub.peers.wait_for_discovery(asyncio.get_running_loop().time() + OPENING)
+    if patience < inf and not await hub.is_linked(until):
+        await hub.close()
+        reason = f"no process answers at {', '.join(connect or [rendezvous or ''])}"
+        advice = "`engage up` starts a robot; --connect has the endpoint of one that runs, or of its router"
+        raise NotReady(Fault(reason=reason, advice=advice))
     return hub
 
 
@@ -157,6 +168,13 @@ class ZenohHub(Hub):
     @property
     def unlinked_at(self) -> Seconds:
         return self._links.unlinked_at
+
+    async def is_linked(self, until: Seconds) -> bool:
+        """Tell whether there is a link to another process; waits for one until then."""
+        info: Any = self.session.info
+        while not info.links() and self._loop.time() < until:
+            await self.peers.change(self._loop.time() + POLL)
+        return bool(info.links())
 
     @property
     def health(self) -> BusHealth:

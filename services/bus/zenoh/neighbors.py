@@ -147,7 +147,7 @@ def told(missing: Sequence[Unseen]) -> list[str]:
         if not seen_by:
             continue
         if is_near and any(map(is_on_this_machine, places)):
-            lines.append(f"{name} is not in sight yet, though {', '.join(seen_by)} can see it; waiting")
+            lines.append(f"{name} is not in sight, though {', '.join(seen_by)} can see it; waiting")
             continue
         if places and all(map(is_on_this_machine, places)):
             why = f"it listens on {', '.join(_host(place) for place in places)} only; {REMEDY}"
@@ -157,7 +157,7 @@ def told(missing: Sequence[Unseen]) -> list[str]:
             why = "it is a client of a router that this process has no link to"
         lines.append(f"{name} cannot be seen from here, though {', '.join(seen_by)} can see it: {why}")
     if nowhere := [each.name for each in missing if not each.seen_by]:
-        lines.append(f"nobody here sees {', '.join(nowhere)} yet; waiting")
+        lines.append(f"nobody here sees {', '.join(nowhere)}; waiting")
     return lines
 
 

@@ -8,6 +8,7 @@ import zenoh
 from engage_hri.schemas import access
 from engage_hri.schemas.access import Does, Holder, owned
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.keys import SERVICES
 from engage_hri.services.bus.config import Mode, is_encrypted
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
@@ -32,7 +33,7 @@ class Rights:
         """Raise InputRefused for what the router would drop. name: of the participant that does it."""
         if not _is_granted(self.holder.role, name, does, key):
             reason = f"the keys of {self.holder.common_name} do not let it {_DOING[does]} {key}"
-            raise InputRefused(Fault(reason=reason, where=name, advice="schemas/access.py has who may do what"))
+            raise InputRefused(Fault(reason=reason, where=name, advice=f"{_who_may(name, does, key)} may"))
 
     def trusts(self, run: str, key: str, source: str) -> bool:
         """Tell whether a message on this key can be from this process; tells of one that is forged in the log."""
@@ -60,6 +61,19 @@ def check_keys(keys: Keys, robot: str, connect: Sequence[str], listen: Sequence[
         raise InputRefused(Fault(reason=reason, where=where, advice="leave --listen and --mode out"))
     if plain := [each for each in connect if not is_encrypted(each)]:
         raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=where, advice="tls/HOST:PORT"))
+
+
+def _who_may(name: str, does: Does, key: str) -> str:
+    """Name the roles that may do what was refused. In the key of a command the role is that of its sender."""
+    chunks = key.split("/")
+    roles = []
+    for role in access.ROLES:
+        if chunks[2:3] == ["cmd"] and does == "publishes":
+            chunks[4] = role
+        if _is_granted(role, name, does, "/".join(chunks)):
+            article = "" if role in (*SERVICES, "perception") else "an " if role[0] in "aeiou" else "a "
+            roles.append(f"{article}{role}")
+    return " or ".join(roles) or "nobody"
 
 
 @lru_cache(4096)  # asked for every message

@@ -6,6 +6,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from math import inf
 from random import uniform
 from secrets import token_hex
 from typing import Any
@@ -14,7 +15,7 @@ import zenoh
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import ADVICE, ENDPOINT, is_encrypted, is_endpoint, is_on_this_machine
 from engage_hri.services.bus.interface import LOG
@@ -114,22 +115,30 @@ def open_session(
         raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=ADVICE)) from error
 
 
-async def open_client(robot: str, connect: Sequence[str], keys: Keys | None = None) -> zenoh.Session:
+async def open_client(
+    robot: str, connect: Sequence[str], keys: Keys | None = None, patience: Seconds = inf
+) -> zenoh.Session:
     """Open a session as a client of the first of these routers that answers. Waits for one, and says so in the log.
 
-    keys: those of this process; None: the link is open. Raises InputRefused when an endpoint is misspelled.
+    keys: those of this process; None: the link is open. Raises InputRefused when an endpoint is misspelled, NotReady
+    when no router has answered within `patience`.
     """
     _check(*connect)
     loop = asyncio.get_running_loop()
-    tell_at = loop.time() + TELL_AFTER
+    tell_at, until = (loop.time() + each for each in (TELL_AFTER, patience))
+    if patience < inf:
+        tell_at = inf  # it is told at the end
     pause, longest = TRY_AGAIN
     more = {} if keys is None else {**encrypted(keys), "id": f"{keys.holder.mark}{token_hex(12)}"}
     while True:
         try:
             return zenoh.open(_config(robot, connect, (), "client", more))
-        except zenoh.ZError:
+        except zenoh.ZError as error:
+            if loop.time() > until:
+                reason, advice = await _why_no_link(connect, keys is not None)
+                raise NotReady(Fault(reason=reason, advice=advice)) from error
             if loop.time() > tell_at:
-                tell_at = float("inf")
+                tell_at = inf
                 LOG.warning("%s; waiting (%s)", *await _why_no_link(connect, keys is not None))
         await asyncio.sleep(pause * uniform(0.5, 1.0))
         pause = min(2 * pause, longest)
