@@ -33,6 +33,8 @@ def opened(path: Path) -> "Recording":
             f"{path}: its end is missing or damaged; {len(recording)} messages until {recording.duration:.2f} s"
             f" are whole{behind}"
         )
+    if (there := recording.another) is not None:
+        complain(f"{path}: another recording begins at byte {there}, and is not read")
     for place in recording.damaged:
         complain(f"{path}: damaged at byte {place.offset}: {place.reason}")
     if recording.losses.total:

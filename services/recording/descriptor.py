@@ -20,13 +20,18 @@ def opened(path: Path, *, overwrite: bool = False) -> int:
     """
     file = os.open(path, FLAGS | (0 if overwrite else os.O_EXCL), 0o644)
     try:
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock(file)
         os.ftruncate(file, 0)
     except OSError:
         os.close(file)
         raise
     return file
+
+
+def lock(file: int) -> None:
+    """Keep others from writing the file until it is closed. Raises BlockingIOError: somebody writes it now."""
+    if fcntl is not None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def is_removed(file: int) -> bool:

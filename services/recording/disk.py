@@ -198,11 +198,15 @@ def read(path: Path) -> Recording:
 def repair(path: Path) -> int:
     """Cut off what is no whole record, and write the end that is missing. Returns the bytes that were cut off.
 
-    Raises InputRefused: it is no recording, or cannot be written.
+    Raises InputRefused: it is no recording, somebody writes it, it cannot be written, or another one is behind it.
     """
     recording = read(path)
     if recording.is_whole:
         return 0
+    if (there := recording.another) is not None:
+        reason = f"another recording begins at byte {there}, and would be cut off"
+        advice = f"part them: `head -c {there} FILE > FIRST`, `tail -c +{there + 1} FILE > SECOND`"
+        raise InputRefused(Fault(reason=reason, where=str(path), advice=advice))
     contents, until, tail = recording.contents, recording.end, b""
     if contents.chunks:
         last, indexes = contents.chunks[-1], recording.indexes(len(contents.chunks) - 1)
@@ -217,12 +221,17 @@ def repair(path: Path) -> int:
     channels, chunks = map(written, contents.channels), map(written, contents.chunks)
     try:
         with path.open("r+b") as file:
+            descriptor.lock(file.fileno())
             file.truncate(until)
             file.seek(until)
             file.write(tail)
             file.writelines(end(contents, channels, chunks, until + len(tail), checksum))
             file.flush()
             os.fsync(file.fileno())
+    except BlockingIOError as error:
+        raise InputRefused(
+            Fault(reason="a recorder writes it now", where=str(path), advice="end it first")
+        ) from error
     except OSError as error:
         raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
     return recording.lost_bytes

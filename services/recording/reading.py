@@ -260,11 +260,12 @@ class Recording:
         while at + _HEAD.size <= until:
             opcode, length = _HEAD.unpack_from(data, at)
             end = at + _HEAD.size + length
-            if opcode == Opcode.DATA_END and end == at + _DATA_END:
+            is_end = opcode == Opcode.DATA_END and end == at + _DATA_END
+            if is_end and not self.is_whole:
                 break
             try:
-                if end > until:
-                    raise ValueError("no record is here")
+                if end > until or is_end:
+                    raise ValueError("the data does not end here" if is_end else "no record is here")
                 self._take(opcode, data[at + _HEAD.size : end], at, end)
                 at = good = end
             except _BAD as error:
@@ -328,6 +329,12 @@ class Recording:
         if times and wall != self.facts.get("wall", ""):
             self.facts = {**self.facts, "wall": wall}
             self._damage(0, "the time of its beginning is damaged")
+
+    @property
+    def another(self) -> int | None:
+        """Place behind this recording at which another one begins, of which nothing is read; None: there is none."""
+        found = self._data.find(MCAP0_MAGIC + bytes([Opcode.HEADER]), max(self.end, 1))
+        return None if found < 0 else found
 
     def _damage(self, at: int, reason: str) -> None:
         self._indexed = None

@@ -2,18 +2,22 @@
 
 import io
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.recording import reading
+from engage_hri.services.recording.descriptor import opened
 from engage_hri.services.recording.disk import read, repair
 from engage_hri.services.recording.reading import Recording
 from tests.recording.files import FACTS, WALL, all_of, bytes_of, nanoseconds, sample, saved
@@ -233,3 +237,54 @@ def test_a_chunk_is_read_up_to_the_largest_size_and_no_larger_one_is_unpacked(
     assert all_of(Recording(data)) == told()
     monkeypatch.setattr(reading, "LARGEST_CHUNK", chunk.uncompressed_size - 1)
     assert f"a chunk says that it has {chunk.uncompressed_size} bytes" in " ".join(map(str, Recording(data).damaged))
+
+
+def test_a_repair_never_cuts_off_another_recording_and_says_where_it_begins(tmp_path: Path) -> None:
+    whole = bytes_of(told())
+    for first in (whole, whole[:-3], bytes_of(told(), is_whole=False)):
+        path = tmp_path / f"{len(first)}.mcap"
+        path.write_bytes(first + whole)
+
+        with pytest.raises(InputRefused, match=f"another recording begins at byte {len(first)}"):
+            repair(path)
+
+        assert path.read_bytes() == first + whole
+        assert read(path).another == len(first)
+    assert Recording(whole).another is None
+
+
+def test_a_recording_that_is_written_now_is_not_repaired(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(b"")
+    file = opened(path, overwrite=True)
+    os.write(file, bytes_of(told(), is_whole=False))
+    with pytest.raises(InputRefused, match="a recorder writes it now"):
+        repair(path)
+    os.close(file)
+
+    assert repair(path) == 0
+    assert read(path).is_whole
+
+
+def test_an_end_of_the_data_in_its_middle_is_damage_and_all_behind_it_is_read() -> None:
+    whole = bytes_of(told())
+    second = Recording(whole).contents.chunks[1].chunk_start_offset
+    assert second
+    records, at = [], len(MCAP0_MAGIC)
+    while at < len(whole) - len(MCAP0_MAGIC):
+        length = 9 + int.from_bytes(whole[at + 1 : at + 9], "little")
+        records.append((at, whole[at : at + length]))
+        at += length
+    end = next(record for _, record in records if record[0] == Opcode.DATA_END)
+    # In place of the indexes behind the first chunk, so that nothing moves.
+    index, old = next((place, record) for place, record in records if record[0] == Opcode.MESSAGE_INDEX)
+    filler = len(old) - len(end) - 9
+    data = (
+        whole[:index] + end + bytes([0x80]) + filler.to_bytes(8, "little") + bytes(filler) + whole[index + len(old) :]
+    )
+
+    recording = Recording(data)
+
+    assert recording.is_whole
+    assert all_of(recording) == all_of(Recording(whole))
+    assert any("the data does not end here" in each.reason for each in recording.damaged)
