@@ -208,7 +208,8 @@ class Bus(ABC):
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         """Queue all messages of these key expressions. Past ones come first, as the class of each key says.
 
-        A pattern of class `alive` delivers `PeerAlive` for all participants that are there, then every change.
+        A pattern of class `alive` delivers `PeerAlive` for all participants that are there, then every change. It is
+        over at once if this participant has left the bus.
         """
 
     @abstractmethod

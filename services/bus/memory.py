@@ -293,7 +293,9 @@ class MemoryBus(Bus):
 
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         subscription = Subscription(patterns, keep, capacity, self._drop)
-        if not self._gone:
+        if self._gone:
+            subscription.close()
+        else:
             self._subscriptions[subscription] = self._hub.replay(self.name, subscription)
             self._wanting.clear()
         return subscription
@@ -311,7 +313,9 @@ class MemoryBus(Bus):
 
     def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
         tap = Tap(patterns, capacity, self._drop_tap)
-        if not self._gone:
+        if self._gone:
+            tap.close()
+        else:
             self._taps[tap] = self._hub.replay(self.name, tap)
         return tap
 

@@ -350,3 +350,13 @@ async def test_closing_leaves_no_task_and_no_thread(place: Place):
     assert {*threading.enumerate()} <= before
     while await inbox.next() is not None:
         pass
+
+
+async def test_a_subscription_of_who_has_left_is_over_at_once(place: Place):
+    hub = await place.process()
+    here = hub.join("here")
+    await here.leave()
+
+    for inbox in (here.subscribe(keys.ANY_FAULT), here.tap(keys.ANY_FAULT)):
+        assert await inbox.next() is None
+        assert inbox.is_over

@@ -1,7 +1,7 @@
 """Who has too many links or tokens at a router: counted by certificate, cut at the bound, let in again later."""
 
 from engage_hri.schemas.access import Holder
-from engage_hri.services.bus.zenoh.crowd import BANNED, MOST_LINKS, MOST_TOKENS, Crowd, Link
+from engage_hri.services.bus.zenoh.crowd import BANNED, MOST_LINKS, MOST_TOKENS, MOST_UNREAD, Crowd, Link
 
 ALICE = Holder(robot="robot", role="manager", name="alice")
 BOB = Holder(robot="robot", role="manager", name="bob")
@@ -78,3 +78,49 @@ def test_without_keys_tokens_are_counted_by_process_and_links_not_at_all() -> No
 
     assert "process 7" in line
     assert ended == (link(None, 7),)
+
+
+def test_a_certificate_whose_tokens_name_more_processes_than_it_may_have_links_is_cut() -> None:
+    crowd = Crowd((ALICE, BOB))
+    crowd.came(link(ALICE, 0), 0.0)
+    for number in range(3 * MOST_LINKS):
+        assert crowd.shown(f"{ALICE.mark}{number}", f"token-{number}", 0.0) == ("", ())
+        crowd.withdrawn(f"{ALICE.mark}{number}", f"token-{number}")
+        crowd.withdrawn(f"{ALICE.mark}{number}", f"token-{number}")
+    for number in range(MOST_LINKS):
+        for what in ("alive", "log"):
+            assert crowd.shown(f"{ALICE.mark}{number}", f"{what}-{number}", 0.0) == ("", ())
+
+    line, ended = crowd.shown(f"{ALICE.mark}one more", "of no process", 0.0)
+
+    assert f"{ALICE.common_name} has more than {MOST_LINKS} processes" in line
+    assert ended == (link(ALICE, 0),)
+    assert crowd.shown(f"{BOB.mark}0", "another's", 0.0) == ("", ())
+
+
+def test_links_that_are_not_read_end_and_so_do_all_of_a_certificate_that_has_many_of_them_within_a_while() -> None:
+    crowd = Crowd((ALICE, BOB))
+    for number in range(MOST_UNREAD + 2):
+        crowd.came(link(ALICE, number), 0.0)
+    for number in range(MOST_UNREAD):
+        line, ended = crowd.unread(link(ALICE, number), float(number))
+        assert line.startswith(f"not read: {ALICE.common_name}")
+        assert ended == (link(ALICE, number),)
+        assert crowd.unread(link(ALICE, number), float(number)) == ("", ended), "it is told once"
+        crowd.went(link(ALICE, number))
+    assert crowd.unread(link(BOB, 0), 3.0)[1] == (link(BOB, 0),)
+
+    line, ended = crowd.unread(link(ALICE, MOST_UNREAD), 5.0)
+
+    assert f"{ALICE.common_name} has more than {MOST_UNREAD} links that are not read" in line
+    assert {*ended} == {link(ALICE, MOST_UNREAD), link(ALICE, MOST_UNREAD + 1)}
+
+
+def test_links_that_are_not_read_are_forgotten_after_a_while_and_without_keys_only_they_end() -> None:
+    crowd = Crowd()
+    for number in range(3 * MOST_UNREAD):
+        one = link(None, number)
+        assert crowd.unread(one, 0.0) == (f"not read: process {one.zid} reads nothing; its link ends", (one,))
+    kept = Crowd((ALICE,))
+    for number in range(3 * MOST_UNREAD):
+        assert kept.unread(link(ALICE, number), number * BANNED / MOST_UNREAD)[0].startswith("not read: ")

@@ -9,7 +9,7 @@ import zenoh
 from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.session import open_session
-from engage_hri.services.bus.zenoh.volume import EXCUSED, Volume, Volumes, volumes
+from engage_hri.services.bus.zenoh.volume import EXCUSED, FULL, UNREAD, Unread, Volume, Volumes, volumes
 from tests.bus.places import PATIENCE, free_endpoint
 
 NAMES = {"a": "robot/observer/viewer", "c": "robot/control/control"}
@@ -30,6 +30,21 @@ def test_who_answers_what_is_asked_of_it_is_not_loud() -> None:
     for second in range(1, 60):
         asked = second * 10 * LOUD["observer"]
         assert kept.look({"a": Volume(EXCUSED * asked, asked)}, NAMES, second) == []
+
+
+def test_a_full_link_of_which_nothing_is_read_is_to_end_and_one_that_is_read_slowly_is_not() -> None:
+    kept, step = Unread(), UNREAD / 3
+    ended = []
+    for look in range(10):
+        links = {
+            "frozen": Volume(0, taken=7, waiting=FULL),
+            "slow": Volume(0, taken=look // 2, waiting=FULL),
+            "idle": Volume(0, taken=7, waiting=FULL - 1),
+            "pauses": Volume(0, taken=7, waiting=FULL if look % 3 else 0),
+        }
+        ended.append(kept.look(links, look * step))
+    assert ended == [[]] * 3 + [["frozen"]] * 7
+    assert kept.look({"frozen": Volume(0, taken=8, waiting=FULL)}, 10 * step) == []
 
 
 @pytest.mark.real_time

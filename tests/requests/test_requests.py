@@ -11,7 +11,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Refused, Request
 from engage_hri.services.bus.interface import Received
@@ -64,6 +64,17 @@ async def test_a_requester_subscribes_with_its_first_request_and_knows_then_whic
     assert subscribed == [Requester.PATTERNS]
     assert server.taken == [block("b"), block("c")]
     await server.die(hub)
+
+
+async def test_a_first_request_of_who_has_left_the_bus_ends_at_once(hub: MemoryHub):
+    client = hub.join("client")
+    async with Requester(client) as requests:
+        await client.leave()
+
+        pending = requests.send(keys.BLOCK, block())
+
+        with pytest.raises(EngageError, match="it has left the bus"):
+            await pending.outcome
 
 
 async def test_a_server_that_comes_late_gets_the_request_at_once_and_once(hub: MemoryHub):

@@ -1,9 +1,11 @@
-"""Bounds of what one holder may take of a router: links and tokens are counted; who has too many is cut. Pure.
+"""Bounds of what one holder may take of a router: who has too many links, tokens or processes is cut. Pure.
 
 Zenoh bounds neither for one holder: a thousand links leave no place for others, and with the number of tokens of one
-link the time grows that each further one costs (measured: 5000 tokens 0.5 s of processor, 20,000 tokens 20 s).
+link the time grows that each further one costs (measured: 5000 tokens 0.5 s of processor, 20,000 tokens 20 s). A
+token can name a process that is none, and whoever reads what that is said to publish asks it in vain again and again.
 """
 
+from collections import Counter
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -11,9 +13,12 @@ from engage_hri.schemas.access import Holder
 from engage_hri.schemas.units import Seconds
 
 MOST_LINKS = 100
-"""Links of one certificate."""
+"""Links of one certificate, and processes that its tokens name."""
 MOST_TOKENS = 1000
 """Tokens of one certificate; without keys, of one process. A process of ours has some three, and a robot a dozen."""
+MOST_UNREAD = 3
+"""Links of one certificate that may be ended within `BANNED` because nobody reads them. Each halts others for half a
+second."""
 BANNED: Seconds = 30.0
 """Time in which who had too many gets no new link."""
 
@@ -36,6 +41,10 @@ class Crowd:
         self._marks = {holder.mark: holder.common_name for holder in holders}
         self._links: dict[str, set[Link]] = {}
         self._tokens: dict[str, set[str]] = {}
+        self._runs: dict[str, Counter[str]] = {}
+        """Number of tokens of each process."""
+        self._unread: dict[str, dict[Link, Seconds]] = {}
+        """When links of each were ended because nobody read them."""
         self._banned: dict[str, Seconds] = {}
         """Time until which each gets no link."""
 
@@ -56,20 +65,43 @@ class Crowd:
             if not own:
                 del self._links[who]
 
+    def unread(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
+        """Take a link that is full and not read; returns as `came`."""
+        who = _owner(link)
+        recent = {
+            each: {one: at for one, at in ended.items() if at > now - BANNED} for each, ended in self._unread.items()
+        }
+        self._unread = {each: ended for each, ended in recent.items() if ended}
+        own = self._unread.setdefault(who, {})
+        if link in own:  # it takes a while to end
+            return "", (link,)
+        own[link] = now
+        if link.name and len(own) > MOST_UNREAD:
+            line, links = self._too_many(who, "links that are not read", MOST_UNREAD, now)
+            return line, (*links, link)
+        return f"not read: {link.name or f'process {link.zid}'} reads nothing; its link ends", (link,)
+
     def shown(self, run: str, token: str, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a new token of the process with this id; returns as `came`."""
         who = self._holder(run)
-        own = self._tokens.setdefault(who, set())
-        own.add(token)
-        return self._too_many(who, "tokens", MOST_TOKENS, now) if len(own) > MOST_TOKENS else ("", ())
+        own, runs = self._tokens.setdefault(who, set()), self._runs.setdefault(who, Counter())
+        if token not in own:
+            own.add(token)
+            runs[run] += 1
+        if len(own) > MOST_TOKENS:
+            return self._too_many(who, "tokens", MOST_TOKENS, now)
+        return self._too_many(who, "processes", MOST_LINKS, now) if len(runs) > MOST_LINKS else ("", ())
 
     def withdrawn(self, run: str, token: str) -> None:
         """Take the end of a token."""
         who = self._holder(run)
-        if (own := self._tokens.get(who)) is not None:
-            own.discard(token)
-            if not own:
-                del self._tokens[who]
+        if token in self._tokens.get(who, ()):
+            self._tokens[who].remove(token)
+            self._runs[who][run] -= 1
+            if not self._runs[who][run]:
+                del self._runs[who][run]
+            if not self._tokens[who]:
+                del self._tokens[who], self._runs[who]
 
     def _holder(self, run: str) -> str:
         return next((name for mark, name in self._marks.items() if run.startswith(mark)), run)

@@ -354,6 +354,9 @@ class ZenohBus(Bus):
 
     def _attached(self, reader: Reader) -> Reader:
         """Attach a reader. Raises InputRefused for a pattern that the keys do not allow."""
+        if self._gone:
+            reader.close()
+            return reader
         if self._hub.rights is not None:
             for pattern in reader.patterns:
                 self._hub.rights.check(self.name, "subscribes", pattern)

@@ -26,8 +26,9 @@ from engage_hri.services.bus.zenoh.volume import Listening, place, sockets
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""
-TOGETHER: Seconds = 0.1
-"""Time in which links that are to be ended are gathered: to find them all sockets are looked at."""
+TOGETHER: Seconds = 0.01
+"""Time in which links that are to be ended are gathered, for all sockets are looked at. It is short: so long one who
+is kept out is heard."""
 SHOWN: Seconds = 1.0
 """Time after which it is shown again that something is served."""
 
@@ -83,7 +84,7 @@ async def routing(
         session = open_router(connect, listen, more)
         bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
         door = Door(session, bridge, Crowd(holders), tell, served)
-        listening = Listening(door.names, tell)
+        listening = Listening(door.names, tell, door.unread)
         try:
             yield Routing(session, bridge)
         finally:
@@ -107,6 +108,8 @@ class Door:
         """tell, served: see `routing`."""
         self.names: dict[str, str] = {}
         """Common names by the address at the other end of a link."""
+        self._links: dict[str, Link] = {}
+        """By that address as well."""
         self._crowd = crowd
         self._tell = tell
         self._served = served
@@ -146,12 +149,19 @@ class Door:
         zid, name, address = str(event.link.zid), event.link.auth_identifier or "", str(event.link.dst)
         link = Link(zid, name, address)
         if event.kind == zenoh.SampleKind.PUT:
+            self._links[place(address)] = link
             if name:
                 self.names[place(address)] = name
             self._keep_out(*self._crowd.came(link, self._loop.time()))
         else:
             self.names.pop(place(address), None)
+            self._links.pop(place(address), None)
             self._crowd.went(link)
+
+    def unread(self, where: str) -> None:
+        """End the link to this address, which is full and not read, unless that is on its way."""
+        if (link := self._links.get(where)) is not None and link not in self._ending:
+            self._keep_out(*self._crowd.unread(link, self._loop.time()))
 
     def _keep_out(self, line: str, links: Iterable[Link]) -> None:
         if line:

@@ -44,8 +44,9 @@ def paced(holders: Iterable[Holder]) -> list[dict[str, Any]]:
     Zenoh passes on one message in a span of time, and drops the next ones. So only what comes again has a rate.
     """
     rules = [
-        {"key_expr": f"{holder.robot}/{keys.own(f'{holder.mark}$*', 'pulse/*')}", "freq": float(MOST_PULSES)}
+        {"key_expr": f"{holder.robot}/{keys.own(f'{holder.mark}$*', f'pulse/{flow}')}", "freq": float(MOST_PULSES)}
         for holder in holders
         if holder.role != ROUTER
+        for flow in keys.FLOWS  # a process tells of both at once
     ]
     return [{"flows": ["ingress"], "messages": ["put"], "rules": rules}] if rules else []

@@ -1,13 +1,17 @@
-"""Bytes that each link brings to a router, from the kernel, and who is loud.
+"""Bytes that each link brings to a router and carries away, from the kernel: who is loud, and who reads nothing.
 
 Zenoh drops a message that is too large before it is whole, and says nothing of it; nor does it count. The router does
 not close the link of one who is loud (docs/decisions/0111-a-flood-is-told-and-not-cut.md).
+
+It ends the link of one who reads nothing. Zenoh would, but waits for the other side with its goodbye, and as long
+each further message for that link halts whoever sends it (docs/decisions/0135-a-link-that-is-not-read-is-ended.md).
 """
 
 import asyncio
 import os
 import socket
 import struct
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple
@@ -15,19 +19,29 @@ from typing import NamedTuple
 from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
 
-LOOK: Seconds = 1.0
-"""Time between two looks at the links."""
+LOOK: Seconds = 0.05
+"""Least time between two looks at the links."""
+SHARE = 0.02
+"""Most part of the time that looking takes: of a thousand links that is a look each half second."""
+SPAN: Seconds = 1.0
+"""Time over which their speed is taken."""
+FULL = 32_768
+"""Bytes that wait for a link to be read from which on it counts as full: a quarter of what may wait."""
+UNREAD: Seconds = 0.15
+"""Time without a byte that is read after which a full link is ended. Zenoh itself gives it 0.2 s (`STALL_US`)."""
 EXCUSED = 4
 """Bytes that a holder may send besides for each that it gets: who is asked much has to answer."""
 _COUNTS = 120
-"""Place of `tcpi_bytes_acked` and `tcpi_bytes_received` in the kernel's `struct tcp_info`."""
+"""Place of `tcpi_bytes_acked` and `tcpi_bytes_received` in the kernel's `struct tcp_info`, and after the numbers of
+segments `tcpi_notsent_bytes`."""
 
 
 class Volume(NamedTuple):
-    """Bytes that a link has brought since it opened, and that it has carried away."""
+    """Bytes that a link has brought since it opened, that it has carried away, and that wait for it to be read."""
 
     brought: int
     taken: int = 0
+    waiting: int = 0
 
 
 class Volumes:
@@ -43,7 +57,7 @@ class Volumes:
 
         names: common names of the other ends, by link.
         """
-        span, self._at = max(now - self._at, LOOK), now
+        span, self._at = max(now - self._at, SPAN), now
         speeds = {link: self._came(link, volume) / span for link, volume in volumes.items()}
         self._before = volumes
         loud = frozenset(link for link, speed in speeds.items() if speed > _bound(names.get(link, "")))
@@ -59,24 +73,52 @@ def _bound(name: str) -> int:
     return LOUD.get(name.split("/")[1], LOUD_ROBOT) if name else LOUD_ROBOT
 
 
-class Listening:
-    """Looks at the links of this process, and tells who is loud, until it is closed."""
+class Unread:
+    """Tells which links are full and are not read any more. Pure: time is an argument."""
 
-    def __init__(self, names: Mapping[str, str], tell: Callable[[str], None]) -> None:
-        """names: common names by the address at the other end of a link."""
+    def __init__(self) -> None:
+        self._since: dict[str, tuple[int, Seconds]] = {}
+        """For each full link, what it had carried away when that last grew, and when."""
+
+    def look(self, volumes: Mapping[str, Volume], now: Seconds) -> list[str]:
+        """Take the volumes of all links; returns those to end."""
+        before, self._since = self._since, {}
+        for link, volume in volumes.items():
+            if volume.waiting >= FULL:
+                taken, since = before.get(link, (volume.taken, now))
+                self._since[link] = (volume.taken, since if taken == volume.taken else now)
+        return [link for link, (_, since) in self._since.items() if now >= since + UNREAD]
+
+
+class Listening:
+    """Looks at the links of this process, and tells who is loud or reads nothing, until it is closed."""
+
+    def __init__(
+        self, names: Mapping[str, str], tell: Callable[[str], None], unread: Callable[[str], None] = lambda link: None
+    ) -> None:
+        """names: common names by the address at the other end of a link. unread: called with that of one to end."""
         self._names = names
         self._tell = tell
+        self._end = unread
         self._loop = asyncio.get_running_loop()
-        self._volumes = Volumes(self._loop.time())
+        self._volumes, self._unread = Volumes(self._loop.time()), Unread()
+        self._next = self._loop.time() + SPAN
         self._timer = self._loop.call_later(LOOK, self._look)
 
     def close(self) -> None:
         self._timer.cancel()
 
     def _look(self) -> None:
-        for line in self._volumes.look(volumes(), self._names, self._loop.time()):
-            self._tell(line)
-        self._timer = self._loop.call_later(LOOK, self._look)
+        began = time.perf_counter()
+        found, now = volumes(), self._loop.time()
+        for link in self._unread.look(found, now):
+            self._end(link)
+        if now >= self._next:
+            self._next = now + SPAN
+            for line in self._volumes.look(found, self._names, now):
+                self._tell(line)
+        took = time.perf_counter() - began
+        self._timer = self._loop.call_later(max(LOOK, took / SHARE), self._look)
 
 
 def place(endpoint: str) -> str:
@@ -89,9 +131,9 @@ def volumes() -> dict[str, Volume]:
     found = {}
     for where, link in sockets():
         with suppress(OSError, AttributeError, struct.error):
-            told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _COUNTS + 16)
-            taken, brought = struct.unpack_from("QQ", told, _COUNTS)
-            found[where] = Volume(brought, taken)
+            told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _COUNTS + 28)
+            taken, brought, waiting = struct.unpack_from("QQ8xI", told, _COUNTS)
+            found[where] = Volume(brought, taken, waiting)
     return found
 
 
