@@ -116,11 +116,15 @@ def test_links_that_are_not_read_end_and_so_do_all_of_a_certificate_that_has_man
     assert {*ended} == {link(ALICE, MOST_UNREAD), link(ALICE, MOST_UNREAD + 1)}
 
 
-def test_links_that_are_not_read_are_forgotten_after_a_while_and_without_keys_only_they_end() -> None:
-    crowd = Crowd()
+def test_links_that_are_not_read_are_forgotten_after_a_while() -> None:
+    crowd = Crowd((ALICE,))
     for number in range(3 * MOST_UNREAD):
-        one = link(None, number)
-        assert crowd.unread(one, 0.0) == (f"not read: process {one.zid} reads nothing; its link ends", (one,))
-    kept = Crowd((ALICE,))
+        assert crowd.unread(link(ALICE, number), number * BANNED / MOST_UNREAD)[0].startswith("not read: ")
+
+
+def test_a_link_that_is_not_read_stays_if_it_is_a_service_or_nobody_can_know_whose_it_is() -> None:
+    control = Holder(robot="robot", role="control", name="control")
+    crowd = Crowd((ALICE, control))
     for number in range(3 * MOST_UNREAD):
-        assert kept.unread(link(ALICE, number), number * BANNED / MOST_UNREAD)[0].startswith("not read: ")
+        for holder in (control, None):
+            assert crowd.unread(link(holder, number), 0.0) == ("", ())

@@ -51,14 +51,20 @@ async def test_three_machines_with_a_router_in_any_order(tmp_path: Path) -> None
     block.write_text(BML)
     async with laboratory(tmp_path, seed=1) as lab:
         address = f"tcp/{lab.machines[1].ip}:7447"
-        waiting = await engage(lab.machines[3], "play", str(block), "--connect", address)
+        waiting = await engage(lab.machines[3], "watch", "--connect", address)
         await until(waiting, "no router answers at tcp/10.77.0.1:7447; waiting")
+        early = await engage(lab.machines[3], "play", str(block), "--connect", address)
+        told, _ = await asyncio.wait_for(early.communicate(), LONG)
+        assert early.returncode == 75, told.decode()
+        assert "no router answers at tcp/10.77.0.1:7447" in told.decode()
         router = await engage(lab.machines[1], "router", "--listen", f"tcp/{lab.machines[1].ip}:7447")
         await start(lab, "--connect", address)
         await until(router, "robot: realizer is here")
-        told, _ = await asyncio.wait_for(waiting.communicate(), LONG)
-        assert waiting.returncode == 0, told.decode()
+        play = await engage(lab.machines[3], "play", str(block), "--connect", address)
+        told, _ = await asyncio.wait_for(play.communicate(), LONG)
+        assert play.returncode == 0, told.decode()
         assert "block b1: done" in told.decode()
+        await until(waiting, "b1")
 
 
 async def test_three_machines_that_connect_to_one_service_that_listens(tmp_path: Path) -> None:

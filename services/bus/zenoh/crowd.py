@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from engage_hri.schemas.access import Holder
+from engage_hri.schemas.limits import LOUD
 from engage_hri.schemas.units import Seconds
 
 MOST_LINKS = 100
@@ -66,8 +67,13 @@ class Crowd:
                 del self._links[who]
 
     def unread(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
-        """Take a link that is full and not read; returns as `came`."""
+        """Take a link that is full and not read; returns as `came`.
+
+        A service keeps its link: it is there to be asked much. So do all without keys, for they may be services.
+        """
         who = _owner(link)
+        if not link.name or link.name.split("/")[1] not in LOUD:
+            return "", ()
         recent = {
             each: {one: at for one, at in ended.items() if at > now - BANNED} for each, ended in self._unread.items()
         }
@@ -76,10 +82,10 @@ class Crowd:
         if link in own:  # it takes a while to end
             return "", (link,)
         own[link] = now
-        if link.name and len(own) > MOST_UNREAD:
+        if len(own) > MOST_UNREAD:
             line, links = self._too_many(who, "links that are not read", MOST_UNREAD, now)
             return line, (*links, link)
-        return f"not read: {link.name or f'process {link.zid}'} reads nothing; its link ends", (link,)
+        return f"not read: {link.name} reads nothing; its link ends", (link,)
 
     def shown(self, run: str, token: str, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a new token of the process with this id; returns as `came`."""
