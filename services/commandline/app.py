@@ -33,7 +33,7 @@ COMMANDS = {
     "as they come.",
     "console": "Show a running robot in the browser: the scene in 3D, lanes of events and behaviors, the Petri net.",
     "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
-    "replay": "Play a recording on a bus, at any speed, to and fro. Exit 2 if a live robot of its name is there.",
+    "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is there.",
     "export": "Turn a recording into annotations (ELAN, Praat, CSV), or pictures of the scene.",
     "analyse": "Make the tables of a study of recordings of people, or recognize them once more (--again).",
     "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or everything. "

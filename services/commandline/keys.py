@@ -42,6 +42,17 @@ def main(options: Options) -> int:
     if find_spec("cryptography") is None:
         advice = f"{extra_command('keys')}; only the machine where keys are made needs it"
         raise InputRefused(Fault(reason="the package `cryptography` is missing", where="engage keys", advice=advice))
+    try:
+        return _done(options)
+    except OSError as error:
+        where, advice = (
+            str(error.filename or options.folder),
+            "FOLDER has to be a folder that can be read and written",
+        )
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
+
+
+def _done(options: Options) -> int:
     from engage_hri.services.commandline import certificates
 
     folder, named = options.folder, options.holders or []

@@ -35,6 +35,15 @@ def ring(engage: Engage, tmp_path: Path) -> Path:
     return tmp_path / "ring"
 
 
+@pytest.mark.parametrize("do", ["init", "add", "show"])
+def test_a_file_where_the_folder_should_be_is_told_in_words(engage: Engage, tmp_path: Path, do: str) -> None:
+    (tmp_path / "file").write_text("no folder")
+    ran = engage("keys", do, tmp_path / "file", *(["manager=bob"] if do == "add" else []))
+    assert ran.code == 2
+    assert str(tmp_path / "file") in ran.err
+    assert "Traceback" not in ran.err
+
+
 def test_init_gives_keys_to_all_that_a_robot_has(ring: Path) -> None:
     for name, role in {**PARTICIPANTS, "alice": "manager", "viewer": "observer", "router": "router"}.items():
         keys = read_keys(ring, name)
