@@ -1,6 +1,7 @@
 """Certificates of the holders of keys, and of the authority that gives them. Needs the package `cryptography`."""
 
 import os
+import re
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
@@ -30,6 +31,7 @@ EARLIER = timedelta(hours=1)
 AUTHORITY_DAYS = 3650
 HERE = ("localhost", "127.0.0.1", "::1")
 """Names and addresses of a router on the same machine."""
+_HOST = re.compile(r"[A-Za-z0-9_*]([A-Za-z0-9_.-]*[A-Za-z0-9_])?")
 
 
 class Shown(NamedTuple):
@@ -209,11 +211,15 @@ def _alternatives(hosts: Iterable[str]) -> x509.SubjectAlternativeName:
         try:
             names.append(x509.IPAddress(ip_address(host)))
         except ValueError:
-            try:
-                names.append(x509.DNSName(host))
-            except ValueError as error:
-                raise InputRefused(Fault(reason=f"{host!r} is no host", where="--host", advice=str(error))) from error
+            names.append(x509.DNSName(_checked_host(host)))
     return x509.SubjectAlternativeName(names)
+
+
+def _checked_host(host: str) -> str:
+    if _HOST.fullmatch(host):
+        return host
+    advice = "the name or the address under which the router is called, without a port"
+    raise InputRefused(Fault(reason=f"{host!r} is no host", where="--host", advice=advice))
 
 
 def _name(common_name: str) -> x509.Name:

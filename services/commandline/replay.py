@@ -48,6 +48,8 @@ class Options(Listening):
 
 def main(options: Options) -> int:
     recording = opened(options.file)
+    if options.at > recording.duration:
+        raise InputRefused(Fault(reason=f"the recording ends after {recording.duration:.2f} s", where="--at"))
     options = options if options.robot else replace(options, robot=recording.robot)
     config = options.read(RobotConfig, elsewhere=ELSEWHERE)
     if config.bus.keys:

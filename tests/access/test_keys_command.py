@@ -44,6 +44,15 @@ def test_a_file_where_the_folder_should_be_is_told_in_words(engage: Engage, tmp_
     assert "Traceback" not in ran.err
 
 
+@pytest.mark.parametrize("host", ["not a host!", "höhle", "a:7447", "-", ""])
+def test_a_host_that_can_be_none_is_refused_before_anything_is_made(
+    engage: Engage, tmp_path: Path, host: str
+) -> None:
+    ran = engage("keys", "init", tmp_path / "ring", "--host", host)
+    assert (ran.code, (tmp_path / "ring").exists()) == (2, False)
+    assert f"{host!r} is no host" in ran.err
+
+
 def test_init_gives_keys_to_all_that_a_robot_has(ring: Path) -> None:
     for name, role in {**PARTICIPANTS, "alice": "manager", "viewer": "observer", "router": "router"}.items():
         keys = read_keys(ring, name)

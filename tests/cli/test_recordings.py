@@ -100,6 +100,13 @@ def test_a_folder_that_is_read_only_and_a_file_that_is_there_are_refused(run: En
     assert (tmp_path / "a.mcap").read_text() == "mine"
 
 
+def test_a_replay_from_behind_the_end_is_refused_with_the_length(run: Engage, tmp_path: Path) -> None:
+    path = saved(tmp_path / "a.mcap", told())
+    result = run("replay", path, "--at", read(path).duration + 0.1)
+    assert result.code == 2
+    assert f"the recording ends after {read(path).duration:.2f} s" in result.err
+
+
 def test_without_the_library_its_extra_is_named(run: Engage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mcap.records", None)
 
