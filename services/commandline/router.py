@@ -98,13 +98,16 @@ async def _watch(options: Options) -> int:
 def _keys(options: Options) -> Keys | None:
     """Read the keys. Raises InputRefused if they are not a router's, or an endpoint does not go with them."""
     folder = bus_config(keys=str(options.keys or "")).keys
+    endpoints = (*options.listen, *(options.robot_listen or ()), *(options.connect or ()))
     if not folder:
+        if closed := [each for each in endpoints if is_encrypted(each)]:
+            advice = "--keys FOLDER names those that `engage keys` has made"
+            raise InputRefused(Fault(reason=f"{closed[0]!r} without keys", where="engage router", advice=advice))
         return None
     own = read_keys(folder, ROUTER)
     if own.holder.role != ROUTER:
         reason = f"these are the keys of {own.holder.common_name}, not of a router"
         raise InputRefused(Fault(reason=reason, where=str(own.folder)))
-    endpoints = (*options.listen, *(options.robot_listen or ()), *(options.connect or ()))
     if plain := [each for each in endpoints if not is_encrypted(each)]:
         raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=str(own.folder), advice="tls/HOST:PORT"))
     return own

@@ -53,6 +53,13 @@ def test_a_host_that_can_be_none_is_refused_before_anything_is_made(
     assert f"{host!r} is no host" in ran.err
 
 
+def test_a_router_at_an_encrypted_endpoint_without_keys_is_refused(engage: Engage) -> None:
+    ran = engage("router", "--listen", "tls/127.0.0.1:7448")
+    assert ran.code == 2
+    assert "'tls/127.0.0.1:7448' without keys" in ran.err
+    assert "--keys FOLDER" in ran.err
+
+
 def test_init_gives_keys_to_all_that_a_robot_has(ring: Path) -> None:
     for name, role in {**PARTICIPANTS, "alice": "manager", "viewer": "observer", "router": "router"}.items():
         keys = read_keys(ring, name)
