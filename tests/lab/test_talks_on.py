@@ -46,7 +46,7 @@ async def test_a_turn_is_answered_though_a_link_was_gone_in_the_midst_of_it(tmp_
             await lab.machines[1].kill(router)
             await engage(lab.machines[1], "router", "--listen", address)
         else:
-            await lab.cut_for(1.5, 1, 2)
+            await lab.cut_for(1.2, 1, 2)  # and up to half a second until it is linked again: a server waits for 2 s
         told, _ = await asyncio.wait_for(play.communicate(), LONG)
     changes = [json.loads(line) for line in events.read_text().splitlines()]
     decided = next(each for each in changes if each["kind"] == "adjacency_pair" and each["state"] != "started")
