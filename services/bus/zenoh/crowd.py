@@ -5,7 +5,6 @@ link the time grows that each further one costs (measured: 5000 tokens 0.5 s of 
 token can name a process that is none, and whoever reads what that is said to publish asks it in vain again and again.
 """
 
-from collections import Counter
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -41,9 +40,8 @@ class Crowd:
     def __init__(self, holders: Iterable[Holder] = ()) -> None:
         self._marks = {holder.mark: holder.common_name for holder in holders}
         self._links: dict[str, set[Link]] = {}
-        self._tokens: dict[str, set[str]] = {}
-        self._runs: dict[str, Counter[str]] = {}
-        """Number of tokens of each process."""
+        self._tokens: dict[str, dict[str, set[str]]] = {}
+        """Tokens of each holder, by process."""
         self._unread: dict[str, dict[Link, Seconds]] = {}
         """When links of each were ended because nobody read them."""
         self._banned: dict[str, Seconds] = {}
@@ -74,11 +72,8 @@ class Crowd:
         who = _owner(link)
         if not link.name or link.name.split("/")[1] not in LOUD:
             return "", ()
-        recent = {
-            each: {one: at for one, at in ended.items() if at > now - BANNED} for each, ended in self._unread.items()
-        }
-        self._unread = {each: ended for each, ended in recent.items() if ended}
-        own = self._unread.setdefault(who, {})
+        own = {one: at for one, at in self._unread.get(who, {}).items() if at > now - BANNED}
+        self._unread[who] = own
         if link in own:  # it takes a while to end
             return "", (link,)
         own[link] = now
@@ -90,24 +85,25 @@ class Crowd:
     def shown(self, run: str, token: str, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a new token of the process with this id; returns as `came`."""
         who = self._holder(run)
-        own, runs = self._tokens.setdefault(who, set()), self._runs.setdefault(who, Counter())
-        if token not in own:
-            own.add(token)
-            runs[run] += 1
-        if len(own) > MOST_TOKENS:
-            return self._too_many(who, "tokens", MOST_TOKENS, now)
-        return self._too_many(who, "processes", MOST_LINKS, now) if len(runs) > MOST_LINKS else ("", ())
+        runs = self._tokens.setdefault(who, {})
+        runs.setdefault(run, set()).add(token)
+        if len(runs) > MOST_LINKS:
+            return self._too_many(who, "processes", MOST_LINKS, now)
+        return (
+            self._too_many(who, "tokens", MOST_TOKENS, now)
+            if sum(map(len, runs.values())) > MOST_TOKENS
+            else ("", ())
+        )
 
     def withdrawn(self, run: str, token: str) -> None:
         """Take the end of a token."""
         who = self._holder(run)
-        if token in self._tokens.get(who, ()):
-            self._tokens[who].remove(token)
-            self._runs[who][run] -= 1
-            if not self._runs[who][run]:
-                del self._runs[who][run]
+        if (own := self._tokens.get(who, {}).get(run)) is not None:
+            own.discard(token)
+            if not own:
+                del self._tokens[who][run]
             if not self._tokens[who]:
-                del self._tokens[who], self._runs[who]
+                del self._tokens[who]
 
     def _holder(self, run: str) -> str:
         return next((name for mark, name in self._marks.items() if run.startswith(mark)), run)
