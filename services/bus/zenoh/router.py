@@ -84,7 +84,7 @@ async def routing(
         session = open_router(connect, listen, more)
         bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
         door = Door(session, bridge, Crowd(holders), tell, served)
-        listening = Listening(door.names, tell, door.unread)
+        listening = Listening(door.links, tell, door.unread)
         try:
             yield Routing(session, bridge)
         finally:
@@ -106,10 +106,8 @@ class Door:
         served: Callable[[], None],
     ) -> None:
         """tell, served: see `routing`."""
-        self.names: dict[str, str] = {}
-        """Common names by the address at the other end of a link."""
-        self._links: dict[str, Link] = {}
-        """By that address as well."""
+        self.links: dict[str, Link] = {}
+        """Each by the address at its other end."""
         self._crowd = crowd
         self._tell = tell
         self._served = served
@@ -149,18 +147,15 @@ class Door:
         zid, name, address = str(event.link.zid), event.link.auth_identifier or "", str(event.link.dst)
         link = Link(zid, name, address)
         if event.kind == zenoh.SampleKind.PUT:
-            self._links[place(address)] = link
-            if name:
-                self.names[place(address)] = name
+            self.links[place(address)] = link
             self._keep_out(*self._crowd.came(link, self._loop.time()))
         else:
-            self.names.pop(place(address), None)
-            self._links.pop(place(address), None)
+            self.links.pop(place(address), None)
             self._crowd.went(link)
 
-    def unread(self, where: str) -> None:
-        """End the link to this address, which is full and not read, unless that is on its way."""
-        if (link := self._links.get(where)) is not None and link not in self._ending:
+    def unread(self, link: Link) -> None:
+        """End a link that is full and not read, unless that is on its way."""
+        if link not in self._ending:
             self._keep_out(*self._crowd.unread(link, self._loop.time()))
 
     def _keep_out(self, line: str, links: Iterable[Link]) -> None:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.crowd import Link
 
 LOOK: Seconds = 0.05
 """Least time between two looks at the links."""
@@ -94,10 +95,10 @@ class Listening:
     """Looks at the links of this process, and tells who is loud or reads nothing, until it is closed."""
 
     def __init__(
-        self, names: Mapping[str, str], tell: Callable[[str], None], unread: Callable[[str], None] = lambda link: None
+        self, links: Mapping[str, Link], tell: Callable[[str], None], unread: Callable[[Link], None]
     ) -> None:
-        """names: common names by the address at the other end of a link. unread: called with that of one to end."""
-        self._names = names
+        """links: those that there are, by the address at the other end. unread: called with one to end."""
+        self._links = links
         self._tell = tell
         self._end = unread
         self._loop = asyncio.get_running_loop()
@@ -111,11 +112,13 @@ class Listening:
     def _look(self) -> None:
         began = time.perf_counter()
         found, now = volumes(), self._loop.time()
-        for link in self._unread.look(found, now):
-            self._end(link)
+        for where in self._unread.look(found, now):
+            if where in self._links:
+                self._end(self._links[where])
         if now >= self._next:
             self._next = now + SPAN
-            for line in self._volumes.look(found, self._names, now):
+            names = {where: link.name for where, link in self._links.items() if link.name}
+            for line in self._volumes.look(found, names, now):
                 self._tell(line)
         took = time.perf_counter() - began
         self._timer = self._loop.call_later(max(LOOK, took / SHARE), self._look)
