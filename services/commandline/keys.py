@@ -45,11 +45,9 @@ def main(options: Options) -> int:
     try:
         return _done(options)
     except OSError as error:
-        where, advice = (
-            str(error.filename or options.folder),
-            "FOLDER has to be a folder that can be read and written",
-        )
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=where, advice=advice)) from error
+        where, reason = str(error.filename or options.folder), error.strerror or str(error)
+        advice = "FOLDER has to be a folder that can be read and written"
+        raise InputRefused(Fault(reason=reason, where=where, advice=advice)) from error
 
 
 def _done(options: Options) -> int:
