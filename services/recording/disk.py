@@ -222,6 +222,8 @@ def repair(path: Path) -> int:
     try:
         with path.open("r+b") as file:
             descriptor.lock(file.fileno())
+            if os.fstat(file.fileno()).st_size != recording.end + recording.lost_bytes:
+                raise BlockingIOError  # it was written between the look and the lock
             file.truncate(until)
             file.seek(until)
             file.write(tail)

@@ -16,7 +16,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.presence import PeerAlive
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording import reading
+from engage_hri.services.recording import disk, reading
 from engage_hri.services.recording.descriptor import opened
 from engage_hri.services.recording.disk import read, repair
 from engage_hri.services.recording.reading import Recording
@@ -264,6 +264,24 @@ def test_a_recording_that_is_written_now_is_not_repaired(tmp_path: Path) -> None
 
     assert repair(path) == 0
     assert read(path).is_whole
+
+
+def test_what_is_written_between_the_look_and_the_repair_is_not_cut_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told(), is_whole=False)
+    path.write_bytes(data[:-500])
+
+    def looked(path: Path) -> Recording:
+        before = read(path)
+        path.write_bytes(data)
+        return before
+
+    monkeypatch.setattr(disk, "read", looked)
+    with pytest.raises(InputRefused, match="a recorder writes it now"):
+        repair(path)
+
+    assert path.read_bytes() == data
 
 
 def test_an_end_of_the_data_in_its_middle_is_damage_and_all_behind_it_is_read() -> None:
