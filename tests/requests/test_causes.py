@@ -8,10 +8,11 @@ from engage_hri.schemas.body import DescribeBody, PerformBehavior
 from engage_hri.schemas.faults import Cause, EngageError, Fault, NoReply
 from engage_hri.schemas.fragments import PerformFragment, TurnFragment
 from engage_hri.schemas.requests import Accepted, Cancel
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import Publish, TellEnd
+from engage_hri.services.requests.asking_effects import Effect, Publish, TellEnd
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.requests.serving_effects import Hand, Hold
@@ -108,21 +109,32 @@ def test_a_hold_says_what_has_happened_and_whose_it_was(
     assert why.reason.startswith(told)
 
 
+def asked(unlinked_at: Seconds, within: Seconds | None = None) -> Asking:
+    """A requester whose fragment generation has accepted, at 10.1. unlinked_at: when it last had no router."""
+    asking = Asking("me", "1", Patience(), Sight("me", lambda: unlinked_at))
+    asking.server_there("generation", "r1", 9.0)
+    asking.send(keys.FRAGMENT, PLEASE, 10.0, within=within)
+    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_fragment"), 10.1, "generation")
+    return asking
+
+
+def ticked(asking: Asking) -> list[Effect]:
+    """What it does until 15.01, each thing on time: it did not stand still."""
+    effects: list[Effect] = []
+    while asking.deadline is not None and asking.deadline <= 15.01:
+        effects += asking.tick(asking.deadline)
+    return effects
+
+
 @pytest.mark.parametrize(
     ("unlinked_at", "cause", "whose"), [(2.0, "gone", "generation"), (13.0, "unlinked", "router")]
 )
 def test_a_server_that_is_missed_is_gone_unless_the_requester_itself_had_no_router(
     unlinked_at: float, cause: Cause, whose: str
 ) -> None:
-    asking = Asking("me", "1", Patience(), Sight("me", lambda: unlinked_at))
-    asking.server_there("generation", "r1", 9.0)
-    asking.send(keys.FRAGMENT, PLEASE, 10.0)
-    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_fragment"), 10.1, "generation")
+    asking = asked(unlinked_at)
     asking.server_gone("generation", 11.0)
-    effects = []
-    while asking.deadline is not None and asking.deadline <= 15.01:
-        effects += asking.tick(asking.deadline)  # on time: it did not stand still
-    (end,) = [each for each in effects if isinstance(each, TellEnd)]
+    (end,) = [each for each in ticked(asking) if isinstance(each, TellEnd)]
     assert isinstance(end.end, EngageError)
 
     assert (end.end.fault.cause, end.end.fault.whose) == (cause, whose)
@@ -164,14 +176,9 @@ async def test_a_question_without_an_answer_tells_how_long_it_has_waited_and_for
 def test_what_takes_too_long_is_cancelled_for_its_server_unless_the_requester_itself_had_no_router(
     unlinked_at: float, cause: Cause, whose: str
 ) -> None:
-    asking = Asking("me", "1", Patience(), Sight("me", lambda: unlinked_at))
-    asking.server_there("generation", "r1", 9.0)
-    asking.send(keys.FRAGMENT, PLEASE, 10.0, within=5.0)
-    asking.hear(Accepted(id="a", requester="me", life="1", kind="perform_fragment"), 10.1, "generation")
-    effects = []
-    while asking.deadline is not None and asking.deadline <= 15.01:
-        effects += asking.tick(asking.deadline)
-    (cancel,) = [each.message for each in effects if isinstance(each, Publish) and isinstance(each.message, Cancel)]
+    asking = asked(unlinked_at, within=5.0)
+    published = [each for each in ticked(asking) if isinstance(each, Publish)]
+    (cancel,) = [each.message for each in published if isinstance(each.message, Cancel)]
 
     assert (cancel.cause, cancel.whose) == (cause, whose)
     assert cancel.reason.startswith("it has taken too long")
