@@ -19,8 +19,6 @@ import asyncio
 import gc
 import json
 import sys
-from collections.abc import Callable
-from contextvars import Context
 from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
@@ -30,7 +28,7 @@ from msgspec import Struct, field, structs
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.harness import percentile
-from benchmarks.measuring import Given
+from benchmarks.measuring import SteppedLoop
 from benchmarks.sync_to_command import chain
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
@@ -55,46 +53,6 @@ from engage_hri.services.runtime.service import running
 NATURAL: Seconds = 1.0
 SPEECHES = 3
 COUNTS = (10, 50, 100, 200, 300, 400, 600)
-
-
-class MeasuredLoop(asyncio.SelectorEventLoop):
-    """Knows the longest processor time of a callback, and of a collection of garbage, which is no part of it."""
-
-    longest_callback: Seconds = 0.0
-    longest_collection: Seconds = 0.0
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._collected = self._since = 0.0
-        gc.callbacks.append(self._collects)
-
-    def close(self) -> None:
-        if not self.is_closed():
-            gc.callbacks.remove(self._collects)
-        super().close()
-
-    def _collects(self, phase: str, info: dict[str, int]) -> None:
-        if phase == "start":
-            self._since = process_time()
-            return
-        taken = process_time() - self._since
-        self._collected += taken
-        self.longest_collection = max(self.longest_collection, taken)
-
-    def call_soon(
-        self, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
-    ) -> asyncio.Handle:
-        return super().call_soon(self._timed, callback, *args, context=context)
-
-    def call_at(
-        self, when: float, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
-    ) -> asyncio.TimerHandle:
-        return super().call_at(when, self._timed, callback, *args, context=context)
-
-    def _timed(self, callback: Callable[[*Given], object], *arguments: *Given) -> None:
-        before = process_time() - self._collected
-        callback(*arguments)
-        self.longest_callback = max(self.longest_callback, process_time() - self._collected - before)
 
 
 class Row(Struct):
@@ -160,7 +118,7 @@ def estimate(question: Message) -> Message:
 async def measure(blocks: int, over: Seconds) -> Row:
     """over: seconds within which the blocks start."""
     loop = asyncio.get_running_loop()
-    assert isinstance(loop, MeasuredLoop)
+    assert isinstance(loop, SteppedLoop)
     async with MemoryHub() as hub, running(hub, {"realizer": partial(realize, config=RealizerConfig())}):
         bus = hub.join("control")
         desk, requests = RequestDesk(bus, "control", lambda cancel: None), Requester(bus)
@@ -197,7 +155,7 @@ async def measure(blocks: int, over: Seconds) -> Row:
         "spread" if over else "at once",
         p50_ms=1000 * percentile(voices.trips, 50),
         p99_ms=1000 * percentile(voices.trips, 99),
-        callback_ms=1000 * loop.longest_callback,
+        callback_ms=1000 * loop.longest,
         garbage_ms=1000 * loop.longest_collection,
         all_done=taken,
         cpu=cpu,
@@ -221,7 +179,7 @@ def main() -> None:
         for blocks in options.blocks:
             for _ in range(options.repeat):
                 gc.collect()
-                with asyncio.Runner(loop_factory=MeasuredLoop) as runner:
+                with asyncio.Runner(loop_factory=SteppedLoop) as runner:
                     row = runner.run(measure(blocks, over))
                 if options.json:
                     print(json.dumps(structs.asdict(row)), flush=True)

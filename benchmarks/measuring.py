@@ -24,7 +24,7 @@ LONG: Seconds = 0.003
 
 
 class SteppedLoop(asyncio.SelectorEventLoop):
-    """Knows the longest of its steps, and how many were long."""
+    """Knows the longest of its steps, how many were long, and the longest collection of garbage, which is no step."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,6 +34,7 @@ class SteppedLoop(asyncio.SelectorEventLoop):
 
     def forget(self) -> None:
         self.longest, self.long, self.what = 0.0, 0, ""
+        self.longest_collection = 0.0
 
     def close(self) -> None:
         if not self.is_closed():
@@ -44,7 +45,9 @@ class SteppedLoop(asyncio.SelectorEventLoop):
         if phase == "start":
             self._since = thread_time()
         else:
-            self._collected += thread_time() - self._since
+            taken = thread_time() - self._since
+            self._collected += taken
+            self.longest_collection = max(self.longest_collection, taken)
 
     def call_soon(
         self, callback: Callable[[*Given], object], *args: *Given, context: Context | None = None
