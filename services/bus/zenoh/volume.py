@@ -21,7 +21,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.crowd import Link
 
 LOOK: Seconds = 0.05
-"""Least time between two looks at the links."""
+"""Least time between two looks at links that may be ended."""
 SHARE = 0.02
 """Most part of the time that looking takes: of a thousand links that is a look each half second."""
 SPAN: Seconds = 1.0
@@ -121,7 +121,9 @@ class Listening:
             for line in self._volumes.look(found, names, now):
                 self._tell(line)
         took = time.perf_counter() - began
-        self._timer = self._loop.call_later(max(LOOK, took / SHARE), self._look)
+        # Without keys no link is ended, and only speeds are looked at.
+        pause = LOOK if any(link.name for link in self._links.values()) else SPAN
+        self._timer = self._loop.call_later(max(pause, took / SHARE), self._look)
 
 
 def place(endpoint: str) -> str:
