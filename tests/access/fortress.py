@@ -30,8 +30,10 @@ AGAIN = 2.0
 class Told:
     """What a process prints, line by line."""
 
+    module = "engage_hri"
+
     def __init__(self, *arguments: object, **environment: str) -> None:
-        command = [sys.executable, "-m", "engage_hri", *map(str, arguments)]
+        command = [sys.executable, "-m", self.module, *map(str, arguments)]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, bufsize=0,
             env={**os.environ, **environment},

@@ -53,6 +53,38 @@ async def test_who_shows_too_many_tokens_is_cut_and_nobody_else() -> None:
             each.close()
 
 
+async def test_who_is_kept_out_and_calls_again_is_turned_away_before_it_can_show_anything() -> None:
+    endpoint, lines = free_endpoint(), asyncio.Queue[str]()
+    loop = asyncio.get_running_loop()
+    async with routing([endpoint], [], lines.put_nowait):
+        loud, quiet = visitor(endpoint), visitor(endpoint)
+        run, seen, calls, called = str(loud.zid()), list[str](), list[str](), asyncio.Event()
+
+        def linked(event: zenoh.TransportEvent) -> None:
+            calls.append(str(event.kind))
+            if len(calls) == 12:  # it has come and gone: it is cut, calls by itself, and is cut again ...
+                loop.call_soon_threadsafe(called.set)
+
+        tokens = [
+            loud.liveliness().declare_token(keys.own(run, f"log/{number}")) for number in range(MOST_TOKENS + 1)
+        ]
+        async with asyncio.timeout(PATIENCE):
+            await lines.get()
+            watched = quiet.liveliness().declare_subscriber(
+                keys.own(run, "log/*"),
+                zenoh.handlers.Callback(lambda one: seen.append(str(one.kind)), indirect=False),
+            )
+            listener = loud.info.declare_transport_events_listener(zenoh.handlers.Callback(linked, indirect=False))
+            await called.wait()
+
+        assert "SampleKind.PUT" not in seen
+        tokens.clear()
+        for each in (watched, listener):
+            each.undeclare()
+        for session in (loud, quiet):
+            session.close()
+
+
 async def test_that_no_router_answers_is_told_only_where_nobody_listens() -> None:
     nobody, somebody = free_endpoint(), free_endpoint()
     host, _, port = somebody.partition("/")[2].rpartition(":")

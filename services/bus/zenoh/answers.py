@@ -10,7 +10,8 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.messages import Message, decode, in_form
 from engage_hri.services.bus.answering import MOST, Answering
 from engage_hri.services.bus.interface import Answer, Bus, is_asked_to_stop
-from engage_hri.services.bus.zenoh.history import finish, form_asked, refuse
+from engage_hri.services.bus.zenoh.history import finish, form_asked, pack, refuse
+from engage_hri.services.bus.zenoh.order import mark_of
 from engage_hri.services.bus.zenoh.session import LoopBridge
 
 
@@ -28,8 +29,12 @@ class Answers:
     def serve(self, key: str, answer: Answer, empty: Message | None) -> None:
         """See `Bus.answer`."""
         self.here.served[key] = answer
+        mark = pack(mark_of(key))
 
         def reply(query: zenoh.Query) -> None:
+            if query.attachment is not None and query.attachment.to_bytes() != mark:
+                finish(query)  # it was asked on another key (`mark_of`), and will be asked again
+                return
             form = "json"
             try:
                 form = form_asked(query)

@@ -47,12 +47,16 @@ class Crowd:
         self._banned: dict[str, Seconds] = {}
         """Time until which each gets no link."""
 
+    def is_banned(self, link: Link, now: Seconds) -> bool:
+        """Tell whether who has this link gets none for now. Any thread may ask."""
+        return self._banned.get(_owner(link), now) > now
+
     def came(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a new link; returns the line to tell, and the links to end."""
         who = _owner(link)
         own = self._links.setdefault(who, set())
         own.add(link)
-        if self._banned.get(who, now) > now:
+        if self.is_banned(link, now):
             return "", (link,)
         return self._too_many(who, "links", MOST_LINKS, now) if link.name and len(own) > MOST_LINKS else ("", ())
 

@@ -5,8 +5,8 @@ timestamp. Parameters of the selector, joined by `;` as Zenoh has it: `format=js
 commands and events go; `run=RUN`, to ask only that process.
 
 Our own processes ask `@bus/<run>/past`, each process by itself, once for all their patterns. They get what is
-missing of a key in one reply, under that key, and at the end one with the `Counts` of all these keys, and when the
-last key was dropped: so they know that all has come, and that there is nothing else.
+missing of a key in one reply, under that key, and at the end one with the `Counts` of all these keys, when the last
+key was dropped, and how many messages it handed out: so they know that all has come, and that there is nothing else.
 """
 
 import asyncio
@@ -41,7 +41,7 @@ BAD = (msgspec.DecodeError, UnicodeDecodeError)
 pack = msgspec.msgpack.encode
 envelopes = msgspec.msgpack.Decoder(Envelope)
 _parts = msgspec.msgpack.Decoder(list[Written])
-_ends = msgspec.msgpack.Decoder(tuple[Counts, int])
+_ends = msgspec.msgpack.Decoder(tuple[Counts, int, int])
 
 
 class _Question(Struct, frozen=True, array_like=True):
@@ -93,22 +93,29 @@ class History:
         run: str,
         missing: Missing,
         told: Callable[[Past], None],
-        ended: Callable[[], None],
+        ended: Callable[[Past | None], None],
     ) -> None:
         """Ask a process for what is missing on these keys.
 
-        Calls `told` with its answer, if that is complete, and then `ended`. Both on the loop.
+        Calls `told` with its answer, if that is complete, and then `ended`, with one of which parts are missing. Both
+        on the loop.
         """
         parts: list[Written] = []
+        incomplete: Past | None = None
 
         def replied(reply: zenoh.Reply) -> None:
+            nonlocal incomplete
             # Zenoh says who answers: no process can answer for another.
             if reply.ok is None or reply.replier_id is None or str(reply.replier_id.zid) != run:
                 return
             with suppress(*BAD):  # counts as no answer
                 if (key := str(reply.ok.key_expr)) == keys.own(run, "counts"):
-                    counts, dropped = _ends.decode(reply.ok.payload.to_bytes())
-                    told(Past(counts, tuple(parts), dropped))
+                    counts, dropped, number = _ends.decode(reply.ok.payload.to_bytes())
+                    past = Past(counts, tuple(parts), dropped)
+                    if len(parts) == number:
+                        told(past)
+                    else:  # a part was lost, or came under another key
+                        incomplete = past
                 else:
                     part = _parts.decode(reply.ok.payload.to_bytes())
                     parts.extend(one for one in part if one.key == key)
@@ -118,7 +125,7 @@ class History:
             question = pack(_Question(tuple(patterns), msgspec.structs.replace(missing, seen={})))
         self._session.get(
             keys.own(run, "past"),
-            self._bridge.on_loop(replied, lambda _: ended()),
+            self._bridge.on_loop(replied, lambda _: ended(incomplete)),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             accept_replies=zenoh.ReplyKeyExpr.ANY,
@@ -149,7 +156,7 @@ class History:
         for key, whole in parts.items():
             for part in fitting(whole, most(key)):
                 query.reply(key, pack([(key, one.encoding, one.payload, one.envelope) for one in part]))
-        query.reply(keys.own(self._sent.run, "counts"), pack((past.counts, past.dropped)))
+        query.reply(keys.own(self._sent.run, "counts"), pack((past.counts, past.dropped, len(past.written))))
         finish(query)
 
     def _asked(self, kind: keys.KeyClass, query: zenoh.Query) -> None:

@@ -32,7 +32,7 @@ from engage_hri.services.bus.zenoh.clocks import Clocks
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.history import History, pack
 from engage_hri.services.bus.zenoh.links import Links
-from engage_hri.services.bus.zenoh.order import Envelope, SentLog, Written
+from engage_hri.services.bus.zenoh.order import Envelope, SentLog, Written, mark_of
 from engage_hri.services.bus.zenoh.own_clock import own_clock
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.publishers import Publishers
@@ -159,7 +159,9 @@ class ZenohHub(Hub):
             self.peers.participants.setdefault((bus.part, bus.name), set()).add(bus.run)
         self._history = History(session, self.bridge, self._sent)
         trusts = rights.trusts if rights else None
-        self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, self._logs, trusts)
+        self.readers = Readers(
+            session, self.bridge, self._sent, self.peers, self._history, self._logs, trusts, lambda: self.unlinked_at
+        )
         self.peers.stand(self.readers.publisher_came, self.readers.participant_changed)
         self._links = Links(session, self.bridge, self._link.connect, LOG.warning)
         until = self._link.until
@@ -278,7 +280,7 @@ class ZenohHub(Hub):
             if self._pulse is None:
                 self._pulse = self._loop.call_later(FIRST_PULSE, self._send_pulse)
         else:
-            written = Written(key, encoding, payload, Envelope(bus.name, self.clocks.own, now))
+            written = Written(key, encoding, payload, Envelope(bus.name, self.clocks.own, now, mark=mark_of(key)))
         attachment = pack(written.envelope)
         self._publishers.of(key, ordered).put(
             payload, encoding=encoding, attachment=attachment, timestamp=stamp, source_info=self._source

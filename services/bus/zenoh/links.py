@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import zenoh
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.forgotten import Forgotten
 from engage_hri.services.bus.zenoh.session import LoopBridge
 
 SETTLE: Seconds = 1.0
@@ -88,7 +89,10 @@ def _replaced(before: Router, now: Router) -> str:
 
 
 class Links:
-    """Listener to Zenoh's links, who tells the news. Nothing is told of processes that are linked directly."""
+    """Listener to Zenoh's links, who tells the news, and ends those that Zenoh has forgotten.
+
+    Nothing is told of processes that are linked directly.
+    """
 
     def __init__(
         self, session: zenoh.Session, bridge: LoopBridge, called: Sequence[str], tell: Callable[[str], None]
@@ -102,7 +106,11 @@ class Links:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
         info: Any = session.info
-        self._listener = info.declare_transport_events_listener(bridge.on_loop(self._changed), history=True)
+        self._forgotten = Forgotten(session, tell)
+        self._listeners: tuple[Any, ...] = (
+            info.declare_transport_events_listener(bridge.on_loop(self._changed), history=True),
+            info.declare_link_events_listener(bridge.on_loop(self._forgotten.changed), history=True),
+        )
 
     @property
     def unlinked_at(self) -> Seconds:
@@ -110,7 +118,9 @@ class Links:
         return self._news.unlinked_at(self._loop.time())
 
     def close(self) -> None:
-        self._listener.undeclare()
+        for listener in self._listeners:
+            listener.undeclare()
+        self._forgotten.close()
         if self._timer is not None:
             self._timer.cancel()
 

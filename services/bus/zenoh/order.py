@@ -20,6 +20,7 @@ order across keys. Sync points and outcomes live on different keys and must not 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
+from zlib import crc32
 
 from msgspec import Struct
 
@@ -47,6 +48,7 @@ class Envelope(Struct, frozen=True, array_like=True):
     Which process sent it, Zenoh says: nothing here can name another.
     number: among all ordered messages of its process, from 1; 0 on a stream, and of a program without envelopes.
     nth: among the messages of its process on this key, from 1; from `base` + 1 on a key that may have been before.
+    mark: of its key (`mark_of`); 0 of a program that gives none. Zenoh may bring a message under another key.
     """
 
     source: str
@@ -55,6 +57,17 @@ class Envelope(Struct, frozen=True, array_like=True):
     number: int = 0
     nth: int = 0
     base: int = 0
+    mark: int = 0
+
+
+def mark_of(key: str) -> int:
+    """A short number of a key, the CRC-32 of its letters, by which one under which a message comes is checked.
+
+    Zenoh writes a number for a key, and tells once on each link what it stands for. When a process calls again while
+    the end of its old link is not known yet, the numbers of both links are mixed up until the new one is ended, too
+    (docs/decisions/0137-a-message-says-its-key.md).
+    """
+    return crc32(key.encode())
 
 
 class Written(Struct, frozen=True, array_like=True):
@@ -130,7 +143,8 @@ class SentLog:
         self.number += 1
         base = self._bases.setdefault(key, self._base)
         nth = self.counts[key] = self.counts.get(key, base) + 1
-        written = Written(key, encoding, payload, Envelope(source, clock, now, self.number, nth, base), stamp)
+        envelope = Envelope(source, clock, now, self.number, nth, base, mark_of(key))
+        written = Written(key, encoding, payload, envelope, stamp)
         self._written_at.pop(key, None)
         self._written_at[key] = now  # the last in order
         if keys.key_class(key) == "state":

@@ -19,7 +19,7 @@ from engage_hri.schemas.status import Reachable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
 from engage_hri.services.bus.zenoh.history import BAD, finish, pack
-from engage_hri.services.bus.zenoh.order import Counts, SentLog
+from engage_hri.services.bus.zenoh.order import Counts, SentLog, mark_of
 from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
 
 FLUSH: Seconds = 2.0
@@ -229,6 +229,7 @@ class Peers:
             consolidation=zenoh.ConsolidationMode.NONE,
             payload=payload,
             encoding=encoding,
+            attachment=pack(mark_of(key)),
             timeout=timeout,
             **QOS,
         )

@@ -29,6 +29,7 @@ from engage_hri.services.bus.zenoh.order import (
     Past,
     SentLog,
     Written,
+    mark_of,
     may_skip,
 )
 from engage_hri.services.bus.zenoh.peers import Peers
@@ -39,10 +40,11 @@ _flushes = msgspec.msgpack.Decoder(tuple[str, Counts])
 
 Trusts = Callable[[str, str, str], bool]
 """Check of a message: the run of its process, its key, and the participant that it names."""
-TRIES = 3
-"""Number of times that a process that is there, but does not answer, is asked before what it sends is let through."""
 UNANSWERED: Seconds = 3.0
-"""Time after which such a process is asked again, as long as it is there: nobody else tells what was missed."""
+"""Time for which a process that is there, but does not answer, is asked before what it sends is let through. As long
+again, and it is asked once more, as long as it is there: nobody else tells what was missed."""
+PAUSE: Seconds = 0.2
+"""Pause before it is asked again. A question on a link that is broken ends at once, and so would all that follow."""
 LOOK: Seconds = 0.05
 """Time between two looks at the links. A look halts the loop, and takes longer than all else that a message costs."""
 RUNS_KEPT = 256
@@ -85,10 +87,13 @@ class Readers:
         history: History,
         own: Mapping[str, SentLog],
         trusts: Trusts | None = None,
+        unlinked_at: Callable[[], Seconds] = lambda: -inf,
     ) -> None:
         """own: what this process has published, by run: each of its hubs offers that to all, so Zenoh's copy is left.
 
-        trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed."""
+        trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed.
+        unlinked_at: see `Bus.unlinked_at`.
+        """
         self.refused = 0
         self.viewer = ""
         self._loop = asyncio.get_running_loop()
@@ -99,6 +104,7 @@ class Readers:
         self._history = history
         self._own = own
         self._trusts = trusts
+        self._unlinked_at = unlinked_at
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
         self._passing: set[str] = set()
@@ -196,6 +202,9 @@ class Readers:
         if run in self._own:
             # Of this session, it is from outside in this process' own name; of another one it has come in memory.
             self.refused += run == self._sent.run
+            return
+        if envelope.mark not in (0, mark_of(key)):  # what is missing under its own key is asked for
+            self.refused += 1
             return
         written = Written(key, sample.encoding, sample.payload, envelope)
         if not self._is_trusted(written, run):
@@ -296,9 +305,13 @@ class Readers:
     def _tell_forged(self, reader: _Reader, run: str) -> None:
         LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
 
-    def _ask(self, reader: _Reader, run: str, follower: Follower, tries: int = 1) -> None:
-        """Ask a process for what is missing."""
-        follower.asking, missing = True, follower.missing(self._loop.time())
+    def _ask(self, reader: _Reader, run: str, follower: Follower, until: Seconds = inf) -> None:
+        """Ask a process for what is missing. until: time from which on it is not asked once more."""
+        if reader not in self._readers:
+            return
+        now = self._loop.time()
+        until = min(until, now + UNANSWERED)
+        follower.asking, missing = True, follower.missing(now)
         is_answered = False
 
         def told(past: Past | None) -> None:
@@ -307,12 +320,13 @@ class Readers:
                 is_answered = True
                 self._told(reader, run, follower, past)
 
-        def ended() -> None:
-            if not is_answered and run in self._peers.publishers and tries < TRIES:
-                # The process is there, only slow, or the link was cut meanwhile: the past is not lost yet.
-                self._ask(reader, run, follower, tries + 1)
+        def ended(incomplete: Past | None) -> None:
+            # If the process is there, only slow, or a link was cut meanwhile, the past is not lost yet.
+            is_there = run in self._peers.publishers or self._unlinked_at() >= now
+            if not is_answered and is_there and self._loop.time() < until:
+                self._loop.call_later(PAUSE, self._ask, reader, run, follower, until)
             else:
-                told(None)
+                told(incomplete)
 
         if reader.kept:
             self._history.ask(reader.kept, run, missing, told, ended)

@@ -2,10 +2,9 @@
 
 import asyncio
 import os
-import socket
 import time
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
-from contextlib import ExitStack, asynccontextmanager, closing, suppress
+from contextlib import ExitStack, asynccontextmanager, closing
 from typing import Any
 
 import zenoh
@@ -19,10 +18,11 @@ from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.crowd import Crowd, Link
 from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
+from engage_hri.services.bus.zenoh.forgotten import Forgotten
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
 from engage_hri.services.bus.zenoh.sizes import paced
-from engage_hri.services.bus.zenoh.volume import Listening, place, sockets
+from engage_hri.services.bus.zenoh.volume import Listening, end, place
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""
@@ -114,22 +114,31 @@ class Door:
         self._served_at = 0.0
         self._loop = asyncio.get_running_loop()
         self._ending: set[Link] = set()
+        self._forgotten = Forgotten(session, tell)
         info: Any = session.info
         token_changed = bridge.on_loop(self._token_changed, first=self._show)
+        link_changed = bridge.on_loop(self._link_changed, first=self._turn_away)
         self._declared: tuple[Any, ...] = (
-            info.declare_link_events_listener(bridge.on_loop(self._link_changed), history=True),
+            info.declare_link_events_listener(link_changed, history=True),
             session.liveliness().declare_subscriber(f"*/{keys.ANY_OWN}", token_changed, history=True),
         )
 
     def close(self) -> None:
+        self._forgotten.close()
         for declared in self._declared:
             declared.undeclare()
 
-    def _show(self) -> None:
+    def _show(self, _: object) -> None:
         """Show that a token was served, in Zenoh's thread: the loop itself may wait for the router's tables."""
         if (now := time.monotonic()) >= self._served_at + SHOWN:
             self._served_at = now
             self._served()
+
+    def _turn_away(self, event: zenoh.LinkEvent) -> None:
+        """End the link of one who gets none, in Zenoh's thread: Zenoh reads nothing of a link before this returns."""
+        link = _link(event)
+        if event.kind == zenoh.SampleKind.PUT and self._crowd.is_banned(link, self._loop.time()):
+            end(lambda _, where: where == place(link.address))
 
     def _token_changed(self, sample: zenoh.Sample) -> None:
         key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
@@ -144,13 +153,13 @@ class Door:
             self._crowd.withdrawn(run, key)
 
     def _link_changed(self, event: zenoh.LinkEvent) -> None:
-        zid, name, address = str(event.link.zid), event.link.auth_identifier or "", str(event.link.dst)
-        link = Link(zid, name, address)
+        self._forgotten.changed(event)
+        link = _link(event)
         if event.kind == zenoh.SampleKind.PUT:
-            self.links[place(address)] = link
+            self.links[place(link.address)] = link
             self._keep_out(*self._crowd.came(link, self._loop.time()))
         else:
-            self.links.pop(place(address), None)
+            self.links.pop(place(link.address), None)
             self._crowd.went(link)
 
     def unread(self, link: Link) -> None:
@@ -166,10 +175,10 @@ class Door:
         self._ending.update(links)
 
     def _end(self) -> None:
-        """End links: Zenoh cannot, so their sockets are shut down, which it takes for the other side's doing."""
         ending = {place(link.address) for link in self._ending}
         self._ending.clear()
-        for where, each in sockets():
-            if where in ending:
-                with suppress(OSError):  # it has ended by itself
-                    each.shutdown(socket.SHUT_RDWR)
+        end(lambda _, where: where in ending)
+
+
+def _link(event: zenoh.LinkEvent) -> Link:
+    return Link(str(event.link.zid), event.link.auth_identifier or "", str(event.link.dst))

@@ -294,7 +294,7 @@ class LoopBridge:
         self,
         enter: Callable[[Any], None],
         end: Callable[[Any], None] | None = None,
-        first: Callable[[], None] | None = None,
+        first: Callable[[Any], None] | None = None,
     ) -> Any:
         """Make a handler for tokens, or for replies: `enter` runs on the loop with each, `end` at last.
 
@@ -303,7 +303,7 @@ class LoopBridge:
 
         def came(item: Any) -> None:
             if first is not None:
-                first()
+                first(item)
             self._let_in(enter, item)
 
         def ended() -> None:

@@ -14,7 +14,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
@@ -134,7 +134,7 @@ def place(endpoint: str) -> str:
 def volumes() -> dict[str, Volume]:
     """Volume of each TCP link of this process, by its other end. Nothing where no kernel tells."""
     found = {}
-    for where, link in sockets():
+    for _, where, link in sockets():
         with suppress(OSError, AttributeError, struct.error):
             told = link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _COUNTS + 28)
             taken, brought, waiting = struct.unpack_from("QQ8xI", told, _COUNTS)
@@ -142,8 +142,23 @@ def volumes() -> dict[str, Volume]:
     return found
 
 
-def sockets() -> Iterator[tuple[str, socket.socket]]:
-    """The sockets of this process that have another end, and where that is. Zenoh's stay Zenoh's."""
+def end(is_meant: Callable[[str, str], bool], how: int = socket.SHUT_RDWR) -> list[tuple[str, str]]:
+    """End links: Zenoh cannot, so their sockets are shut down, which it takes for the other side's doing.
+
+    is_meant: called with the places of a link's own and other end. how: which direction. Returns the places of those
+    that were ended.
+    """
+    ended = []
+    for own, where, each in sockets():
+        if is_meant(own, where):
+            with suppress(OSError):  # it has ended by itself
+                each.shutdown(how)
+                ended.append((own, where))
+    return ended
+
+
+def sockets() -> Iterator[tuple[str, str, socket.socket]]:
+    """The sockets of this process that have another end: places of the own end and of that. Zenoh's stay Zenoh's."""
     try:
         numbers = [int(each) for each in os.listdir("/proc/self/fd")]
     except OSError:
@@ -154,9 +169,13 @@ def sockets() -> Iterator[tuple[str, socket.socket]]:
         except OSError:
             continue
         try:
-            host, port = link.getpeername()[:2]
-            yield f"[{host}]:{port}" if ":" in host else f"{host}:{port}", link
+            yield _place(link.getsockname()), _place(link.getpeername()), link
         except (OSError, ValueError):
             continue
         finally:
             link.detach()
+
+
+def _place(address: Any) -> str:
+    host, port = address[:2]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

@@ -7,6 +7,8 @@ worst once, and put it into `ATTACKS`: it is called again and again.
 import json
 import os
 import select
+import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -19,6 +21,7 @@ import zenoh
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.access import Holder
 from engage_hri.schemas.limits import BESIDE, most
+from engage_hri.services.bus.zenoh.crowd import MOST_TOKENS
 
 HUNDRED_MB = 100_000_000
 NOBODY = "stranger"
@@ -35,6 +38,9 @@ class Attacker:
         self.run = f"{mark}{token_hex(12)}"
         self.session: Any = None
         self.turn = 0
+        self.kept: list[Any] = []
+        """What it has declared."""
+        self.others: list[subprocess.Popen[bytes]] = []
 
     def open(self) -> None:
         """Connect, with the own keys if there are any; raises `zenoh.ZError` when it is not let in."""
@@ -141,13 +147,41 @@ def encodings(by: Attacker) -> None:
     by.put(f"{key}/{'x' * 60_000}", b"")
 
 
+def unread_links(by: Attacker) -> None:
+    """Links that are never read, and what fills them."""
+    if by.turn % 100 == 0 and by.turn < 1000:
+        by.others.append(subprocess.Popen([*COMMAND, *sys.argv[1:4], "stand-still", "0"], stdin=subprocess.DEVNULL))
+    key = by.next_of(by.may("publishes"))
+    by.put(key, b"\xc1" * min(60_000, most(key)), encoding="application/msgpack")
+    select.select([], [], [], 0.002)
+
+
+def stand_still(by: Attacker) -> None:
+    """Subscribe to all that there is for this role, and halt."""
+    nothing = zenoh.handlers.Callback(lambda sample: None, indirect=False)
+    for key in by.may("subscribes"):
+        by.kept.append(by.session.declare_subscriber(key, nothing))
+    select.select([], [], [], 0.1)
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def ghosts(by: Attacker) -> None:
+    """Tokens of processes that do not exist, almost as many as one may have; each says that it has a past."""
+    mark = by.run[: -len(token_hex(12))]
+    for number in range(MOST_TOKENS - 10 - len(by.kept)):
+        key = keys.own(f"{mark}{number:024x}", "log/news")
+        by.kept.append(by.session.liveliness().declare_token(key))
+    select.select([], [], [], 0.2)
+
+
 ATTACKS: Mapping[str, Callable[[Attacker], None]] = {
     each.__name__.replace("_", "-"): each
     for each in (
         one_byte_more, huge, huge_questions, as_large_as_allowed, pulses, small_messages, urgent_messages, questions,
-        encodings,
+        encodings, unread_links, ghosts,
     )
 }  # fmt: skip
+COMMAND = [sys.executable, "-m", "tests.rigs.attacker.attacks"]
 
 
 def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> None:
@@ -155,6 +189,9 @@ def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> No
     role, _, name = holder.partition("=")
     by = Attacker(endpoint, Path(ring) if ring else None, role, name)
     os.nice(15)  # it stands for one on another machine, and takes no processor of the robot
+    if attack == "stand-still":
+        by.open()
+        stand_still(by)
     end, times, refused = time.monotonic() + float(seconds), 0, 0
     while time.monotonic() < end:
         try:
@@ -166,6 +203,8 @@ def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> No
             refused += 1
             by.session = None
             select.select([], [], [], 0.3)
+    for other in by.others:
+        other.kill()
     print(json.dumps({"times": times, "refused": refused}), flush=True)
 
 

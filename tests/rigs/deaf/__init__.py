@@ -1,0 +1,1 @@
+"""A router, four processes that hear one another, a flood: processes stand still, links are cut."""
