@@ -246,6 +246,7 @@ def crash(hub: ZenohHub) -> None:
     hub.bridge.close()
     if hub._pulse is not None:
         hub._pulse.cancel()
+    hub.readers._readers.clear()  # it asks nothing any more
     hub.session.close()  # type: ignore[no-untyped-call]
 
 

@@ -159,9 +159,7 @@ class ZenohHub(Hub):
             self.peers.participants.setdefault((bus.part, bus.name), set()).add(bus.run)
         self._history = History(session, self.bridge, self._sent)
         trusts = rights.trusts if rights else None
-        self.readers = Readers(
-            session, self.bridge, self._sent, self.peers, self._history, self._logs, trusts, lambda: self.unlinked_at
-        )
+        self.readers = Readers(session, self.bridge, self._sent, self.peers, self._history, self._logs, trusts)
         self.peers.stand(self.readers.publisher_came, self.readers.participant_changed)
         self._links = Links(session, self.bridge, self._link.connect, LOG.warning)
         until = self._link.until

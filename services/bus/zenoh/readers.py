@@ -41,8 +41,8 @@ _flushes = msgspec.msgpack.Decoder(tuple[str, Counts])
 Trusts = Callable[[str, str, str], bool]
 """Check of a message: the run of its process, its key, and the participant that it names."""
 UNANSWERED: Seconds = 3.0
-"""Time for which a process that is there, but does not answer, is asked before what it sends is let through. As long
-again, and it is asked once more, as long as it is there: nobody else tells what was missed."""
+"""Time for which a process that does not answer is asked before what it has sent is let through. As long again, and
+it is asked once more, as long as it is there: nobody else tells what was missed."""
 PAUSE: Seconds = 0.2
 """Pause before it is asked again. A question on a link that is broken ends at once, and so would all that follow."""
 LOOK: Seconds = 0.05
@@ -87,13 +87,10 @@ class Readers:
         history: History,
         own: Mapping[str, SentLog],
         trusts: Trusts | None = None,
-        unlinked_at: Callable[[], Seconds] = lambda: -inf,
     ) -> None:
         """own: what this process has published, by run: each of its hubs offers that to all, so Zenoh's copy is left.
 
-        trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed.
-        unlinked_at: see `Bus.unlinked_at`.
-        """
+        trusts: tells whether a message can be from its sender; None: whoever reaches the bus is believed."""
         self.refused = 0
         self.viewer = ""
         self._loop = asyncio.get_running_loop()
@@ -104,7 +101,6 @@ class Readers:
         self._history = history
         self._own = own
         self._trusts = trusts
-        self._unlinked_at = unlinked_at
         self._readers: list[_Reader] = []
         self._carriers: dict[str, tuple[Any, list[_Reader]]] = {}
         self._passing: set[str] = set()
@@ -321,9 +317,8 @@ class Readers:
                 self._told(reader, run, follower, past)
 
         def ended(incomplete: Past | None) -> None:
-            # If the process is there, only slow, or a link was cut meanwhile, the past is not lost yet.
-            is_there = run in self._peers.publishers or self._unlinked_at() >= now
-            if not is_answered and is_there and self._loop.time() < until:
+            # It may be slow; or a link was cut, its own or ours, and it seems to be gone: the past is not lost yet.
+            if not is_answered and self._loop.time() < until:
                 self._loop.call_later(PAUSE, self._ask, reader, run, follower, until)
             else:
                 told(incomplete)
