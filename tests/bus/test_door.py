@@ -58,24 +58,24 @@ async def test_who_is_kept_out_and_calls_again_is_turned_away_before_it_can_show
     loop = asyncio.get_running_loop()
     async with routing([endpoint], [], lines.put_nowait):
         loud, quiet = visitor(endpoint), visitor(endpoint)
-        run, seen, calls, called = str(loud.zid()), list[str](), list[str](), asyncio.Event()
+        run, seen, calls = str(loud.zid()), list[str](), asyncio.Queue[str]()
 
         def linked(event: zenoh.TransportEvent) -> None:
-            calls.append(str(event.kind))
-            if len(calls) == 12:  # it has come and gone: it is cut, calls by itself, and is cut again ...
-                loop.call_soon_threadsafe(called.set)
+            loop.call_soon_threadsafe(calls.put_nowait, str(event.kind))
 
+        listener = loud.info.declare_transport_events_listener(zenoh.handlers.Callback(linked, indirect=False))
         tokens = [
             loud.liveliness().declare_token(keys.own(run, f"log/{number}")) for number in range(MOST_TOKENS + 1)
         ]
         async with asyncio.timeout(PATIENCE):
-            await lines.get()
+            assert (await lines.get()).startswith("too many: ")
+            assert await calls.get() == "SampleKind.DELETE"
             watched = quiet.liveliness().declare_subscriber(
                 keys.own(run, "log/*"),
                 zenoh.handlers.Callback(lambda one: seen.append(str(one.kind)), indirect=False),
             )
-            listener = loud.info.declare_transport_events_listener(zenoh.handlers.Callback(linked, indirect=False))
-            await called.wait()
+            for _ in range(5):  # it calls by itself, and is cut
+                assert [await calls.get(), await calls.get()] == ["SampleKind.PUT", "SampleKind.DELETE"]
 
         assert "SampleKind.PUT" not in seen
         tokens.clear()
