@@ -80,7 +80,7 @@ async def test_links_that_zenoh_knows_are_left_alone_also_while_they_come_and_go
     async with routing([endpoint], [], lines.append):
         for _ in range(12):
             hub = await open_hub("robot", connect=[endpoint], mode="client")
-            await asyncio.sleep(0.1)
+            assert await hub.is_linked(asyncio.get_running_loop().time() + PATIENCE)
             await hub.close()
     assert not [line for line in lines if "deaf" in line]
 

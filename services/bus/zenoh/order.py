@@ -95,6 +95,13 @@ class Missing(Struct, frozen=True):
     age: Seconds = 0.0
 
 
+def together(questions: Sequence[Missing]) -> Missing:
+    """One question for all that these ask for, who are new, or one alone. Each leaves out what it has seen itself."""
+    known = set.intersection(*({*each.seen} for each in questions))
+    seen = {key: min(each.seen[key] for each in questions) for key in known}
+    return Missing(seen, questions[0].is_new, max(each.age for each in questions))
+
+
 class Past(Struct, frozen=True):
     """The answer of a process: what was missing, in order, and its counts of all keys that were asked for.
 
@@ -250,6 +257,11 @@ class Follower:
             return []
         self._deliver(written)
         return [written]
+
+    @property
+    def has_answered(self) -> bool:
+        """True once a question for the past has been answered."""
+        return not self._is_new
 
     @property
     def held(self) -> int:

@@ -1,7 +1,7 @@
 """Delivers what arrives: to the right subscriptions, in order; asks for missing messages. On the loop."""
 
 import asyncio
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from functools import partial
 from itertools import chain
 from math import inf
@@ -19,7 +19,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.bus.zenoh.history import BAD, History, envelopes, finish, refuse
+from engage_hri.services.bus.zenoh.history import BAD, PATTERNS, History, envelopes, finish, refuse
 from engage_hri.services.bus.zenoh.order import (
     Counts,
     Envelope,
@@ -31,6 +31,7 @@ from engage_hri.services.bus.zenoh.order import (
     Written,
     mark_of,
     may_skip,
+    together,
 )
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.bus.zenoh.session import Arrived, LoopBridge
@@ -44,7 +45,11 @@ UNANSWERED: Seconds = 3.0
 """Time for which a process that does not answer is asked before what it has sent is let through. As long again, and
 it is asked once more, as long as it is there: nobody else tells what was missed."""
 PAUSE: Seconds = 0.2
-"""Pause before it is asked again. A question on a link that is broken ends at once, and so would all that follow."""
+"""Pause before it is asked again, the first; each is twice the one before. A question on a link that is broken ends
+at once, and so would all that follow."""
+CROWD = 64
+"""Processes that come at once from which on others are asked only after the first pause, if they are still there: who
+shows a thousand tokens of nobody is cut, and to ask for each of them takes seconds."""
 LOOK: Seconds = 0.05
 """Time between two looks at the links. A look halts the loop, and takes longer than all else that a message costs."""
 RUNS_KEPT = 256
@@ -106,6 +111,8 @@ class Readers:
         self._passing: set[str] = set()
         """Processes that pass on what others send, as of the last look."""
         self._looked_at: Seconds = -inf
+        self._asking: dict[tuple[str, Seconds], list[tuple[_Reader, Follower]]] = {}
+        """Who wants to ask a process that has never answered, and for how long."""
         self._flushing: list[tuple[str, keys.Flow, zenoh.Query]] = []
         self._decoded: tuple[Written, Message | None] | None = None
         self._flows: dict[keys.Flow, tuple[Any, ...]] = {}
@@ -301,32 +308,64 @@ class Readers:
     def _tell_forged(self, reader: _Reader, run: str) -> None:
         LOG.warning("%s: dropped messages that say they are of %s, which never sent them", reader.bus.name, run)
 
-    def _ask(self, reader: _Reader, run: str, follower: Follower, until: Seconds = inf) -> None:
-        """Ask a process for what is missing. until: time from which on it is not asked once more."""
-        if reader not in self._readers:
+    def _ask(self, reader: _Reader, run: str, follower: Follower, patience: Seconds = UNANSWERED) -> None:
+        """Ask a process for what is missing. patience: time for which it is asked again if it does not answer.
+
+        One that has never answered may be a mere token, of which there can be many: all who want something of it ask
+        together.
+        """
+        follower.asking = True
+        if not reader.kept:
+            self._told(reader, run, follower, None)
+        elif follower.has_answered:
+            self._ask_for(run, [(reader, follower)], self._loop.time() + patience)
+        else:
+            if (run, patience) not in self._asking:
+                pause = 0.0 if len(self._asking) < CROWD else PAUSE
+                self._loop.call_later(pause, self._ask_together, run, patience)
+            self._asking.setdefault((run, patience), []).append((reader, follower))
+
+    def _ask_together(self, run: str, patience: Seconds) -> None:
+        until, part, size = self._loop.time() + patience, list[tuple[_Reader, Follower]](), 0
+        asking = self._asking.pop((run, patience))
+        if run not in self._peers.publishers:
+            for reader, follower in asking:
+                self._told(reader, run, follower, None)
             return
-        now = self._loop.time()
-        until = min(until, now + UNANSWERED)
-        follower.asking, missing = True, follower.missing(now)
-        is_answered = False
+        for one in asking:
+            if part and size + len(one[0].kept) > PATTERNS:
+                self._ask_for(run, part, until)
+                part, size = [], 0
+            part.append(one)
+            size += len(one[0].kept)
+        self._ask_for(run, part, until)
+
+    def _ask_for(
+        self, run: str, asking: Sequence[tuple[_Reader, Follower]], until: Seconds, pause: Seconds = PAUSE
+    ) -> None:
+        asking = [one for one in asking if one[0] in self._readers]
+        if not asking:
+            return
+        is_answered, now = False, self._loop.time()
 
         def told(past: Past | None) -> None:
             nonlocal is_answered
             if not is_answered:
                 is_answered = True
-                self._told(reader, run, follower, past)
+                for reader, follower in asking:
+                    self._told(reader, run, follower, past)
 
         def ended(incomplete: Past | None) -> None:
             # It may be slow; or a link was cut, its own or ours, and it seems to be gone: the past is not lost yet.
-            if not is_answered and self._loop.time() < until:
-                self._loop.call_later(PAUSE, self._ask, reader, run, follower, until)
+            may_answer = run in self._peers.publishers or any(follower.has_answered for _, follower in asking)
+            if not is_answered and may_answer and self._loop.time() < until:
+                self._loop.call_later(pause, self._ask_for, run, asking, until, 2 * pause)
             else:
                 told(incomplete)
 
-        if reader.kept:
-            self._history.ask(reader.kept, run, missing, told, ended)
-        else:
-            told(None)
+        patterns = dict.fromkeys(pattern for reader, _ in asking for pattern in reader.kept)
+        missing = together([follower.missing(now) for _, follower in asking])
+        self._history.ask(tuple(patterns), run, missing, told, ended)
 
     def _told(self, reader: _Reader, run: str, follower: Follower, past: Past | None) -> None:
         follower.asking, known = False, follower.forged
@@ -348,7 +387,7 @@ class Readers:
     def _ask_again(self, reader: _Reader, run: str, follower: Follower) -> None:
         if reader in self._readers and run in self._peers.publishers and not follower.asking:
             follower.behind = True
-            self._catch_up(reader, run, follower)
+            self._ask(reader, run, follower, patience=0.0)
 
     def publisher_came(self, run: str, flow: keys.Flow) -> None:
         for reader in self._readers:

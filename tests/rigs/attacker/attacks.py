@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -190,8 +191,10 @@ def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> No
     by = Attacker(endpoint, Path(ring) if ring else None, role, name)
     os.nice(15)  # it stands for one on another machine, and takes no processor of the robot
     if attack == "stand-still":
-        by.open()
-        stand_still(by)
+        with suppress(zenoh.ZError):
+            by.open()
+            stand_still(by)
+        return
     end, times, refused = time.monotonic() + float(seconds), 0, 0
     while time.monotonic() < end:
         try:

@@ -8,6 +8,7 @@ doubled or come in another order. Needs `ss` and root, Linux alone has both ends
 import argparse
 import json
 import random
+import select
 import signal
 import subprocess
 import sys
@@ -74,9 +75,9 @@ def disturb(speakers: dict[str, Speaker], port: str, chance: random.Random) -> N
     what = chance.random()
     if what < 0.6:
         subprocess.run(["kill", "-STOP", str(pid)], check=True)
-        time.sleep(chance.choice([0.1, 0.25, 0.3, 0.5, 0.8, 1.5]))
+        select.select([], [], [], chance.choice([0.1, 0.25, 0.3, 0.5, 0.8, 1.5]))
         subprocess.run(["kill", "-CONT", str(pid)], check=True)
-        time.sleep(chance.random() * 0.1)
+        select.select([], [], [], chance.random() * 0.1)
     if what > 0.15:
         listed = subprocess.run(
             ["ss", "-tnpH", f"dport = :{port}"], capture_output=True, text=True, check=True
@@ -85,7 +86,7 @@ def disturb(speakers: dict[str, Speaker], port: str, chance: random.Random) -> N
             if f"pid={pid}," in line:
                 own = line.split()[3].rpartition(":")[2]
                 subprocess.run(["ss", "-K", f"sport = :{own}"], capture_output=True, check=True)
-    time.sleep(chance.choice([0.05, 0.1, 0.2, 0.5, 1.0]))
+    select.select([], [], [], chance.choice([0.05, 0.1, 0.2, 0.5, 1.0]))
 
 
 def trial(seconds: float, seed: int) -> int:
@@ -101,7 +102,7 @@ def trial(seconds: float, seed: int) -> int:
             disturbed += 1
         until = time.monotonic() + QUIET
         while (left := deaf(speakers)) and time.monotonic() < until:
-            time.sleep(0.5)
+            select.select([], [], [], 0.5)
     flood.send_signal(signal.SIGKILL)
     wrong = sum(each.wrong for each in speakers.values())
     for each in (*(one.process for one in speakers.values()), router):
