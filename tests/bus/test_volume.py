@@ -1,6 +1,7 @@
 """Who sends a lot to a router is told, with the name; who answers what it is asked is not."""
 
 import asyncio
+import socket
 from contextlib import suppress
 
 import pytest
@@ -9,7 +10,7 @@ import zenoh
 from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.session import open_session
-from engage_hri.services.bus.zenoh.volume import EXCUSED, FULL, UNREAD, Unread, Volume, Volumes, volumes
+from engage_hri.services.bus.zenoh.volume import EXCUSED, FULL, UNREAD, Unread, Volume, Volumes, sockets, volumes
 from tests.bus.places import PATIENCE, free_endpoint
 
 NAMES = {"a": "robot/observer/viewer", "c": "robot/control/control"}
@@ -30,6 +31,16 @@ def test_who_answers_what_is_asked_of_it_is_not_loud() -> None:
     for second in range(1, 60):
         asked = second * 10 * LOUD["observer"]
         assert kept.look({"a": Volume(EXCUSED * asked, asked)}, NAMES, second) == []
+
+
+def test_sockets_of_other_kinds_are_passed_over() -> None:
+    """The C library opens one to the kernel whenever a name is looked up, which Zenoh's threads do."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        kernel = socket.socket(getattr(socket, "AF_NETLINK"), socket.SOCK_RAW, 0)  # noqa: B009
+        with kernel, socket.create_connection(server.getsockname()) as link:
+            kernel.bind((0, 0))
+            ends = [tuple(f"{host}:{port}" for host, port in (link.getsockname(), link.getpeername()))]
+            assert [(own, other) for own, other, each in sockets() if each.fileno() == link.fileno()] == ends
 
 
 def test_a_full_link_of_which_nothing_is_read_is_to_end_and_one_that_is_read_slowly_is_not() -> None:

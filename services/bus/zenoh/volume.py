@@ -158,7 +158,7 @@ def end(is_meant: Callable[[str, str], bool], how: int = socket.SHUT_RDWR) -> li
 
 
 def sockets() -> Iterator[tuple[str, str, socket.socket]]:
-    """The sockets of this process that have another end: places of the own end and of that. Zenoh's stay Zenoh's."""
+    """The sockets of this process with another end on the net: places of both, own first. Zenoh's stay Zenoh's."""
     try:
         numbers = [int(each) for each in os.listdir("/proc/self/fd")]
     except OSError:
@@ -169,8 +169,9 @@ def sockets() -> Iterator[tuple[str, str, socket.socket]]:
         except OSError:
             continue
         try:
-            yield _place(link.getsockname()), _place(link.getpeername()), link
-        except (OSError, ValueError):
+            if link.family in (socket.AF_INET, socket.AF_INET6):
+                yield _place(link.getsockname()), _place(link.getpeername()), link
+        except OSError:  # it has no other end
             continue
         finally:
             link.detach()

@@ -24,6 +24,7 @@ from engage_hri.schemas.access import Holder
 from engage_hri.schemas.limits import BESIDE, most
 from engage_hri.services.bus.zenoh.crowd import MOST_TOKENS
 
+COMMAND = [sys.executable, "-m", "tests.rigs.attacker.attacks"]
 HUNDRED_MB = 100_000_000
 NOBODY = "stranger"
 """Role of one without keys."""
@@ -182,7 +183,6 @@ ATTACKS: Mapping[str, Callable[[Attacker], None]] = {
         encodings, unread_links, ghosts,
     )
 }  # fmt: skip
-COMMAND = [sys.executable, "-m", "tests.rigs.attacker.attacks"]
 
 
 def main(endpoint: str, ring: str, holder: str, attack: str, seconds: str) -> None:

@@ -2,11 +2,12 @@
 
 So a link is full, more than one thread waits for it, and Zenoh forgets the one that comes after it
 (docs/decisions/0136-a-link-that-zenoh-has-forgotten.md). Exit 1 if anybody stays deaf, or if numbers are left out,
-doubled or come in another order. Needs `ss` and root, Linux alone has both ends of a link in one place.
+doubled or come in another order. Needs Linux, root, and `ss`, which cuts links.
 """
 
 import argparse
 import json
+import os
 import random
 import select
 import signal
@@ -74,9 +75,9 @@ def disturb(speakers: dict[str, Speaker], port: str, chance: random.Random) -> N
     pid = speakers[chance.choice(NAMES)].process.process.pid
     what = chance.random()
     if what < 0.6:
-        subprocess.run(["kill", "-STOP", str(pid)], check=True)
+        os.kill(pid, signal.SIGSTOP)
         select.select([], [], [], chance.choice([0.1, 0.25, 0.3, 0.5, 0.8, 1.5]))
-        subprocess.run(["kill", "-CONT", str(pid)], check=True)
+        os.kill(pid, signal.SIGCONT)
         select.select([], [], [], chance.random() * 0.1)
     if what > 0.15:
         listed = subprocess.run(
@@ -103,7 +104,7 @@ def trial(seconds: float, seed: int) -> int:
         until = time.monotonic() + QUIET
         while (left := deaf(speakers)) and time.monotonic() < until:
             select.select([], [], [], 0.5)
-    flood.send_signal(signal.SIGKILL)
+    flood.kill()
     wrong = sum(each.wrong for each in speakers.values())
     for each in (*(one.process for one in speakers.values()), router):
         each.end()
