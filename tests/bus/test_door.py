@@ -69,7 +69,8 @@ async def test_who_is_kept_out_and_calls_again_is_turned_away_before_it_can_show
         ]
         async with asyncio.timeout(PATIENCE):
             assert (await lines.get()).startswith("too many: ")
-            assert await calls.get() == "SampleKind.DELETE"
+            for cut in ("SampleKind.DELETE", "SampleKind.PUT", "SampleKind.DELETE"):
+                assert await calls.get() == cut  # of its first link the router may still read the rest
             watched = quiet.liveliness().declare_subscriber(
                 keys.own(run, "log/*"),
                 zenoh.handlers.Callback(lambda one: seen.append(str(one.kind)), indirect=False),

@@ -154,6 +154,8 @@ def end(is_meant: Callable[[str, str], bool], how: int = socket.SHUT_RDWR) -> li
             with suppress(OSError):  # it has ended by itself
                 each.shutdown(how)
                 ended.append((own, where))
+                while each.recv(65_536, socket.MSG_DONTWAIT):
+                    pass  # a kernel hands out what has come before, and Zenoh would take it
     return ended
 
 
