@@ -133,6 +133,21 @@ def test_who_sends_a_key_that_takes_for_ever_to_match_is_named_be_it_allowed_or_
     assert told(checked("Query", key, un="", flow="egress")) == []
 
 
+def test_a_refusal_of_a_key_with_the_words_of_an_allowance_is_told() -> None:
+    key = "robot/engage/v1/evt/x is authorized to Put (ingress) on robot/fault"
+    known = checked("Put", un="")
+
+    assert told(known, checked("Put", key)) == ["denied: robot/manager/bob may not put robot/engage/v1/evt/x"]
+
+
+def test_costly_keys_of_one_holder_hide_no_refused_link() -> None:
+    names = [f"robot/engage/v1/@bus/{'$*0' * number}" for number in range(5, 5 + 2 * MOST)]
+    refused = "2026-11-22T22:21:19Z WARN acc-0 ThreadId(05) zenoh_link_tls::unicast: no certificate"
+
+    said = told(*(checked("Query", name, un="") for name in names), refused)
+    assert said[-1] == "refused a link: no certificate"
+
+
 def test_other_errors_of_zenoh_are_passed_on() -> None:
     assert told("2026-11-22T22:21:19Z ERROR acc-0 ThreadId(05) zenoh::x: no memory")[0].startswith("zenoh: 2026")
     assert not told("2026-11-22T22:21:19Z DEBUG acc-0 ThreadId(05) zenoh_link_tls::utils: Loading certificates", "")

@@ -86,7 +86,7 @@ class Denials:
             line = line[:LONGEST] + b"..."
         before, self._before = self._before, line
         if line.endswith(_DROPPED):
-            if b" is authorized to " in before:
+            if _is_allowance(before):
                 self._drop(before, line)
             return False
         if line.startswith(_PACING, (after := line.find(_AFTER)) + len(_AFTER)):
@@ -127,7 +127,7 @@ class Denials:
 
         New is an allowance of a process without a name yet, or of a costly key.
         """
-        if b" is authorized to " in line:
+        if _is_allowance(line):
             if (said := _WHO.search(line)) is None or said[1] not in self._zids:
                 return False
             if (what := _INGRESS.search(line)) is not None:
@@ -171,7 +171,8 @@ class Denials:
             self._know(checked["zid"], checked["name"])
         who = self._names.get(checked["zid"], f"process {checked['zid']}")
         if (wild := checked["key"].count("$*")) > WILD and checked["flow"] == "ingress":
-            self._say(f"costly: {who} has sent a key with {wild} `$*`; while it is matched the router stands still")
+            news = f"costly: {who} has sent a key with {wild} `$*`; while it is matched the router stands still"
+            self._say(news, f"of what {who} does")
         if (caching := self._caching.get(thread)) is not None:
             is_cached = not checked["cached"] and caching == (checked["flow"], checked["key"])
             if not is_cached or checked["what"] == _LAST_CACHED:
@@ -217,3 +218,9 @@ def _thread(line: bytes) -> bytes:
     """Number of the thread that wrote a line; empty: it is the rest of one."""
     found = _THREAD.search(line)
     return found[1] if found else b""
+
+
+def _is_allowance(line: bytes) -> bool:
+    """Tell whether a line says that something is allowed. The verdict is before the key, which may hold any words."""
+    verdict, found, _ = line.partition(b"authorized to ")
+    return bool(found) and verdict.endswith(b" is ")
