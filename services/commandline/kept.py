@@ -27,14 +27,16 @@ def opened(path: Path) -> "Recording":
     from engage_hri.services.recording.disk import read
 
     recording = read(path)
-    if not recording.is_whole:
+    if (there := recording.another) is not None:
+        complain(f"{path}: another recording begins at byte {there}, and is not read")
+    elif not recording.is_whole and recording.has_all_data:
+        complain(f"{path}: the index at its end is damaged; its data is there, {len(recording)} messages")
+    if not recording.is_whole and not recording.has_all_data:
         behind = f", {recording.lost_bytes} bytes behind them are not" if recording.lost_bytes else ""
         complain(
             f"{path}: its end is missing or damaged; {len(recording)} messages until {recording.duration:.2f} s"
             f" are whole{behind}"
         )
-    if (there := recording.another) is not None:
-        complain(f"{path}: another recording begins at byte {there}, and is not read")
     for place in recording.damaged:
         complain(f"{path}: damaged at byte {place.offset}: {place.reason}")
     if recording.losses.total:

@@ -64,11 +64,14 @@ def _repair(path: Path | None) -> int:
 
     if path is None:
         raise InputRefused(Fault(reason="needs a FILE", where="--repair"))
-    if read(path).is_whole:
-        print(f"{path}: nothing to repair")
-        return DONE
+    before = read(path)
     cut = repair(path)
-    print(f"{path}: {len(read(path))} messages; {cut} bytes at the end were not whole and are cut off")
+    done = "nothing to repair" if before.is_whole else f"{len(before)} messages, and a new index"
+    if cut:
+        done += f"; {cut} bytes at the end were not whole and are cut off"
+    if before.damaged:
+        done += "; what is damaged before its end cannot be brought back, and all commands leave it out"
+    print(f"{path}: {done}")
     return DONE
 
 

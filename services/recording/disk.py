@@ -196,7 +196,7 @@ def read(path: Path) -> Recording:
 
 
 def repair(path: Path) -> int:
-    """Cut off what is no whole record, and write the end that is missing. Returns the bytes that were cut off.
+    """Cut off what is no whole record, and write the end that is missing. Returns the bytes of data that it cut.
 
     Raises InputRefused: it is no recording, somebody writes it, it cannot be written, or another one is behind it.
     """
@@ -236,7 +236,7 @@ def repair(path: Path) -> int:
         ) from error
     except OSError as error:
         raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
-    return recording.lost_bytes
+    return 0 if recording.has_all_data else recording.lost_bytes
 
 
 def _sync_folder(path: Path) -> None:

@@ -82,8 +82,9 @@ class Recording:
     """A recording. Its messages are numbered from 0, in the order in which they came to the recorder.
 
     facts: what the recorder wrote of itself at the beginning (docs/recordings.md). notes: what it wrote later, by
-    name. is_whole: its end is there, and agrees with its checksum. lost_bytes: bytes at the end that were not read.
-    damaged: everything else that is not as a recorder wrote it.
+    name. is_whole: its end is there, and agrees with its checksum. has_all_data: the data ends where it says so, and
+    only the index behind it may be damaged. lost_bytes: bytes at the end that were not read. damaged: everything
+    else that is not as a recorder wrote it.
     """
 
     def __init__(self, data: bytes, name: str = "recording") -> None:
@@ -91,7 +92,7 @@ class Recording:
         self.name = name
         self.facts: dict[str, str] = {}
         self.notes: dict[str, dict[str, str]] = {}
-        self.is_whole = False
+        self.is_whole = self.has_all_data = False
         self.lost_bytes = 0
         self.damaged: list[Damaged] = []
         self._data = data
@@ -254,7 +255,7 @@ class Recording:
         if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
             raise InputRefused(Fault(reason="this is no MCAP file", where=self.name))
         until = self._read_index()
-        self.is_whole = until is not None
+        self.is_whole = self.has_all_data = until is not None
         until = size if until is None else until
         at = good = len(MCAP0_MAGIC)
         while at + _HEAD.size <= until:
@@ -262,6 +263,7 @@ class Recording:
             end = at + _HEAD.size + length
             is_end = opcode == Opcode.DATA_END and end == at + _DATA_END
             if is_end and not self.is_whole:
+                self.has_all_data = self._next_chunk(at, size) is None
                 break
             try:
                 if end > until or is_end:

@@ -18,6 +18,7 @@ from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.config import load
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat
 from tests.bus.places import PATIENCE, free_endpoint
 from tests.cli.command import Engage, engage, start
@@ -130,6 +131,34 @@ def test_a_cut_file_is_read_and_repaired_and_that_is_said(run: Engage, tmp_path:
     assert "49 messages" in repaired.out
     assert "nothing to repair" in again.out
     assert read(path).is_whole
+
+
+def test_a_damaged_index_is_told_from_a_missing_end_and_a_repair_from_what_it_cannot_do(
+    run: Engage, tmp_path: Path
+) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told())
+    begin = Recording(data).end + 20
+    path.write_bytes(data[:begin] + bytes([data[begin] ^ 1]) + data[begin + 1 :])
+
+    shown = run("export", path, "--csv")
+    repaired = run("record", path, "--repair")
+
+    assert shown.err.splitlines()[0].endswith("the index at its end is damaged; its data is there, 50 messages")
+    assert repaired.out.endswith("50 messages, and a new index\n")
+    assert path.read_bytes()[: begin - 20] == data[: begin - 20]
+
+    middle = Recording(data).contents.chunks[1].chunk_start_offset + 60
+    path.write_bytes(data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :])
+    assert run("record", path, "--repair").out.endswith("cannot be brought back, and all commands leave it out\n")
+
+
+def test_of_a_recording_behind_another_only_that_is_said(run: Engage, tmp_path: Path) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told())
+    path.write_bytes(data + data)
+
+    shown = run("export", path, "--csv")
+
+    assert [f"{path}: another recording begins at byte {len(data)}, and is not read"] == shown.err.splitlines()
 
 
 def test_of_a_file_that_ends_between_two_chunks_no_bytes_are_said_to_be_lost(run: Engage, tmp_path: Path) -> None:
