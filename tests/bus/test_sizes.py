@@ -133,26 +133,28 @@ async def test_questions_and_answers_are_bounded_as_their_key_is(sides: tuple[ze
         if got.ok is not None:
             answers.append((str(got.ok.key_expr), len(got.ok.payload.to_bytes())))
 
-    def ask(key: str, question: int, answer: int) -> None:
+    def ask(key: str, question: int, answer: int, patience: float = PATIENCE) -> None:
         handler = zenoh.handlers.Callback(answered, lambda: ends.append(key), indirect=False)
-        sender.get(f"{key}?size={answer}", handler, payload=bytes(question), timeout=PATIENCE / 20)
+        sender.get(f"{key}?size={answer}", handler, payload=bytes(question), timeout=patience)
 
     for key in all_keys:
         witness.session.declare_queryable(key, zenoh.handlers.Callback(reply, indirect=False))
-    ask(all_keys[-1], 0, 0)
+    ask(all_keys[-1], 0, 0, PATIENCE / 20)
     while not answers:
         await witness.wait(lambda: bool(ends))
         ends.clear()
-        ask(all_keys[-1], 0, 0)
+        ask(all_keys[-1], 0, 0, PATIENCE / 20)
     await witness.wait(lambda: bool(ends))
     for list_of in (heard, answers, ends):
         list_of.clear()  # type: ignore[attr-defined]
 
     for key in all_keys:
-        for size in (most(key) + BESIDE, most(key) + BESIDE + 1):
-            ask(key, size, 0)
-            ask(key, 0, size)
-        await witness.wait(lambda key=key: len([each for each in answers if each[0] == key]) == 2)
+        most_of_all = most(key) + BESIDE
+        for number, (question, answer) in enumerate(((most_of_all, 0), (0, most_of_all)), 1):
+            ask(key, question, answer)  # one after the other: a link that is full for long is closed
+            await witness.wait(lambda key=key, number=number: [each[0] for each in answers].count(key) == number)
+        for question, answer in ((most_of_all + 1, 0), (0, most_of_all + 1)):
+            ask(key, question, answer, PATIENCE / 20)
     await witness.wait(lambda: len(ends) == 4 * len(all_keys))
 
     assert sorted(heard) == sorted((key, size) for key in all_keys for size in (0, 0, most(key) + BESIDE))
