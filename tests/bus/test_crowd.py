@@ -1,7 +1,7 @@
 """Who has too many links or tokens at a router: counted by certificate, cut at the bound, let in again later."""
 
 from engage_hri.schemas.access import Holder
-from engage_hri.services.bus.zenoh.crowd import BANNED, MOST_LINKS, MOST_TOKENS, MOST_UNREAD, Crowd, Link
+from engage_hri.services.bus.zenoh.crowd import BANNED, GOING, MOST_LINKS, MOST_TOKENS, MOST_UNREAD, Crowd, Link
 
 ALICE = Holder(robot="robot", role="manager", name="alice")
 BOB = Holder(robot="robot", role="manager", name="bob")
@@ -22,6 +22,65 @@ def test_one_link_more_than_the_bound_ends_all_of_that_certificate_and_no_other(
     assert ALICE.common_name in line
     assert str(MOST_LINKS) in line
     assert set(ended) == {link(ALICE, number) for number in range(MOST_LINKS + 1)}
+
+
+CONTROL = Holder(robot="robot", role="control", name="control")
+
+
+def test_of_a_service_the_first_link_stays_and_only_that_one_comes_again() -> None:
+    """Somebody else with its keys shows tokens of processes that are none: the service itself goes on."""
+    crowd = Crowd((CONTROL,))
+    own, *others = (link(CONTROL, number) for number in range(3))
+    for each in (own, *others):
+        crowd.came(each, 0.0)
+    said = [crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0) for number in range(MOST_LINKS + 1)]
+
+    assert said[:-1] == [("", ())] * MOST_LINKS
+    assert "its links end but for the first" in said[-1][0]
+    assert said[-1][1] == tuple(others)
+    for each in others:
+        crowd.went(each)
+    for number in range(1, MOST_LINKS + 1):
+        crowd.withdrawn(f"{CONTROL.mark}{number}", "token")
+    assert crowd.still(GOING) == ("", ())
+    assert crowd.is_banned(link(CONTROL, 7), 2.0)
+    crowd.went(own)
+    assert not crowd.is_banned(own, 2.0)
+    assert crowd.came(own, 2.0) == ("", ())
+    assert crowd.came(link(CONTROL, 7), BANNED - 0.1) == ("", (link(CONTROL, 7),))
+
+
+def test_a_service_whose_last_link_still_shows_too_many_loses_that_too() -> None:
+    crowd = Crowd((CONTROL,))
+    crowd.came(link(CONTROL, 0), 0.0)
+    for number in range(MOST_LINKS + 1):
+        crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0)
+
+    line, ended = crowd.still(GOING)
+
+    assert ended == (link(CONTROL, 0),)
+    assert CONTROL.common_name in line
+    crowd.went(link(CONTROL, 0))
+    assert crowd.is_banned(link(CONTROL, 0), BANNED - 0.1)
+    assert crowd.still(2 * GOING) == ("", ())
+
+
+def test_who_takes_the_place_of_a_spared_service_and_shows_too_many_loses_its_link() -> None:
+    crowd = Crowd((CONTROL,))
+    crowd.came(link(CONTROL, 0), 0.0)
+    crowd.came(link(CONTROL, 1), 0.0)
+    tokens = [f"{CONTROL.mark}{number}" for number in range(MOST_LINKS + 1)]
+    for each in tokens:
+        crowd.shown(each, "token", 0.0)
+    for number in range(2):
+        crowd.went(link(CONTROL, number))
+    for each in tokens:
+        crowd.withdrawn(each, "token")
+    crowd.came(link(CONTROL, 2), GOING)
+    said = [crowd.shown(each, "token", GOING) for each in tokens]
+
+    assert said[-1][1] == (link(CONTROL, 2),)
+    assert crowd.is_banned(link(CONTROL, 3), GOING + 1)
 
 
 def test_who_goes_makes_room() -> None:

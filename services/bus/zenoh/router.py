@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
-from engage_hri.services.bus.zenoh.crowd import Crowd, Link
+from engage_hri.services.bus.zenoh.crowd import GOING, Crowd, Link
 from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.forgotten import Forgotten
@@ -170,9 +170,13 @@ class Door:
     def _keep_out(self, line: str, links: Iterable[Link]) -> None:
         if line:
             self._tell(printable(line))
+            self._loop.call_later(GOING, self._look_again)
         if links and not self._ending:
             self._loop.call_later(TOGETHER, self._end)
         self._ending.update(links)
+
+    def _look_again(self) -> None:
+        self._keep_out(*self._crowd.still(self._loop.time()))
 
     def _end(self) -> None:
         ending = {place(link.address) for link in self._ending}
