@@ -18,7 +18,7 @@ from engage_hri.services.bus.zenoh.history import History
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.order import Missing, Past, Written
 from engage_hri.services.bus.zenoh.peers import CLOCK_TRIPS, Peers
-from engage_hri.services.bus.zenoh.readers import RUNS_KEPT, UNANSWERED
+from engage_hri.services.bus.zenoh.readers import CROWD, PAUSE, RUNS_KEPT, UNANSWERED
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time
@@ -231,6 +231,32 @@ async def test_of_a_crowd_of_tokens_without_processes_few_are_asked_and_none_tha
 
     assert numbers(await messages(inbox)) == [2]
     assert {*asked} == {there.run, *(f"ghost{number}" for number in range(400, 500))}
+
+
+async def test_a_crowd_is_asked_a_few_at_a_time_and_each_once(
+    pair: tuple[ZenohHub, ZenohHub], monkeypatch: pytest.MonkeyPatch
+):
+    here, _ = pair
+    loop, asked, all_asked = asyncio.get_running_loop(), list[tuple[str, float]](), asyncio.Event()
+    crowd = [f"process{number}" for number in range(3 * CROWD)]
+
+    def ask_past(patterns: Sequence[str], run: str, missing: Missing, told: Told, ended: Ended) -> None:
+        if run in crowd:
+            asked.append((run, loop.time()))
+        loop.call_soon(told, Past({}, ()))
+        if len(asked) == len(crowd):
+            all_asked.set()
+
+    monkeypatch.setattr(here._history, "ask", ask_past)
+    inbox = here.join("here").subscribe(keys.WORLD)
+    for run in crowd:
+        here.peers.publishers[run] = {"news"}
+        here.readers.publisher_came(run, "news")
+    await asyncio.wait_for(all_asked.wait(), PATIENCE)
+
+    assert sorted(run for run, _ in asked) == sorted(crowd)
+    assert all(late - early > PAUSE / 2 for (_, early), (_, late) in zip(asked, asked[CROWD:], strict=False))
+    assert not len(inbox)
 
 
 async def test_processes_that_read_one_clock_do_not_ask_one_another_for_the_time(monkeypatch: pytest.MonkeyPatch):

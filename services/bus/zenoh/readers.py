@@ -48,8 +48,8 @@ PAUSE: Seconds = 0.2
 """Pause before it is asked again, the first; each is twice the one before. A question on a link that is broken ends
 at once, and so would all that follow."""
 CROWD = 64
-"""Processes that come at once from which on others are asked only after the first pause, if they are still there: who
-shows a thousand tokens of nobody is cut, and to ask for each of them takes seconds."""
+"""Processes that are asked at once. Of those that come together the others follow, as many after each first pause, if
+they are still there: who shows a thousand tokens of nobody is cut, and to ask for each of them takes seconds."""
 LOOK: Seconds = 0.05
 """Time between two looks at the links. A look halts the loop, and takes longer than all else that a message costs."""
 RUNS_KEPT = 256
@@ -321,7 +321,7 @@ class Readers:
             self._ask_for(run, [(reader, follower)], self._loop.time() + patience)
         else:
             if (run, patience) not in self._asking:
-                pause = 0.0 if len(self._asking) < CROWD else PAUSE
+                pause = len(self._asking) // CROWD * PAUSE
                 self._loop.call_later(pause, self._ask_together, run, patience)
             self._asking.setdefault((run, patience), []).append((reader, follower))
 
