@@ -19,18 +19,23 @@ async def test_no_fragment_is_lost_to_messages_that_are_too_large_and_their_send
             calm = await siege.perform(robot, time.monotonic() + 60, fragments=1)
             attacks = [
                 await attacked(siege, robot, role, attack, 3.0)
-                for role, attack in (("observer", "one-byte-more"), ("manager", "huge"), (NOBODY, "huge"))
-            ]
+                for role, attack in (
+                    ("observer", "one-byte-more"), ("manager", "huge"), (NOBODY, "huge"), ("generation", "ghosts"),
+                )
+            ]  # fmt: skip
+            environment = siege.environment
     assert not calm.lost
     for one in attacks:
         assert (one.role, one.performed.lost) == (one.role, [])
         assert one.performed.seconds
-    large, huge, stranger = attacks
+    assert b"MALLOC_ARENA_MAX=2" in environment, "floods of questions leave holes in every heap"
+    large, huge, stranger, ghosts = attacks
     for what in ("a put on robot/engage/v1/evt/viewer/fault", "a query on robot/engage/v1/rpc/control/describe"):
         assert any(f"robot/observer/viewer sends {what} that is larger" in line for line in large.told), large.told
     assert any(line.startswith("loud: robot/manager/mallory sends") for line in huge.told), huge.told
     assert stranger.times == 0
     assert any("refused a link" in line for line in stranger.told), stranger.told
+    assert any("its links end but for the first" in line for line in ghosts.told), ghosts.told
 
 
 async def test_no_fragment_is_lost_to_a_stranger_on_a_robot_that_is_open_to_all(tmp_path: Path) -> None:

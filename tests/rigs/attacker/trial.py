@@ -66,7 +66,17 @@ class Siege:
 
     def memory(self) -> float:
         """Memory of the router's processes, in MB."""
-        return sum(_memory(pid) for pid in _family(self.router.process.pid))
+        return sum(map(_memory, self.family))
+
+    @property
+    def family(self) -> list[int]:
+        """Processes of the router: the one that watches, then the one that routes."""
+        return _family(self.router.process.pid)
+
+    @property
+    def environment(self) -> list[bytes]:
+        """Variables of the process that routes."""
+        return Path(f"/proc/{self.family[1]}/environ").read_bytes().split(b"\0")
 
     def told_of(self, role: str) -> list[str]:
         """Lines of the router so far about the holder of a role, or about one without a name."""
