@@ -26,8 +26,8 @@ class Forgotten:
         """tell: called with a line for each link that is ended."""
         self._info: Any = session.info
         self._tell = tell
-        self._links: dict[tuple[str, str], tuple[str, str]] = {}
-        """Id of the process at the other end of each link, and how it is called, by the places of both ends."""
+        self._links: dict[str, tuple[tuple[str, str], str]] = {}
+        """Places of both ends of the link to each process, and how it is called. Zenoh does not tell of every end."""
         self._loop = asyncio.get_running_loop()
         self._timer = self._loop.call_later(LOOK, self._look)
 
@@ -39,15 +39,15 @@ class Forgotten:
         link = event.link
         zid, places = str(link.zid), (place(str(link.src)), place(str(link.dst)))
         if event.kind == zenoh.SampleKind.PUT:
-            self._links[places] = (zid, link.auth_identifier or f"process {zid}")
-        else:
-            self._links.pop(places, None)
+            self._links[zid] = (places, link.auth_identifier or f"process {zid}")
+        elif zid in self._links and self._links[zid][0] == places:
+            del self._links[zid]
 
     def _look(self) -> None:
         self._timer = self._loop.call_later(LOOK, self._look)
         known = {str(transport.zid) for transport in self._info.transports()}
-        lost = {places: name for places, (zid, name) in self._links.items() if zid not in known}
-        if lost:
+        if gone := self._links.keys() - known:
+            lost = dict(self._links.pop(zid) for zid in gone)
             # Only what comes is cut off: so Zenoh has done with the link before the other process calls again.
             for places in end(lambda own, other: (own, other) in lost, socket.SHUT_RD):
                 self._tell(f"deaf: Zenoh sends {lost[places]} nothing any more; their link is opened anew")

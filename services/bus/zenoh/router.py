@@ -84,7 +84,7 @@ async def routing(
         session = open_router(connect, listen, more)
         bridge = LoopBridge(lambda error, what: LOG.error("%s: %s", what, error, exc_info=error))
         door = Door(session, bridge, Crowd(holders), tell, served)
-        listening = Listening(door.links, tell, door.unread)
+        listening = Listening(door.links, tell, door.unread, door.went)
         try:
             yield Routing(session, bridge)
         finally:
@@ -159,8 +159,13 @@ class Door:
             self.links[place(link.address)] = link
             self._keep_out(*self._crowd.came(link, self._loop.time()))
         else:
-            self.links.pop(place(link.address), None)
-            self._crowd.went(link)
+            self.went(link)
+
+    def went(self, link: Link) -> None:
+        """Take the end of a link, of which there may be news more than once."""
+        if self.links.get(place(link.address)) == link:
+            del self.links[place(link.address)]
+        self._crowd.went(link)
 
     def unread(self, link: Link) -> None:
         """End a link that is full and not read, unless that is on its way."""

@@ -95,12 +95,20 @@ class Listening:
     """Looks at the links of this process, and tells who is loud or reads nothing, until it is closed."""
 
     def __init__(
-        self, links: Mapping[str, Link], tell: Callable[[str], None], unread: Callable[[Link], None]
+        self,
+        links: Mapping[str, Link],
+        tell: Callable[[str], None],
+        unread: Callable[[Link], None],
+        went: Callable[[Link], None],
     ) -> None:
-        """links: those that there are, by the address at the other end. unread: called with one to end."""
+        """links: those that there are, by the address at the other end. unread: called with one to end.
+
+        went: called with one that has ended: Zenoh says nothing of one that it has closed because it was full.
+        """
         self._links = links
         self._tell = tell
         self._end = unread
+        self._went = went
         self._loop = asyncio.get_running_loop()
         self._volumes, self._unread = Volumes(self._loop.time()), Unread()
         self._next = self._loop.time() + SPAN
@@ -112,6 +120,10 @@ class Listening:
     def _look(self) -> None:
         began = time.perf_counter()
         found, now = volumes(), self._loop.time()
+        if found:  # no kernel but Linux' tells
+            for link in [link for where, link in self._links.items() if where not in found]:
+                if link.address.startswith(("tcp/", "tls/")):
+                    self._went(link)
         for where in self._unread.look(found, now):
             if where in self._links:
                 self._end(self._links[where])
