@@ -181,6 +181,18 @@ def test_links_that_are_not_read_are_forgotten_after_a_while() -> None:
         assert crowd.unread(link(ALICE, number), number * BANNED / MOST_UNREAD)[0].startswith("not read: ")
 
 
+def test_of_a_service_only_the_first_link_stays_when_it_is_not_read() -> None:
+    crowd = Crowd((CONTROL,))
+    own, other = link(CONTROL, 0), link(CONTROL, 1)
+    for each in (own, other):
+        crowd.came(each, 0.0)
+
+    assert crowd.unread(own, 0.0) == ("", ())
+    assert crowd.unread(other, 0.0)[1] == (other,)
+    crowd.went(own)
+    assert crowd.unread(other, 0.0) == ("", ())
+
+
 def test_a_link_that_is_not_read_stays_if_it_is_a_service_or_nobody_can_know_whose_it_is() -> None:
     control = Holder(robot="robot", role="control", name="control")
     crowd = Crowd((ALICE, control))

@@ -81,10 +81,10 @@ class Crowd:
     def unread(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a link that is full and not read; returns as `came`.
 
-        A service keeps its link: it is there to be asked much. So do all without keys, for they may be services.
+        A service keeps its first link: it is there to be asked much. All without keys keep theirs: they may be services.
         """
         who = _owner(link)
-        if not link.name or _is_service(who):
+        if not link.name or (_is_service(who) and link == next(iter(self._links.get(who, ())), link)):
             return "", ()
         own = {one: at for one, at in self._unread.get(who, {}).items() if at > now - BANNED}
         self._unread[who] = own

@@ -20,7 +20,7 @@ from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.forgotten import Forgotten
 from engage_hri.services.bus.zenoh.rules import access_control
-from engage_hri.services.bus.zenoh.session import LoopBridge, encrypted, open_router
+from engage_hri.services.bus.zenoh.session import ROUTER_STALL_US, STALL, LoopBridge, encrypted, open_router
 from engage_hri.services.bus.zenoh.sizes import paced
 from engage_hri.services.bus.zenoh.volume import Listening, end, place
 
@@ -76,7 +76,7 @@ async def routing(
         if keys_of_router is not None:
             holders = keys_of_router.holders()
             more = {**encrypted(keys_of_router), "access_control": access_control(holders)}
-            more["downsampling"] = paced(holders)
+            more |= {"downsampling": paced(holders), STALL: ROUTER_STALL_US}
             os.environ["RUST_LOG"] = LEVELS
             zenoh.init_log_from_env_or(LEVELS)
             own = keys_of_router.holder

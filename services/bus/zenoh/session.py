@@ -41,6 +41,10 @@ LEASE_MS = 2000
 """Time in which a silent link counts as alive: with shorter ones peers seem to go and come on cuts of 0.4 s."""
 STALL_US = 200_000
 """Time that a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
+ROUTER_STALL_US = 400_000
+"""The same in a router with keys, which ends such links itself, sooner (volume.py). Once Zenoh has begun to close a
+link that nobody reads, nothing ends that, and each message for it halts whoever sends it."""
+STALL = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
 """Place in Zenoh's source, at the end of its errors: of no use to a user."""
 ROUTER_MS = 2000
@@ -213,7 +217,7 @@ def _config(
         "timestamping/enabled": True,
         "transport/link/tx/lease": LEASE_MS,
         "transport/link/tcp": ON_THE_WAY,
-        "transport/link/tx/queue/congestion_control/block/wait_before_close": STALL_US,
+        STALL: STALL_US,
         "transport/shared_memory/enabled": False,
     }
     if robot is not None:
