@@ -81,7 +81,7 @@ class Crowd:
     def unread(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a link that is full and not read; returns as `came`.
 
-        A service keeps its first link: it is there to be asked much. All without keys keep theirs: they may be services.
+        A service keeps its first link: it is there to be asked much. Without keys all keep theirs: each may be one.
         """
         who = _owner(link)
         if not link.name or (_is_service(who) and link == next(iter(self._links.get(who, ())), link)):
