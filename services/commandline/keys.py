@@ -54,6 +54,10 @@ def _done(options: Options) -> int:
     from engage_hri.services.commandline import certificates
 
     folder, named = options.folder, options.holders or []
+    if folder.exists() and not folder.is_dir():
+        raise InputRefused(
+            Fault(reason="this is no folder", where=str(folder), advice="keys are in a folder: name that")
+        )
     match options.do:
         case "init":
             _check_robot(options.robot)

@@ -101,17 +101,21 @@ async def _listen(
             is_alive()
 
     is_alive()
-    reading = asyncio.gather(_each(lines, take), _each(process.stdout, take_other))
+    reading = {asyncio.create_task(_each(lines, take)), asyncio.create_task(_each(process.stdout, take_other))}
+    left = reading
     try:
-        while not reading.done():
-            await asyncio.wait([reading], timeout=min(SILENCE, silences.look - loop.time()))
-            if not reading.done() and silences.due(loop.time()):
+        while left:
+            patience = min(SILENCE, silences.look - loop.time())
+            done, left = await asyncio.wait(left, timeout=patience, return_when=asyncio.FIRST_COMPLETED)
+            for each in done:
+                each.result()
+            if left and silences.due(loop.time()):
                 return has_shown, True
-        reading.result()
         return has_shown, False
     finally:
-        reading.cancel()
-        await asyncio.wait([reading])
+        for each in reading:
+            each.cancel()
+        await asyncio.wait(reading)
 
 
 async def _each(stream: asyncio.StreamReader, take: Callable[[bytes], None]) -> None:

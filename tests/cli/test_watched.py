@@ -275,6 +275,8 @@ async def test_a_router_goes_with_who_watches_over_it_and_its_place_is_free() ->
         out, err = await third.communicate()
     assert (third.returncode, out, err.count(b"\n")) == (3, b"", 1)
     assert await stopped(second, signal.SIGTERM) == 0
+    _, complaints = await second.communicate()
+    assert complaints == b""
     await first.communicate()
 
 

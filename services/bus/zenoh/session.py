@@ -47,6 +47,15 @@ link that nobody reads, nothing ends that, and each message for it halts whoever
 STALL = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")
 """Place in Zenoh's source, at the end of its errors: of no use to a user."""
+LINK_SETTINGS = re.compile(r"#so_\w+=[\w=;]+")
+"""Our settings of a link, behind its endpoint there."""
+_DO = {
+    "(os error 13)": "a port below 1024 wants more rights: take another one",
+    "(os error 98)": "something listens there: stop it, or take another port",
+    "(os error 99)": "listen at an address of this machine, or at 0.0.0.0 for all that it has",
+    "lookup address information": "no machine of this name is known: is it misspelled?",
+}
+"""Advice for errors of the system, by a part of their text."""
 ROUTER_MS = 2000
 """Time that one try to reach a router may take, in which the loop stands still: nothing runs on it yet. Any link has
 this time to open."""
@@ -115,8 +124,9 @@ def open_session(
         session = zenoh.open(_config(robot, connect, tuple(listen) or (LOOPBACK,), mode, more))
         return session, bool(connect)
     except zenoh.ZError as error:
-        where, reason = ", ".join((*listen, *connect)), RUST_PLACE.sub("", str(error))
-        raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=ADVICE)) from error
+        where, reason = ", ".join((*listen, *connect)), LINK_SETTINGS.sub("", RUST_PLACE.sub("", str(error)))
+        advice = next((advice for sign, advice in _DO.items() if sign in reason), ADVICE)
+        raise RunFailed(Fault(reason=f"cannot open the bus: {reason}", where=where, advice=advice)) from error
 
 
 async def open_client(
