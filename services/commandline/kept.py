@@ -30,7 +30,8 @@ def opened(path: Path) -> "Recording":
     if (there := recording.another) is not None:
         complain(f"{path}: another recording begins at byte {there}, and is not read")
     elif not recording.is_whole and recording.has_all_data:
-        complain(f"{path}: the index at its end is damaged; its data is there, {len(recording)} messages")
+        whole = f"its data is there, {len(recording)} messages"
+        complain(f"{path}: the index at its end is damaged, or more stands behind it; {whole}")
     if not recording.is_whole and not recording.has_all_data:
         behind = f", {recording.lost_bytes} bytes behind them are not" if recording.lost_bytes else ""
         complain(

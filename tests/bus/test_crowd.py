@@ -65,6 +65,28 @@ def test_a_service_whose_last_link_still_shows_too_many_loses_that_too() -> None
     assert crowd.still(2 * GOING) == ("", ())
 
 
+def test_a_look_for_another_does_not_judge_a_service_before_its_time() -> None:
+    crowd = Crowd((CONTROL,))
+    crowd.came(link(CONTROL, 0), 0.0)
+    for number in range(MOST_LINKS + 1):
+        crowd.shown(f"{CONTROL.mark}{number}", "token", 4.9)
+
+    assert crowd.still(GOING) == ("", ())
+    assert crowd.still(4.9 + GOING)[1] == (link(CONTROL, 0),)
+
+
+def test_the_same_process_comes_back_though_its_old_link_still_counts() -> None:
+    crowd = Crowd((CONTROL,))
+    own = link(CONTROL, 0)
+    crowd.came(own, 0.0)
+    for number in range(MOST_LINKS + 1):
+        crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0)
+    again = own._replace(address="tls/127.0.0.1:9999")
+
+    assert crowd.came(again, 1.0) == ("", ())
+    assert crowd.is_banned(link(CONTROL, 7), 1.0)
+
+
 def test_who_takes_the_place_of_a_spared_service_and_shows_too_many_loses_its_link() -> None:
     crowd = Crowd((CONTROL,))
     crowd.came(link(CONTROL, 0), 0.0)

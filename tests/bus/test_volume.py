@@ -8,6 +8,7 @@ import pytest
 import zenoh
 
 from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
+from engage_hri.services.bus.zenoh import volume
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.session import open_session
 from engage_hri.services.bus.zenoh.volume import EXCUSED, FULL, UNREAD, Unread, Volume, Volumes, sockets, volumes
@@ -41,6 +42,12 @@ def test_sockets_of_other_kinds_are_passed_over() -> None:
             kernel.bind((0, 0))
             ends = [tuple(f"{host}:{port}" for host, port in (link.getsockname(), link.getpeername()))]
             assert [(own, other) for own, other, each in sockets() if each.fileno() == link.fileno()] == ends
+
+
+def test_an_address_of_a_local_link_is_spelled_with_its_card_as_zenoh_does() -> None:
+    assert volume._place(("fe80::1", 41882, 0, 3)) == "[fe80::1%3]:41882"
+    assert volume._place(("::1", 7447, 0, 0)) == "[::1]:7447"
+    assert volume._place(("127.0.0.1", 7447)) == "127.0.0.1:7447"
 
 
 def test_a_full_link_of_which_nothing_is_read_is_to_end_and_one_that_is_read_slowly_is_not() -> None:

@@ -58,8 +58,8 @@ class Crowd:
     def is_banned(self, link: Link, now: Seconds) -> bool:
         """Tell whether who has this link gets none for now. Any thread may ask."""
         who = _owner(link)
-        own = self._links.get(who, ())
-        return self._banned.get(who, now) > now and (who not in self._spared or len(own) > (link in own))
+        others = any(each.zid != link.zid for each in list(self._links.get(who, ())))
+        return self._banned.get(who, now) > now and (who not in self._spared or others)
 
     def came(self, link: Link, now: Seconds) -> tuple[str, tuple[Link, ...]]:
         """Take a new link; returns the line to tell, and the links to end."""
@@ -104,8 +104,9 @@ class Crowd:
         return self._too_many(who, what, most, now) if what else ("", ())
 
     def still(self, now: Seconds) -> tuple[str, tuple[Link, ...]]:
-        """Look again at services of which one link was spared, when `GOING` is over; returns as `came`."""
-        guilty = [who for who in sorted(self._spared) if self._excess(who)[0] and self._banned.get(who, now) > now]
+        """Look again at services of which one link was spared, `GOING` ago at least; returns as `came`."""
+        judged = [who for who in sorted(self._spared) if now < self._banned.get(who, now) <= now + BANNED - GOING]
+        guilty = [who for who in judged if self._excess(who)[0]]
         self._spared -= {*guilty}
         line = f"too many: {' and '.join(guilty)} still has them; all its links end" if guilty else ""
         return line, tuple(link for who in guilty for link in self._links.get(who, ()))

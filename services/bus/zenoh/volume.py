@@ -163,10 +163,12 @@ def end(is_meant: Callable[[str, str], bool], how: int = socket.SHUT_RDWR) -> li
     ended = []
     for own, where, each in sockets():
         if is_meant(own, where):
-            with suppress(OSError):  # it has ended by itself
-                each.shutdown(how)
+            with suppress(OSError), each.dup() as held:  # so its number is not another link's before we are done
+                if _place(held.getpeername()) != where:
+                    continue
+                held.shutdown(how)
                 ended.append((own, where))
-                while each.recv(65_536, socket.MSG_DONTWAIT):
+                while held.recv(65_536, socket.MSG_DONTWAIT):
                     pass  # a kernel hands out what has come before, and Zenoh would take it
     return ended
 
@@ -192,5 +194,7 @@ def sockets() -> Iterator[tuple[str, str, socket.socket]]:
 
 
 def _place(address: Any) -> str:
-    host, port = address[:2]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    """Spell an address as Zenoh does: one of a local link has the number of its network card."""
+    host, port, *more = address
+    scope = f"%{more[1]}" if more and more[1] else ""
+    return f"[{host}{scope}]:{port}" if ":" in host else f"{host}:{port}"
