@@ -44,8 +44,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
+from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.service import embody
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.planning import planned_alone

@@ -82,7 +82,7 @@ SERVICES: dict[str, Service] = {
 }
 PARTS = (
     ("codec", "engage_hri.services.bus.memory", ("encode", "decode", "published")),
-    ("estimates", "engage_hri.services.control.questions", ("Questions.estimate", "Questions._estimated")),
+    ("estimates", "engage_hri.services.control.serving.questions", ("Questions.estimate", "Questions._estimated")),
     ("choice", "engage_hri.services.generation.pipeline", ("choose", "weigh", "unasked", "choice")),
     ("phrases", "engage_hri.services.generation.pipeline", ("proposed",)),
     ("block", "engage_hri.services.generation.pipeline", ("Emission.plan", "Emission.__init__")),

@@ -27,7 +27,7 @@ from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Body, BodyFailed, MovementAuthority, Reached
+from engage_hri.services.control.contract.body import Body, BodyFailed, MovementAuthority, Reached
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.pulse import Pulse

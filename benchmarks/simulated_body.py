@@ -31,8 +31,8 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Pointing, Sp
 from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso import kinematics
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
 

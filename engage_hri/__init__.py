@@ -52,12 +52,12 @@ if TYPE_CHECKING:
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.commandline.embedding import embedded as embedded
-    from engage_hri.services.control.body import Arrived as Arrived
-    from engage_hri.services.control.body import BehaviorRefused as BehaviorRefused
-    from engage_hri.services.control.body import Body as Body
-    from engage_hri.services.control.body import MovementAuthority as MovementAuthority
-    from engage_hri.services.control.body import Reached as Reached
-    from engage_hri.services.control.ordinary import OrdinaryBody as OrdinaryBody
+    from engage_hri.services.control.bases.one_part_motion import OrdinaryBody as OrdinaryBody
+    from engage_hri.services.control.contract.body import Arrived as Arrived
+    from engage_hri.services.control.contract.body import BehaviorRefused as BehaviorRefused
+    from engage_hri.services.control.contract.body import Body as Body
+    from engage_hri.services.control.contract.body import MovementAuthority as MovementAuthority
+    from engage_hri.services.control.contract.body import Reached as Reached
 
 _PLACES = {
     "engage_hri.schemas.behaviors": ("Gaze", "Head", "Pointing", "Reference", "Speech", "SpeechOption"),
@@ -75,8 +75,14 @@ _PLACES = {
     "engage_hri.services.client.results": ("PerformFailed",),
     "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.commandline.embedding": ("embedded",),
-    "engage_hri.services.control.body": ("Arrived", "MovementAuthority", "BehaviorRefused", "Body", "Reached"),
-    "engage_hri.services.control.ordinary": ("OrdinaryBody",),
+    "engage_hri.services.control.contract.body": (
+        "Arrived",
+        "MovementAuthority",
+        "BehaviorRefused",
+        "Body",
+        "Reached",
+    ),
+    "engage_hri.services.control.bases.one_part_motion": ("OrdinaryBody",),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}

@@ -4,13 +4,13 @@ SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
     "services/realizer/perform/control_link.py",  # asks the body
     "services/realizer/perform/recognition_link.py",  # asks recognition
-    "services/control/shown.py",  # publishes what the body shows
-    "services/control/performing.py",  # breaks off what a body does not end
-    "services/control/questions.py",  # answers what behaviors would take
-    "services/control/estimates.py",  # publishes mistakes of the body
-    "services/control/warned.py",  # publishes what a person has to see to
-    "services/control/switching.py",  # publishes the faults that are on
-    "services/control/guarded.py",  # times the calls of drivers by the clock of the loop
+    "services/control/serving/state_publisher.py",  # publishes what the body shows
+    "services/control/serving/behavior_task.py",  # breaks off what a body does not end
+    "services/control/serving/questions.py",  # answers what behaviors would take
+    "services/control/serving/estimates.py",  # publishes mistakes of the body
+    "services/control/serving/warnings_told.py",  # publishes what a person has to see to
+    "services/control/serving/fault_switch.py",  # publishes the faults that are on
+    "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/perform/feedback.py",  # publishes feedback
     "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
@@ -23,9 +23,9 @@ SHELLS = {
     "services/realizer/perform/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
-    "services/control/body.py",  # the interface of bodies: coroutines
-    "services/control/ordinary.py",  # a body that moves on the loop's clock
-    "services/control/composed.py",  # takes several bodies home at once
+    "services/control/contract/body.py",  # the interface of bodies: coroutines
+    "services/control/bases/one_part_motion.py",  # a body that moves on the loop's clock
+    "services/control/bases/composed.py",  # takes several bodies home at once
     "services/control/mujoco/film.py",  # hands pictures to ffmpeg
     "services/control/mujoco/pulse.py",  # steps of a physics on loop time
     "services/control/torso/body.py",  # a body that moves on the loop's clock
@@ -36,7 +36,7 @@ SHELLS = {
     "services/control/voice/studio.py",  # runs the process of the synthesizer
     "services/control/voice/pipe.py",  # runs the process of a player
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
-    "services/control/waiting.py",  # waits for a moment or a change of authority
+    "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
     "services/recording/disk.py",  # times the disk

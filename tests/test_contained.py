@@ -20,7 +20,7 @@ from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import load
-from engage_hri.services.control.body import MovementAuthority
+from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.runtime.service import running
 from tests.cancelling import whole_robot
 from tests.test_lives_and_late_answers import HOME, _serve_until, everything, says

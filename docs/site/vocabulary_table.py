@@ -13,9 +13,9 @@ from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT
 from engage_hri.schemas.vocabulary import NAMES, Term, terms
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.choreography import plan
-from engage_hri.services.control.torso.course import Impossible, Situation
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.choreography import plan
+from engage_hri.services.control.figure.course import Impossible, Situation
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "vocabulary.md"
 HEAD = """\
@@ -27,7 +27,7 @@ the values of attributes. What is performed needs no warning. What is degraded i
 is dropped costs the behavior, with one warning. This page is made from the code: `make generate`.
 
 The tables hold the words of the standards only. The simulated body has a few lexemes more, which
-`services/control/torso/repertoire.toml` lists; where a lexeme is not known, the warning names those that there are.
+`services/control/figure/repertoire.toml` lists; where a lexeme is not known, the warning names those that there are.
 For lexemes of your own write a repertoire file and name it with `control.repertoire`: it may add words, or replace
 what is performed for a word of these tables ([control.md](control.md#repertoire) has an example). `engage plan` and
 `engage play` take it with `--set control.repertoire=FILE`. A lexeme of yours is performed without a warning.

@@ -16,10 +16,10 @@ from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.folder import ResultFile
 from engage_hri.services.commandline.options import Configured
 from engage_hri.services.commandline.process import DONE, run, typed
-from engage_hri.services.control.body import Body, BodyState
-from engage_hri.services.control.calibration import PARTS, WIDEST, Calibration, written
-from engage_hri.services.control.fitting import Fit, Measurement, fit
-from engage_hri.services.control.measuring import OTHER_ROWS, Eyes, SimulatedEyes, marks, measured
+from engage_hri.services.control.calibrating.fitting import Fit, Measurement, fit
+from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, Eyes, SimulatedEyes, marks, measured
+from engage_hri.services.control.contract.body import Body, BodyState
+from engage_hri.services.control.contract.calibration import PARTS, WIDEST, Calibration, written
 
 FEWEST = 3
 """Measurements of a part below which nothing is fitted."""
@@ -106,7 +106,7 @@ async def _calibrate(
     out: ResultFile,
     record: ResultFile | None,
 ) -> None:
-    from engage_hri.services.control.drivers import made
+    from engage_hri.services.control.bases.drivers import made
     from engage_hri.services.simulation.still import load_world
 
     body = made(config.control)

@@ -23,8 +23,8 @@ from engage_hri.services.commandline.sources import read_world
 from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
-    from engage_hri.services.control.body import Body
     from engage_hri.services.control.config import ControlConfig
+    from engage_hri.services.control.contract.body import Body
     from engage_hri.services.control.testing.check import Progress
 
 BROKEN = 1
@@ -89,7 +89,7 @@ def main(options: Options) -> int:
 
 def maker(name: str, config: "ControlConfig") -> "Callable[[], Body]":
     """Find a driver, and say how its body is made. Raises InputRefused."""
-    from engage_hri.services.control import drivers
+    from engage_hri.services.control.bases import drivers
 
     asked = replace(config, body=name)
     drivers.check(asked)

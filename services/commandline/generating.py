@@ -33,8 +33,8 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
 
 
 async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
-    from engage_hri.services.control.calibration import calibrated
-    from engage_hri.services.control.drivers import made
+    from engage_hri.services.control.bases.drivers import made
+    from engage_hri.services.control.contract.calibration import calibrated
     from engage_hri.services.generation.fragment_check import performable
     from engage_hri.services.generation.head.inhibitions import Leases
     from engage_hri.services.generation.pipeline import glance, planned, planning, targets

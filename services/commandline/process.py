@@ -80,7 +80,7 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
     Said is where, if that is in a driver's call that does not come back.
     """
-    guarded = sys.modules.get("engage_hri.services.control.guarded")
+    guarded = sys.modules.get("engage_hri.services.control.bases.driver_guard")
     if guarded is not None and sys.stderr is not None and (told := guarded.held_up(frame)):
         os.write(sys.stderr.fileno(), f"{told}\n".encode(errors="backslashreplace"))
     if left and sys.stderr is not None:

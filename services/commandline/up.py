@@ -28,7 +28,7 @@ from engage_hri.services.commandline.run import ready_line
 from engage_hri.services.commandline.supervisor import Child, supervised
 from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink, following
-from engage_hri.services.control import drivers
+from engage_hri.services.control.bases import drivers
 from engage_hri.services.runtime.service import Service, running
 
 WITHOUT_TASK = ("simulation.human=attentive",)

@@ -28,8 +28,9 @@ from engage_hri.schemas.requests import Cancel, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
-from engage_hri.services.control.actions import ActionReporter
-from engage_hri.services.control.body import (
+from engage_hri.services.control.bases.drivers import made, with_settings_of_drivers
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.body import (
     AbortMode,
     Arrived,
     BehaviorRefused,
@@ -42,18 +43,17 @@ from engage_hri.services.control.body import (
     Spoke,
     TakenOver,
 )
-from engage_hri.services.control.calibration import calibrated
-from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made, with_settings_of_drivers
-from engage_hri.services.control.live import LiveBehavior
-from engage_hri.services.control.performing import Performing
-from engage_hri.services.control.questions import Questions
-from engage_hri.services.control.refusals import VOICE_ADVICE
-from engage_hri.services.control.shown import Shown
-from engage_hri.services.control.switching import FaultSwitch
-from engage_hri.services.control.unheard import Unheard
-from engage_hri.services.control.variability import Deviations, is_lost
-from engage_hri.services.control.warned import recovered, warn
+from engage_hri.services.control.contract.calibration import calibrated
+from engage_hri.services.control.contract.refusals import VOICE_ADVICE
+from engage_hri.services.control.contract.variability import Deviations, is_lost
+from engage_hri.services.control.serving.actions import ActionReporter
+from engage_hri.services.control.serving.behavior_task import Performing
+from engage_hri.services.control.serving.dead_man import Unheard
+from engage_hri.services.control.serving.fault_switch import FaultSwitch
+from engage_hri.services.control.serving.live_behavior import LiveBehavior
+from engage_hri.services.control.serving.questions import Questions
+from engage_hri.services.control.serving.state_publisher import Shown
+from engage_hri.services.control.serving.warnings_told import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.requests.serving_effects import Hold
 from engage_hri.services.runtime.service import Ready

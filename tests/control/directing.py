@@ -12,8 +12,8 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.testing import WORLD
 from engage_hri.services.requests.ends import Pending, Requester

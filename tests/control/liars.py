@@ -7,7 +7,7 @@ from contextlib import aclosing
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Speech
-from engage_hri.services.control.body import (
+from engage_hri.services.control.contract.body import (
     Arrived,
     MovementAuthority,
     Progress,

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Speech
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import BodyState, MouthShape, MovementAuthority, Progress
+from engage_hri.services.control.contract.body import BodyState, MouthShape, MovementAuthority, Progress
 from engage_hri.services.control.torso.body import SimulatedBody
 
 

@@ -13,14 +13,14 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Head, P
 from engage_hri.schemas.body import BodyPose, Estimate, JointAngle
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.contract.body import (
     BodyFailed,
     BodyState,
     MovementAuthority,
     Progress,
     Reached,
 )
-from engage_hri.services.control.torso import kinematics
+from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.liars import Teller
 

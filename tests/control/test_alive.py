@@ -13,11 +13,11 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Pointing, Speech
 from engage_hri.schemas.body import BodyPose, JointAngle, RobotState
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import BodyState, Reached
-from engage_hri.services.control.extras import GIVES_WAY
+from engage_hri.services.control.contract.body import BodyState, Reached
+from engage_hri.services.control.contract.extras import GIVES_WAY
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.alive import CLOSED, CLOSING, OPENING, Blinks, closure
 from engage_hri.services.control.testing import CROWDS, WORLD, Stage, performed, recorded, violations, witnessed
-from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.alive import CLOSED, CLOSING, OPENING, Blinks, closure
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.directing import robot
 

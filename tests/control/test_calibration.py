@@ -1,7 +1,7 @@
 """A miscalibrated body: people see where it really points, measurements correct it, and what is stated is true.
 
 The oracle has forward kinematics of its own: matrices in homogeneous coordinates, of nothing but the lengths that
-services/control/torso/kinematics.py states.
+services/control/figure/kinematics.py states.
 """
 
 import asyncio
@@ -30,10 +30,10 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.control.calibration import Calibration, calibrated, read, written
+from engage_hri.services.control.calibrating.fitting import Fit, fit
+from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, SimulatedEyes, marks, measured
 from engage_hri.services.control.config import ControlConfig, Miscalibrated, Variability
-from engage_hri.services.control.fitting import Fit, fit
-from engage_hri.services.control.measuring import OTHER_ROWS, SimulatedEyes, marks, measured
+from engage_hri.services.control.contract.calibration import Calibration, calibrated, read, written
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.torso.body import SimulatedBody

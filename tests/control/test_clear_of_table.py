@@ -15,11 +15,11 @@ import pytest
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Pointing, Posture, PostureShift
 from engage_hri.schemas.body import EstimateItem, PlannedTime
-from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed
+from engage_hri.services.control.figure.kinematics import TABLE_EDGE, TABLE_TOP
+from engage_hri.services.control.figure.repertoire import BUILT_IN, extended
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.kinematics import TABLE_EDGE, TABLE_TOP
-from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 from tests.random_cases import share_of
 
 WIDE = """

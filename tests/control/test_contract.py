@@ -6,8 +6,8 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from engage_hri.services.control.body import Body, BodyState
 from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
+from engage_hri.services.control.contract.body import Body, BodyState
 from engage_hri.services.control.testing import BodyContract, played
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.liars_by_deed import Noisy

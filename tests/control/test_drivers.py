@@ -12,10 +12,10 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.world import World
-from engage_hri.services.control import drivers
-from engage_hri.services.control.body import Body, BodyState, MovementAuthority, Progress
-from engage_hri.services.control.composed import ComposedBody
+from engage_hri.services.control.bases import drivers
+from engage_hri.services.control.bases.composed import ComposedBody
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.body import Body, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.torso.body import SimulatedBody
 
 PLAIN = '''

@@ -14,9 +14,9 @@ from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
-from engage_hri.services.control.composed import composed
-from engage_hri.services.control.members import Member
+from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.contract.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.clauses import clause

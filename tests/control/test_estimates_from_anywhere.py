@@ -32,11 +32,11 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import BodyState, MovementAuthority, Reached
+from engage_hri.services.control.contract.body import BodyState, MovementAuthority, Reached
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.tracks import Track
 from engage_hri.services.control.testing import Stage, aside
-from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.tracks import Track
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 STATED = {

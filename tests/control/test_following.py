@@ -11,9 +11,9 @@ import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Body, BodyFailed, Progress
+from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
+from engage_hri.services.control.contract.body import Body, BodyFailed, Progress
 from engage_hri.services.control.testing import Stage, aside, beside
 
 POINTED, LOOKED = 0.05, 0.05

@@ -12,7 +12,10 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, JointAngle
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.driver_guard import GuardedBody
+from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     BodyState,
@@ -21,10 +24,7 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
 )
-from engage_hri.services.control.composed import composed
-from engage_hri.services.control.extras import Idle
-from engage_hri.services.control.guarded import GuardedBody
-from engage_hri.services.control.members import Member
+from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.runtime.steps import finished
 from tests.control.test_drivers import Bare
 

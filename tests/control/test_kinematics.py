@@ -7,8 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.body import Ray
-from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.kinematics import HOME, Side, Unreachable
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.kinematics import HOME, Side, Unreachable
 
 PIECES = [(x / 100, y / 100, 0.73) for x in range(35, 80, 5) for y in range(-40, 45, 10)]
 SIDES: tuple[Side, ...] = ("left", "right")

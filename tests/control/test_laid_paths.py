@@ -10,8 +10,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso import laid_paths
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.figure import laid_paths
 from engage_hri.services.control.torso.body import SimulatedBody
 
 ASKED: list[BlockBehavior] = [Gaze(id="look", target="ball"), Pointing(id="point", target="ball", mode="RIGHT_HAND")]

@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Body, MovementAuthority
-from engage_hri.services.control.ordinary import OrdinaryBody
+from engage_hri.services.control.bases.one_part_motion import OrdinaryBody
+from engage_hri.services.control.contract.body import Body, MovementAuthority
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.testing.laws import Finding, LawBroken
 from engage_hri.services.control.testing.motions import unused

@@ -9,7 +9,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.services.control.body import MouthShape
+from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.mouth import CHANGE, Mouth

@@ -6,10 +6,10 @@ from random import Random
 import numpy as np
 import pytest
 
-from engage_hri.services.control.torso import kinematics, tracks
-from engage_hri.services.control.torso.aiming import TRUNK, UPRIGHT, Aim, Trunk
-from engage_hri.services.control.torso.course import Impossible
-from engage_hri.services.control.torso.kinematics import (
+from engage_hri.services.control.figure import kinematics, tracks
+from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim, Trunk
+from engage_hri.services.control.figure.course import Impossible
+from engage_hri.services.control.figure.kinematics import (
     CLEARANCE,
     REACH,
     ROOM,
@@ -20,9 +20,9 @@ from engage_hri.services.control.torso.kinematics import (
     Side,
     Unreachable,
 )
-from engage_hri.services.control.torso.lifting import LIFTS, MARGIN, SIZES, clear_of_table
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import (
+from engage_hri.services.control.figure.table_lift import LIFTS, MARGIN, SIZES, clear_of_table
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import (
     LEAST,
     OUTSIDE,
     SAMPLES,
@@ -32,7 +32,7 @@ from engage_hri.services.control.torso.path import (
     Leg,
     Path,
 )
-from engage_hri.services.control.torso.path import (
+from engage_hri.services.control.motion.path import (
     MARGIN as SAMPLED,
 )
 

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.path import Leg, Path, resting
-from engage_hri.services.control.torso.tracks import ALONG, FINELY, limits_of, meets_table
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.tracks import ALONG, FINELY, limits_of, meets_table
+from engage_hri.services.control.motion.path import Leg, Path, resting
 
 PARTS = [
     ("left_arm",), ("right_arm",), ("left_arm", "right_arm"), ("torso", "right_arm"),

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.control.torso import tracks
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
+from engage_hri.services.control.figure import tracks
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
 
 LIMITS = tracks.LIMITS["right_arm"]
 HOME = tracks.HOME["right_arm"]

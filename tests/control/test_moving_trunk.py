@@ -24,7 +24,8 @@ from engage_hri.schemas.behaviors import (
     PostureShift,
 )
 from engage_hri.schemas.body import EstimateItem, PlannedTime
-from engage_hri.services.control.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
+from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
+from engage_hri.services.control.figure.repertoire import BUILT_IN, extended
 from engage_hri.services.control.testing import (
     ON_AXIS,
     STEP,
@@ -39,7 +40,6 @@ from engage_hri.services.control.testing import (
     violations,
 )
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 from tests.random_cases import share_of
 
 TARGETS = ("human", "near-right", "far-left")

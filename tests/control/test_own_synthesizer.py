@@ -9,9 +9,9 @@ import pytest
 
 from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import MovementAuthority, Reached, Spoke
+from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
+from engage_hri.services.control.contract.body import MovementAuthority, Reached, Spoke
 from engage_hri.services.control.voice.alignment import FRAME, Loudness
 from engage_hri.services.control.voice.clauses import laid_out
 from engage_hri.services.control.voice.phrases import pieces

@@ -16,9 +16,9 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
 from engage_hri.schemas.body import AbortBehavior, BehaviorAborted, BehaviorOutcome, Capabilities, SyncPointReached
 from engage_hri.schemas.references import type_name
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Arrived, MovementAuthority, Progress, Reached, Spoke
+from engage_hri.services.control.contract.body import Arrived, MovementAuthority, Progress, Reached, Spoke
+from engage_hri.services.control.serving.progress_check import SKEW, Told
 from engage_hri.services.control.testing import BEHAVIORS
-from engage_hri.services.control.told import SKEW, Told
 from tests.control.directing import robot
 from tests.control.test_drivers import Bare
 

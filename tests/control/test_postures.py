@@ -24,13 +24,14 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, JointAngle, PlannedTime
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Displaced, Variability
-from engage_hri.services.control.torso import kinematics, postures
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.tracks import limits_of, meets_table
+from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
+from engage_hri.services.control.torso import postures
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.outlines import Asked, outlines
-from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
-from engage_hri.services.control.torso.tracks import limits_of, meets_table
 from engage_hri.services.runtime.steps import finished
 from engage_hri.services.runtime.unhurried import SLICE
 

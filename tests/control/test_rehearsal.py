@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Pointing, Posture, PostureShift
 from engage_hri.schemas.body import EstimateItem, PlannedTime
-from engage_hri.services.control.body import BehaviorRefused, MovementAuthority, Reached
+from engage_hri.services.control.contract.body import BehaviorRefused, MovementAuthority, Reached
 from engage_hri.services.control.testing import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
 

@@ -23,10 +23,10 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire
 from engage_hri.services.control.testing import WORLD, Stage, performed, recorded, stops, times, violations
-from engage_hri.services.control.torso import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 LEXEMES: list[BlockBehavior] = [

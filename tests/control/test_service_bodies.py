@@ -24,8 +24,8 @@ from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.world import World
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import BodyFailed
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.body import BodyFailed
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.testing.asked import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody

@@ -12,8 +12,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Pointing, Speech
 from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, PerformBehavior
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Spoke
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.body import Spoke
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import Requester

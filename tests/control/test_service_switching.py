@@ -11,8 +11,8 @@ from engage_hri.schemas.body_faults import BodyFault, BodyFaults
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.service import running

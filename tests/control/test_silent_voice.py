@@ -10,9 +10,9 @@ from engage_hri.schemas.behaviors import Gaze, Mark, Speech
 from engage_hri.schemas.body import BodyPose
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, Progress, Spoke
+from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed, Progress, Spoke
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.silent import SilentVoice

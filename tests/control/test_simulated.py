@@ -27,10 +27,10 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import Arrived, BehaviorRefused, MovementAuthority
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, MovementAuthority
 from engage_hri.services.control.testing import WORLD, Stage, default, performed, recorded, stops, times, violations
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 ARMS = ("LEFT_HAND", "RIGHT_HAND")

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Pointing
 from engage_hri.schemas.body import Estimate
-from engage_hri.services.control.body import Body, MovementAuthority
 from engage_hri.services.control.config import Slow, Variability
+from engage_hri.services.control.contract.body import Body, MovementAuthority
+from engage_hri.services.control.figure.sizing import SIZES
 from engage_hri.services.control.testing import WORLD, Recording, recorded, times, violations
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.sizing import SIZES
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.random_cases import share_of
 

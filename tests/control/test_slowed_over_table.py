@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Hand, Pointing, Posture, PostureShift
 from engage_hri.schemas.units import Meters
-from engage_hri.services.control.body import BehaviorRefused, Body, Reached
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, Reached
+from engage_hri.services.control.figure.kinematics import TABLE_EDGE, TABLE_TOP
+from engage_hri.services.control.figure.repertoire import BUILT_IN, extended
 from engage_hri.services.control.testing import WORLD, Stage
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.kinematics import TABLE_EDGE, TABLE_TOP
-from engage_hri.services.control.torso.repertoire import BUILT_IN, extended
 from tests.random_cases import share_of
 
 Array = NDArray[np.float64]

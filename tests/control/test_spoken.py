@@ -11,8 +11,8 @@ from engage_hri.schemas.behaviors import BlockBehavior, Mark, Speech
 from engage_hri.schemas.body import BodyPose, Estimate, WordTime
 from engage_hri.schemas.documents.prosody import marked_up, spans, unread
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import MovementAuthority, Progress, Spoke
-from engage_hri.services.control.spoken import estimate_of, progress_of, spoken
+from engage_hri.services.control.contract.body import MovementAuthority, Progress, Spoke
+from engage_hri.services.control.serving.words_for_voice import estimate_of, progress_of, spoken
 from engage_hri.services.control.torso.body import SimulatedBody
 
 

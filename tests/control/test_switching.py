@@ -11,8 +11,8 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Pointing, Speech
 from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw, words
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.control.body import Body, BodyFailed, MovementAuthority, Progress, Spoke
 from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
+from engage_hri.services.control.contract.body import Body, BodyFailed, MovementAuthority, Progress, Spoke
 from engage_hri.services.control.testing.asked import WORLD
 from engage_hri.services.control.testing.laws import angles
 from engage_hri.services.control.testing.motions import recorded, violations

@@ -14,10 +14,10 @@ import pytest
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, MovementAuthority, Spoke
+from engage_hri.services.control.bases.driver_guard import GuardedBody
+from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
-from engage_hri.services.control.guarded import GuardedBody
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed, MovementAuthority, Spoke
 from engage_hri.services.control.voice import studio
 from engage_hri.services.control.voice.sounding import SoundingVoice
 from engage_hri.services.control.voice.synthesis import Phrase

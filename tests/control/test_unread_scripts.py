@@ -9,7 +9,7 @@ import pytest
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.documents.prosody import Prosody
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import MovementAuthority, Reached
+from engage_hri.services.control.contract.body import MovementAuthority, Reached
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
 from engage_hri.services.control.voice.espeak_voices import voices
 from engage_hri.services.control.voice.scripts import READ_IN, UNREAD_IN, Unread, is_read, told, unread

@@ -5,11 +5,11 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
-from engage_hri.services.control.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
+from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed, Reached, Spoke
+from engage_hri.services.control.contract.variability import Deviations, configured, is_lost, normal
 from engage_hri.services.control.testing import WORLD, Stage, performed, poses_agree, times
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.variability import Deviations, configured, is_lost, normal
 
 POINT = Pointing(id="p", target="near-right")
 

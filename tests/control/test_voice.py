@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Mark, Speech
-from engage_hri.services.control.body import MovementAuthority, Spoke
+from engage_hri.services.control.contract.body import MovementAuthority, Spoke
 from engage_hri.services.control.voice.speaking import speak
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop, run_virtual

@@ -16,7 +16,8 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.bases.composed import Member, composed
+from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     MouthShape,
@@ -25,7 +26,6 @@ from engage_hri.services.control.body import (
     Reached,
     Spoke,
 )
-from engage_hri.services.control.composed import Member, composed
 from engage_hri.services.control.testing import Stage
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice import player

@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Mark, Speech
 from engage_hri.schemas.speakable import tokens
-from engage_hri.services.control.body import MovementAuthority, Reached
+from engage_hri.services.control.contract.body import MovementAuthority, Reached
 from engage_hri.services.control.voice.espeak import EspeakSettings
 from engage_hri.services.control.voice.sounding import EspeakVoice
 from tests.recogniser import Recogniser

@@ -16,7 +16,7 @@ import engage_hri
 from engage_hri.schemas import faults
 from engage_hri.schemas.faults import EngageError
 from engage_hri.services.client import feeds, inputs, results, robot
-from engage_hri.services.control import body
+from engage_hri.services.control.contract import body
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 BESIDE = (feeds.Feed, feeds.EventFeed, body.BodyState, body.Spoke, body.BodyFailed)

@@ -15,8 +15,8 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnC
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.service import generate

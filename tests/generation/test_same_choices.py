@@ -18,8 +18,8 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Capabilities, Estimate, EstimateItem
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice
-from engage_hri.services.control.body import MovementAuthority
 from engage_hri.services.control.config import Displaced, Variability
+from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.block.ordering import ordered

@@ -13,9 +13,9 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.control.figure.course import Impossible
+from engage_hri.services.control.figure.estimates import infeasible
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.course import Impossible
-from engage_hri.services.control.torso.estimates import infeasible
 from engage_hri.services.requests.ends import RequestRefused
 from tests.generation.partners import Partners, stage
 from tests.generation.robots import Robot, robot, says, shows

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.control.body import BodyState
+from engage_hri.services.control.contract.body import BodyState
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.rigs.hostile.__main__ import main
 

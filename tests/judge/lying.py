@@ -14,7 +14,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.contract.body import (
     Arrived,
     BehaviorRefused,
     Body,

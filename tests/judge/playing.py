@@ -20,8 +20,8 @@ from engage_hri.schemas.faults import EngageError, RequestRefused
 from engage_hri.schemas.feedback import Feedback
 from engage_hri.services.bus.interface import LOG, Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.realizer.config import RealizerConfig

@@ -43,8 +43,8 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.body import Body
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.realizer.config import RealizerConfig

@@ -21,9 +21,15 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.extras import Idle, Seen
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
+from engage_hri.services.control.contract.extras import Idle, Seen
+from engage_hri.services.control.figure import kinematics, tracks
+from engage_hri.services.control.figure.course import CoursePoint
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
+from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.figure.tracks import Track
 from engage_hri.services.control.mujoco import along
 from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
@@ -33,14 +39,9 @@ from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.pulse import TICK, Pulse
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.workbench import Workbench
-from engage_hri.services.control.torso import homing, kinematics, tracks, truth
+from engage_hri.services.control.torso import homing, truth
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.course import CoursePoint
-from engage_hri.services.control.torso.files import repertoire_of
-from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.tracks import Track
-from engage_hri.services.control.waiting import Bell
 
 SAMPLES = 6
 """Places of a plan between a sync point and where the plan is, at which the joints may be to have come there."""

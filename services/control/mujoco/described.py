@@ -16,9 +16,9 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Body, MovementAuthority, Progress
-from engage_hri.services.control.composed import ComposedBody
-from engage_hri.services.control.members import Member
+from engage_hri.services.control.bases.composed import ComposedBody
+from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, refuse, told
 from engage_hri.services.control.mujoco.film import Film, Frame

@@ -9,7 +9,7 @@ import mujoco
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import BodyState
+from engage_hri.services.control.contract.body import BodyState
 from engage_hri.services.control.mujoco.film import Film, Frame, check
 from engage_hri.services.control.mujoco.pictures import FROM_ABOVE, FROM_THE_SIDE, OVER_THE_SHOULDER, Beam, Cone
 from engage_hri.services.control.mujoco.settings import MujocoSettings

@@ -13,7 +13,9 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.bases.one_part_motion import OrdinaryBody, Way
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     BodyState,
@@ -21,12 +23,10 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
 )
-from engage_hri.services.control.extras import Seen
+from engage_hri.services.control.contract.extras import Seen
+from engage_hri.services.control.figure.kinematics import HAND_TO_TARGET, TABLE_TOP
 from engage_hri.services.control.mujoco.ik import ON_AXIS, Chain, Solution
 from engage_hri.services.control.mujoco.stage import Angles, Stage
-from engage_hri.services.control.ordinary import OrdinaryBody, Way
-from engage_hri.services.control.torso.kinematics import HAND_TO_TARGET, TABLE_TOP
-from engage_hri.services.control.waiting import Bell
 from engage_hri.services.runtime.steps import Steps, finished
 
 NODS: Mapping[str, tuple[Radians, Radians]] = {

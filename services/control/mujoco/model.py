@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterable, Iterator
 
 from engage_hri.schemas.units import Meters, Seconds, Vector
+from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.mujoco.motors import Motor
-from engage_hri.services.control.torso import kinematics
 from engage_hri.services.tangram.table import Piece, TangramTable
 
 STEP: Seconds = 0.002

@@ -8,13 +8,13 @@ import numpy as np
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import Leg, Path, resting
 from engage_hri.services.control.mujoco import faults
 from engage_hri.services.control.mujoco.description import Description, PartDescription
 from engage_hri.services.control.mujoco.physics import Array, Physics
 from engage_hri.services.control.mujoco.pulse import Pulse
 from engage_hri.services.control.mujoco.room import Room
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Leg, Path, resting
 
 Angles = Mapping[str, Radians]
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.figure.kinematics import LIMIT
 from engage_hri.services.control.mujoco import model
 from engage_hri.services.control.mujoco.faults import conditions, noise, obstacles, table_rise
 from engage_hri.services.control.mujoco.physics import Array, Physics
 from engage_hri.services.control.mujoco.room import Room
-from engage_hri.services.control.torso.kinematics import LIMIT
 from engage_hri.services.tangram.table import tangram_table
 
 PARTS = {joint: LIMIT[joint].part for joint in model.MOTORS}

@@ -19,7 +19,9 @@ from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import (
     Arrived,
     BehaviorRefused,
     Body,
@@ -31,8 +33,9 @@ from engage_hri.services.control.body import (
     Revoked,
     TakenOver,
 )
-from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.extras import Idle
+from engage_hri.services.control.contract.extras import Idle
+from engage_hri.services.control.figure.course import Impossible
+from engage_hri.services.control.figure.estimates import infeasible, wait_estimate
 from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
 from engage_hri.services.control.reachy_mini.courses import Instant
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
@@ -44,10 +47,7 @@ from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.reachy_mini.tracks import Off, busy
 from engage_hri.services.control.reachy_mini.watching import Rate, Watch, slow
-from engage_hri.services.control.torso.course import Impossible
-from engage_hri.services.control.torso.estimates import infeasible, wait_estimate
 from engage_hri.services.control.voice import speaking
-from engage_hri.services.control.waiting import Bell
 
 FREEZE: Seconds = 0.5
 """Seconds that a track stands still when it is told to freeze, before it goes home."""

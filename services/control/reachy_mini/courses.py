@@ -31,13 +31,13 @@ from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.vocabulary import normal
 from engage_hri.schemas.world import World
+from engage_hri.services.control.figure import expressions
+from engage_hri.services.control.figure.choreography import OFFSETS
+from engage_hri.services.control.figure.course import Impossible, Situation
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
+from engage_hri.services.control.motion.path import Leg
 from engage_hri.services.control.reachy_mini import geometry, joints
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
-from engage_hri.services.control.torso import expressions
-from engage_hri.services.control.torso.choreography import OFFSETS
-from engage_hri.services.control.torso.course import Impossible, Situation
-from engage_hri.services.control.torso.path import Leg
-from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 
 Looks = Gaze | GazeShift | HeadDirectionShift
 TYPES_OF_BEHAVIORS: tuple[type[BlockBehavior], ...] = (

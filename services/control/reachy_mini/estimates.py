@@ -6,11 +6,11 @@ from itertools import pairwise
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.motion.path import Path, resting
 from engage_hri.services.control.reachy_mini import geometry, joints
 from engage_hri.services.control.reachy_mini.courses import Circumstances, Course, Instant
 from engage_hri.services.control.reachy_mini.moving import Moves
 from engage_hri.services.control.reachy_mini.tracks import NEAR
-from engage_hri.services.control.torso.path import Path, resting
 
 FRAME: Seconds = 0.02
 """Seconds between two measurements; a point is told of by the first one that bears it out."""

@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from math import inf, radians, sin, tau
 
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.services.control.extras import Gate
+from engage_hri.services.control.contract.extras import Gate
+from engage_hri.services.control.figure.alive import BREATH
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.geometry import Angles
-from engage_hri.services.control.torso.alive import BREATH
 
 LEAN: Radians = radians(0.5)
 """Amplitude of the breath: 1.5 mm of the head, which looks on where it looks."""

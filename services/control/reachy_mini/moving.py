@@ -13,7 +13,10 @@ import numpy as np
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import MovementAuthority
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.figure.course import Impossible
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
 from engage_hri.services.control.reachy_mini import courses, geometry, joints
 from engage_hri.services.control.reachy_mini.courses import Circumstances, Course, Instant
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
@@ -22,9 +25,6 @@ from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.reachy_mini.speeds import Speeds
 from engage_hri.services.control.reachy_mini.tracks import NEAR, Aim, Off, Track, Tracks, farthest
 from engage_hri.services.control.reachy_mini.trim import Trim
-from engage_hri.services.control.torso.course import Impossible
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import JointMotion, Leg, Path, resting
 
 NOTICEABLE = radians(0.3)
 """A target that moves less does not move the head."""

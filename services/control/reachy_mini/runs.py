@@ -4,11 +4,11 @@ from math import inf
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import MovementAuthority
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.reachy_mini.courses import Course, Instant
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Path
-from engage_hri.services.control.waiting import Bell
 
 
 class Run:

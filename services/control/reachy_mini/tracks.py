@@ -6,10 +6,10 @@ from math import inf, radians
 from msgspec import Struct
 
 from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import Path, resting
 from engage_hri.services.control.reachy_mini import courses, joints
 from engage_hri.services.control.reachy_mini.geometry import Angles
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Path, resting
 
 Tracks = dict[str, tuple[float, ...]]
 NEAR = {

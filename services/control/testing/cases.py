@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import EngageError
-from engage_hri.services.control.blame import place_of, words_of
-from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed
+from engage_hri.services.control.bases.error_place import place_of, words_of
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed
 from engage_hri.services.control.testing.laws import Finding, LawBroken, named
 from engage_hri.services.control.testing.stage import PATIENCE, Stage
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut

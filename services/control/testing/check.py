@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD, behaviors_in
 from engage_hri.services.control.testing.cases import findings_of
 from engage_hri.services.control.testing.causes import told_once

@@ -10,7 +10,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDir
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase, PlannedTime, Ray
 from engage_hri.schemas.units import Degrees, Meters, Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Arrived, Body, BodyState, Progress, Reached
+from engage_hri.services.control.contract.body import Arrived, Body, BodyState, Progress, Reached
 from engage_hri.services.control.testing.laws import angles, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.predictions import has_joints

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import AbortMode, Body, Spoke
+from engage_hri.services.control.contract.body import AbortMode, Body, Spoke
 from engage_hri.services.control.testing.cases import Connection, still_running
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
 from engage_hri.services.control.testing.laws import broken, degrees, listed, ms

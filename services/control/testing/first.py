@@ -18,7 +18,7 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.cases import Connection, cause_of
 from engage_hri.services.control.testing.causes import by_words
 from engage_hri.services.control.testing.laws import NEVER_ENDS, NOTHING_MOVES, angles, listed, named

@@ -10,7 +10,7 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Mark, Pointing, Speech, Wait
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Arrived, Body, Reached, Spoke
+from engage_hri.services.control.contract.body import Arrived, Body, Reached, Spoke
 from engage_hri.services.control.testing.asked import HOLDS
 from engage_hri.services.control.testing.laws import broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, recorded

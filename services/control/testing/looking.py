@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.laws import broken, degrees
 from engage_hri.services.control.testing.rays import angle, aside
 from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, standing

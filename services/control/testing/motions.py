@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.laws import angles
 
 STEP: Seconds = 0.004

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, words
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.plugin import virtual_loop
 
 Make = Callable[[], Body]

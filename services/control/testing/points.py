@@ -10,7 +10,7 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import Locomotion, Speech
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Arrived, BehaviorRefused, Body, MouthShape, Reached, Spoke
+from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, Body, MouthShape, Reached, Spoke
 from engage_hri.services.control.testing.asked import ONE_INSTANT
 from engage_hri.services.control.testing.laws import broken, listed, ms, named
 from engage_hri.services.control.testing.stage import Stage, default, done, standing, times

@@ -9,7 +9,7 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Head, HeadDirectionShift, Speech, Wait
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.laws import broken, listed, ms, named
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.stage import Stage, default, done, standing, times

@@ -7,7 +7,7 @@ from typing import ClassVar
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
+from engage_hri.services.control.contract.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
 from engage_hri.services.control.testing.laws import NEVER_ENDS, broken, listed, ms
 
 PATIENCE: Seconds = 30.0

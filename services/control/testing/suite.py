@@ -16,7 +16,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.body import BodyPose, Capabilities
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds, Vector
-from engage_hri.services.control.body import Body, BodyState
+from engage_hri.services.control.contract.body import Body, BodyState
 from engage_hri.services.control.testing.asked import BEHAVIORS, HOLDS, WORLD
 from engage_hri.services.control.testing.cases import Case, Connection, still_running
 from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees

@@ -8,7 +8,7 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Pointing
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.references import type_name
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.laws import broken, degrees, listed
 from engage_hri.services.control.testing.rays import angle, aside
 from engage_hri.services.control.testing.stage import Stage, standing

@@ -12,7 +12,7 @@ from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
 from engage_hri.services.control.testing.motions import Recording, recorded
 from engage_hri.services.control.testing.playing import Played

@@ -25,7 +25,7 @@ from engage_hri.schemas.body import Ray
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import BehaviorRefused, Body, BodyFailed, BodyState, Progress, Reached
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed, BodyState, Progress, Reached
 from engage_hri.services.control.testing.cases import findings_of
 from engage_hri.services.control.testing.laws import Finding, angles, degrees, ms, named
 from engage_hri.services.control.testing.points import PROMPT

@@ -4,8 +4,8 @@ from collections.abc import Container, Mapping
 from itertools import pairwise
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso.course import Course
-from engage_hri.services.control.torso.path import Path
+from engage_hri.services.control.figure.course import Course
+from engage_hri.services.control.motion.path import Path
 
 START = "start"
 """Name of the first sync point."""

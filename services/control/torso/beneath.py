@@ -5,8 +5,8 @@ A shift says where the head belongs. Its `end` says that this holds: the head is
 
 from collections.abc import AsyncGenerator
 
-from engage_hri.services.control.body import MovementAuthority, Progress, Reached
-from engage_hri.services.control.waiting import Bell
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import MovementAuthority, Progress, Reached
 
 
 async def pass_end(authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

@@ -17,8 +17,9 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control import variability
-from engage_hri.services.control.body import (
+from engage_hri.services.control.config import ControlConfig, Variability
+from engage_hri.services.control.contract import variability
+from engage_hri.services.control.contract.body import (
     Arrived,
     BehaviorRefused,
     Body,
@@ -29,25 +30,25 @@ from engage_hri.services.control.body import (
     Progress,
     Reached,
 )
-from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.extras import Idle, Seen
-from engage_hri.services.control.torso import choreography, displacing, head, homing, kinematics, tracks, truth
-from engage_hri.services.control.torso.alive import Alive
+from engage_hri.services.control.contract.extras import Idle, Seen
+from engage_hri.services.control.contract.variability import Deviations
+from engage_hri.services.control.figure import choreography, kinematics, tracks
+from engage_hri.services.control.figure.alive import Alive
+from engage_hri.services.control.figure.course import CoursePoint, Impossible
+from engage_hri.services.control.figure.estimates import beneath_a_look, infeasible, wait_estimate
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
+from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.torso import displaced_joints, head, homing, truth
 from engage_hri.services.control.torso.beneath import pass_end
-from engage_hri.services.control.torso.copied import Clock, beside
-from engage_hri.services.control.torso.course import CoursePoint, Impossible
-from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible, wait_estimate
-from engage_hri.services.control.torso.files import repertoire_of
+from engage_hri.services.control.torso.copy_for_rehearsal import Clock, beside
 from engage_hri.services.control.torso.following import follow, is_behind
 from engage_hri.services.control.torso.idling import idling
-from engage_hri.services.control.torso.measured import Measured, measured
+from engage_hri.services.control.torso.measured_state import Measured, measured
 from engage_hri.services.control.torso.mouth import Mouth
-from engage_hri.services.control.torso.moving import Torso, is_last_on_target
 from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import rehearsed
-from engage_hri.services.control.torso.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
-from engage_hri.services.control.variability import Deviations
+from engage_hri.services.control.torso.torso import Torso, is_last_on_target
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
@@ -223,10 +224,10 @@ class SimulatedBody(Body):
 
     def switch_faults(self, faults: Sequence[BodyFault]) -> None:
         on, displaced = _displaced(self.faults), _displaced(faults)
-        if reason := displacing.objection(self._torso, on, displaced):
+        if reason := displaced_joints.objection(self._torso, on, displaced):
             raise InputRefused(Fault(reason=reason, where="displaced", service="control"))
         self._deviations = Deviations(self._deviations.seed, tuple(faults))
-        displacing.displace(self._torso, on, displaced)
+        displaced_joints.displace(self._torso, on, displaced)
         self._torso.deviate(self._deviations)
         self._voice.is_mute = bool(self._deviations.of("mute"))
         if self._deviations.of("voiceless"):

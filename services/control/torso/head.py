@@ -8,14 +8,14 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso import choreography, tracks
-from engage_hri.services.control.torso.aiming import NECK, Aim
-from engage_hri.services.control.torso.course import Course, Impossible, Situation
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.pace import turning_time
-from engage_hri.services.control.torso.path import Leg, Path
+from engage_hri.services.control.figure import choreography, tracks
+from engage_hri.services.control.figure.aiming import NECK, Aim
+from engage_hri.services.control.figure.course import Course, Impossible, Situation
+from engage_hri.services.control.figure.pace import turning_time
+from engage_hri.services.control.figure.tracks import Track
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.tracks import Track
 
 NOTICEABLE = radians(0.5)
 """Radians: a target that moves less does not move the head."""

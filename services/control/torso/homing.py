@@ -2,9 +2,9 @@
 
 from collections.abc import Collection
 
-from engage_hri.services.control.body import TakenOver
-from engage_hri.services.control.torso.moving import Torso
-from engage_hri.services.control.waiting import Bell
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import TakenOver
+from engage_hri.services.control.torso.torso import Torso
 
 
 async def wait(torso: Torso, going: Collection[str]) -> None:

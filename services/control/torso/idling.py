@@ -3,10 +3,10 @@
 from math import inf
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.extras import Idle
-from engage_hri.services.control.torso.alive import Alive
+from engage_hri.services.control.contract.extras import Idle
+from engage_hri.services.control.figure.alive import Alive
 from engage_hri.services.control.torso.mouth import Mouth
-from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.torso.torso import Torso
 
 
 def idling(torso: Torso, mouth: Mouth, alive: Alive | None, now: Seconds) -> Idle:

@@ -4,8 +4,8 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import MouthShape
-from engage_hri.services.control.extras import smooth
+from engage_hri.services.control.contract.body import MouthShape
+from engage_hri.services.control.contract.extras import smooth
 
 CHANGE: Seconds = 0.09
 """Seconds in which the lips go from one shape to the next, half of them before the next begins, as people's do: as

@@ -14,9 +14,10 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from engage_hri.schemas.units import Degrees
-from engage_hri.services.control.torso import kinematics
-from engage_hri.services.control.torso.aiming import UPRIGHT
-from engage_hri.services.control.torso.path import (
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.aiming import UPRIGHT
+from engage_hri.services.control.figure.tracks import ALONG, FINELY, limits_of
+from engage_hri.services.control.motion.path import (
     LEAST,
     MARGIN,
     OUTSIDE,
@@ -26,7 +27,6 @@ from engage_hri.services.control.torso.path import (
     Array,
     Leg,
 )
-from engage_hri.services.control.torso.tracks import ALONG, FINELY, limits_of
 
 Flags = NDArray[np.bool_]
 

@@ -5,12 +5,12 @@ from typing import Protocol
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.torso.aiming import Aim
-from engage_hri.services.control.torso.course import Situation
+from engage_hri.services.control.figure.aiming import Aim
+from engage_hri.services.control.figure.course import Situation
+from engage_hri.services.control.figure.tracks import Track
+from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.torso.head import Fixation
-from engage_hri.services.control.torso.path import Path
 from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.tracks import Track
 
 
 class Clock(Protocol):

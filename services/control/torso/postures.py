@@ -7,11 +7,11 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import Gaze, Pointing
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.world import World
-from engage_hri.services.control.torso import choreography
-from engage_hri.services.control.torso.course import Course, Impossible, Situation, angles
-from engage_hri.services.control.torso.estimates import infeasible, is_arm, is_gaze, poses, posture_estimate
-from engage_hri.services.control.torso.moving import Torso
+from engage_hri.services.control.figure import choreography
+from engage_hri.services.control.figure.course import Course, Impossible, Situation, angles
+from engage_hri.services.control.figure.estimates import infeasible, is_arm, is_gaze, poses, posture_estimate
 from engage_hri.services.control.torso.outlines import Asked, outlines
+from engage_hri.services.control.torso.torso import Torso
 from engage_hri.services.runtime.steps import Steps, portions
 
 AT_ONCE = 64

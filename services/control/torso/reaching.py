@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.torso.aiming import Aim
-from engage_hri.services.control.torso.course import Course
+from engage_hri.services.control.figure.aiming import Aim
+from engage_hri.services.control.figure.course import Course
+from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.torso.parts import Parts
-from engage_hri.services.control.torso.path import Leg, Path
 
 STEP: Seconds = 0.02
 """Seconds between two looks at where the trunk will be."""

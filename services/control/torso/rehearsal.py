@@ -15,18 +15,19 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso import choreography, following, head, tracks
+from engage_hri.services.control.contract.bell import EARLY
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.contract.variability import Deviations
+from engage_hri.services.control.figure import choreography, tracks
+from engage_hri.services.control.figure.course import Impossible
+from engage_hri.services.control.figure.estimates import beneath_a_look, infeasible
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import Path, resting
+from engage_hri.services.control.torso import following, head
 from engage_hri.services.control.torso.asked import HURRIED, START, paced_by, told_apart
-from engage_hri.services.control.torso.copied import Clock
-from engage_hri.services.control.torso.course import Impossible
-from engage_hri.services.control.torso.estimates import beneath_a_look, infeasible
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.moving import Torso, is_last_on_target
-from engage_hri.services.control.torso.path import Path, resting
+from engage_hri.services.control.torso.copy_for_rehearsal import Clock
 from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.variability import Deviations
-from engage_hri.services.control.waiting import EARLY
+from engage_hri.services.control.torso.torso import Torso, is_last_on_target
 from engage_hri.services.runtime.steps import Steps
 
 RELEASE, BEGIN = 0, 1

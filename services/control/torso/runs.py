@@ -8,14 +8,14 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control import variability
-from engage_hri.services.control.body import MovementAuthority
-from engage_hri.services.control.torso.course import Course, CoursePoint
-from engage_hri.services.control.torso.motion import Motion
-from engage_hri.services.control.torso.path import Leg, Path, unmarked
-from engage_hri.services.control.torso.sizing import hurried
-from engage_hri.services.control.variability import Deviations
-from engage_hri.services.control.waiting import Bell
+from engage_hri.services.control.contract import variability
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.contract.variability import Deviations
+from engage_hri.services.control.figure.course import Course, CoursePoint
+from engage_hri.services.control.figure.sizing import hurried
+from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.path import Leg, Path, unmarked
 from engage_hri.services.runtime.steps import Steps
 
 STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")

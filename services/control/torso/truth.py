@@ -5,9 +5,9 @@ from math import radians
 
 from engage_hri.schemas.body import BodyPose, Ray
 from engage_hri.schemas.units import Radians
-from engage_hri.services.control.extras import Seen
-from engage_hri.services.control.torso import kinematics, tracks
-from engage_hri.services.control.variability import Deviations
+from engage_hri.services.control.contract.extras import Seen
+from engage_hri.services.control.contract.variability import Deviations
+from engage_hri.services.control.figure import kinematics, tracks
 
 
 def beside(deviations: Deviations, offsets: Mapping[str, Radians]) -> dict[str, Radians]:

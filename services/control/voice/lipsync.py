@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Arrived, MouthShape, MovementAuthority, Progress, Reached, Spoke
+from engage_hri.services.control.contract.body import Arrived, MouthShape, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.voice.timeline import Utterance, Word
 
 VOWELS: dict[str, tuple[float, float]] = {

@@ -13,7 +13,7 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.refusals import infeasible
+from engage_hri.services.control.contract.refusals import infeasible
 from engage_hri.services.control.voice.clauses import Clause
 from engage_hri.services.control.voice.phrases import Piece
 from engage_hri.services.control.voice.timeline import Utterance, Word, utter, uttered

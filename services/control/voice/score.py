@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import Reached, Spoke
+from engage_hri.services.control.contract.body import Reached, Spoke
 from engage_hri.services.control.voice.parts import Part
 
 FADE: Seconds = 0.004

@@ -6,14 +6,14 @@ from contextlib import aclosing
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     MovementAuthority,
     Progress,
     Reached,
 )
-from engage_hri.services.control.refusals import unsupported
+from engage_hri.services.control.contract.refusals import unsupported
 from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.parts import unspeakable
 from engage_hri.services.control.voice.speaker import FAULTS, Speaker, speech, voiceless

@@ -20,14 +20,15 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import (
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     MovementAuthority,
     Progress,
     Reached,
 )
-from engage_hri.services.control.refusals import unsupported
+from engage_hri.services.control.contract.refusals import unsupported
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
 from engage_hri.services.control.voice.estimate import speech_estimate
@@ -41,7 +42,6 @@ from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
 from engage_hri.services.control.voice.timeline import utter, uttered
 from engage_hri.services.control.voice.wav import WavFile
-from engage_hri.services.control.waiting import Bell
 
 
 class SoundingVoice(Speaker):

@@ -8,7 +8,7 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
-from engage_hri.services.control.body import BehaviorRefused, Body, BodyState
+from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyState
 from engage_hri.services.control.voice.voice import Voice
 
 FAULTS = ("mute", "voiceless")

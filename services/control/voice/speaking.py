@@ -14,7 +14,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.body import (
+from engage_hri.services.control.contract.bell import EARLY, Bell
+from engage_hri.services.control.contract.body import (
     Arrived,
     BodyFailed,
     MouthShape,
@@ -27,7 +28,6 @@ from engage_hri.services.control.voice.outlets import Nowhere, Outlet
 from engage_hri.services.control.voice.parts import Part, silent
 from engage_hri.services.control.voice.score import FADE, Cut, Gap, Item, More, faded, items_of
 from engage_hri.services.control.voice.visemes import Lips
-from engage_hri.services.control.waiting import EARLY, Bell
 
 OnLips = Callable[[Sequence[MouthShape]], None]
 CHECK: Seconds = 0.05

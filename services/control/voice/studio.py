@@ -24,10 +24,10 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.voice.clauses import Clause
 from engage_hri.services.control.voice.synthesis import Phrase, SynthesisFailed, Synthesizer
 from engage_hri.services.control.voice.worker import HEAD, Answer, Failed, Made, Order, Spoken, packed
-from engage_hri.services.control.waiting import Bell
 
 LARGEST = 64 * 2**20
 """Bytes of sound that are kept: some 25 minutes."""

@@ -6,9 +6,9 @@ from math import inf
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.faults import Fault
-from engage_hri.services.control.body import BehaviorRefused, MovementAuthority, Progress, Reached
+from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import BehaviorRefused, MovementAuthority, Progress, Reached
 from engage_hri.services.control.voice import speaking
-from engage_hri.services.control.waiting import Bell
 
 
 class Voice:

@@ -6,8 +6,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
+from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
 from engage_hri.services.control.mujoco.body import MujocoBody
 
 

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Gesture, Hand, Head, Pointing, PostureShift
-from engage_hri.services.control.body import BehaviorRefused, Body
+from engage_hri.services.control.contract.body import BehaviorRefused, Body
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.testing import WORLD, Stage
 from engage_hri.services.control.torso.body import SimulatedBody

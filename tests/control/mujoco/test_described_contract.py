@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 pytest.importorskip("icub_models", reason="needs the package icub-models, which has the model")
 
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.testing import BodyContract
 from tests.random_cases import trials

@@ -13,13 +13,13 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Pointing
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.control.body import BehaviorRefused, BodyFailed
+from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed
+from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.faults import OURS
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.testing.suite import Suite
 from engage_hri.services.control.testing.witness import ARMS, LOOKS, Witness
-from engage_hri.services.control.torso import kinematics
 from tests.random_cases import share_of
 
 POINT = Pointing(id="point", target="near-right", mode="RIGHT_HAND")

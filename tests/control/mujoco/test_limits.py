@@ -10,12 +10,12 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
 from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.services.control.figure.kinematics import LIMIT
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.commands import Commands
 from engage_hri.services.control.mujoco.faults import OURS
 from engage_hri.services.control.testing import WORLD, Stage
 from engage_hri.services.control.testing.witness import ARMS, LOOKS
-from engage_hri.services.control.torso.kinematics import LIMIT
 
 PARTS = ("head", "torso", "left_arm", "right_arm")
 SETTLED = 0.06

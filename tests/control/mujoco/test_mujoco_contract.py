@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.testing import BodyContract
 from tests.random_cases import trials

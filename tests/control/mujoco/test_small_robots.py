@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.testing import BodyContract
 from tests.random_cases import trials

@@ -9,9 +9,9 @@ from itertools import pairwise
 import pytest
 
 from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Head, Pose, Posture
-from engage_hri.services.control.body import Reached
+from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import made
+from engage_hri.services.control.contract.body import Reached
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.idling import LEAN, SWAY
 from engage_hri.services.control.testing import WORLD, Stage, performed

@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.testing import BodyContract
 from tests.control.reachy_mini.fake import FakeDaemon

@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 
 from engage_hri.schemas.references import type_name
+from engage_hri.services.control.bases.drivers import check
 from engage_hri.services.control.config import ControlConfig
-from engage_hri.services.control.drivers import check
 from engage_hri.services.control.reachy_mini import courses, joints
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from tests.control.reachy_mini import daemon

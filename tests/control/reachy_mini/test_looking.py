@@ -10,7 +10,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.body import BodyFailed, Reached
+from engage_hri.services.control.contract.body import BodyFailed, Reached
+from engage_hri.services.control.motion.path import JointMotion, resting
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.courses import Course
@@ -19,7 +20,6 @@ from engage_hri.services.control.reachy_mini.moving import SHORTEST, Moves
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.reachy_mini.tracks import NEAR
 from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
-from engage_hri.services.control.torso.path import JointMotion, resting
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 

@@ -17,7 +17,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
-from engage_hri.services.control.body import Body, BodyFailed
+from engage_hri.services.control.contract.body import Body, BodyFailed
 from engage_hri.services.control.reachy_mini import messages
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.connection import connected

@@ -10,7 +10,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Head
 from engage_hri.schemas.faults import Fault, RunFailed
-from engage_hri.services.control.body import BehaviorRefused, BodyFailed
+from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed

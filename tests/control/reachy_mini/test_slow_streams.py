@@ -9,7 +9,7 @@ from itertools import cycle, pairwise, repeat
 import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, Head, Posture
-from engage_hri.services.control.body import Reached
+from engage_hri.services.control.contract.body import Reached
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage, performed
 from tests.control.reachy_mini.fake import PERIOD, FakeDaemon

@@ -9,7 +9,7 @@ from engage_hri.services.commandline import roster
 from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.sources import still
-from engage_hri.services.control.body import Body
+from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.runtime.service import Ready, Service
 from engage_hri.services.simulation.still import tangram_world

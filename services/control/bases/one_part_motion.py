@@ -1,0 +1,314 @@
+"""The ordinary robot: one part, one motion at a time. A driver on it only says where, and passes goals to its SDK.
+
+    class PanTilt(OrdinaryBody):
+        part = "head"
+        joints = (JointLimit(...), JointLimit(...))
+
+        def aim(self, behavior, world): ...     # joint angles on target
+        def angles(self): ...                   # measured
+        def go(self, goal, seconds): ...        # a command to the motors; returns at once
+
+A sync point is where the *measured* angles are: an SDK's "finished" often means that the planned time is over.
+"""
+
+import asyncio
+import math
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager, suppress
+from typing import NamedTuple
+
+from engage_hri.schemas.behavior_types import TYPES
+from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import BodyPose, Estimate, JointAngle, Phase
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus.sight import Sight
+from engage_hri.services.control.bases.one_part_body import Angles, DrivenBody, by_instant
+from engage_hri.services.control.bases.one_part_body import Way as Way
+from engage_hri.services.control.contract.body import (
+    Arrived,
+    BehaviorRefused,
+    BodyFailed,
+    BodyState,
+    MovementAuthority,
+    Progress,
+    Reached,
+    Revoked,
+    TakenOver,
+)
+from engage_hri.services.control.contract.refusals import infeasible
+from engage_hri.services.requests.deadlines import Silences
+
+
+class _Doing:
+    """A behavior that has the part. sync: the point whose goal it is at, or on its way to; empty: none yet."""
+
+    def __init__(self, behavior: BlockBehavior, authority: MovementAuthority, goals: Mapping[str, Angles]) -> None:
+        self.behavior, self.authority, self.goals = behavior, authority, goals
+        self.sync = ""
+
+
+class _Look(NamedTuple):
+    """An entity that the eyes were turned to. goal: where the joints are for it."""
+
+    target: str
+    goal: Callable[[], Angles]
+
+
+class OrdinaryBody(DrivenBody):
+    """A robot with one part, which makes one motion at a time: derive a driver from it.
+
+    What a driver says of its robot is in `DrivenBody`.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._sight = Sight("control")
+        self._settled: BlockBehavior | None = None
+        """The shift that has set where it rests; None: it rests at home."""
+        self._shifts = 0
+        """Number of times that a behavior or `home` has set where it rests."""
+        self._doing: _Doing | None = None
+        self._look: _Look | None = None
+        self._goal: Angles | None = None
+        """Where the joints are on their way to; None: they stand."""
+        self._is_open = False
+
+    # -- the contract -------------------------------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        await self.open()
+        self._is_open = True
+        try:
+            yield
+        finally:
+            self._is_open = False
+            await self.close()
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        try:
+            way = self._way(behavior, world)
+        except BehaviorRefused as refused:
+            target = getattr(behavior, "target", "")
+            warning = "NO_SUCH_TARGET" if target and world.entity(target) is None else "CANNOT_CREATE_BEHAVIOR"
+            if type_name(behavior) not in self.types:
+                warning = "BEHAVIOR_TYPE_NOT_SUPPORTED"
+            return infeasible(behavior.id, warning, refused.fault)
+        here = dict(self._measured())
+        here |= {angle.joint: angle.angle for angle in pose.joints if angle.joint in here} if pose else {}
+        row, phases, since = TYPES[type_name(behavior)], [], "start"
+        at: Angles = here
+        goals = by_instant(behavior, way)
+        target = way[-2 if len(way) > 1 else -1][1]
+        for sync in row.points[1:]:
+            goal = goals.get(sync, at)
+            seconds, hold = self._seconds(at, goal), sync in row.holds
+            longest = None if hold or not seconds else seconds  # it has one pace
+            phases.append(Phase(since=since, to=sync, shortest=seconds, natural=seconds, longest=longest, hold=hold))
+            since, at = sync, goal
+        is_head = self.gaze(here) is not None
+        turned = math.degrees(sum(abs(target[joint] - here[joint]) for joint in here))
+        return Estimate(
+            behavior=behavior.id, feasible=True, parts=(self.part,), phases=tuple(phases),
+            ray=self.gaze(target) if is_head else self.forearm(target),
+            head_degrees=turned if is_head else 0.0, arm_degrees=0.0 if is_head else turned,
+            pose_after=_pose(target), pose_end=_pose(at),
+        )  # fmt: skip
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        row = TYPES[type_name(behavior)]
+        doing = _Doing(behavior, authority, self._goals(behavior, self.world))
+        at = came = _now()
+        is_beneath = row.turns_base and self._doing is not None and self._doing.authority.points != row.points
+        if row.turns_base:
+            self._rest_at(doing.goals["end"], behavior)
+        shifts = self._shifts
+        if is_beneath:  # beneath a look nothing moves
+            for sync in authority.points:
+                yield Reached(sync, at, at)
+            return
+        if self._doing is not None:
+            self._doing.authority.revoke("taken_over")  # it wakes, and ends without its next points
+        self._doing = doing
+        passed = 0
+        try:
+            for sync in authority.points:
+                if sync in doing.goals:
+                    arrived = await self._reach(sync, doing)
+                    at = came = at if arrived is None else arrived
+                hold = _last_of_instant(row.one_instant, sync)
+                if hold in row.holds and not authority.covers(hold):
+                    yield Arrived(hold, came := at)
+                    await authority.granted(hold)
+                    at = max(_now(), await self._stay(doing) or 0.0)
+                yield Reached(sync, at, came)
+                passed += 1
+                if hold == sync:  # the next point is another instant
+                    came = at
+        except Revoked:
+            if row.turns_base and authority.revoked == "taken_over" and self._shifts == shifts:
+                yield Reached("end", _now(), _now())  # a look lies over it, and goes home to there
+        finally:
+            if self._doing is doing:
+                self._doing = None
+                if passed < len(authority.points):
+                    with suppress(BodyFailed):
+                        self._command(self._base)
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        if parts and self.part not in parts:
+            return
+        if self._doing is not None:
+            self._doing.authority.revoke()
+            self._doing = None
+        self._rest_at(self._home, None)
+        await self._move(lambda: self._home, None, "home")
+
+    def state(self) -> BodyState:
+        angles = self._measured()
+        arm = self.forearm(angles)
+        self._note_arrival(angles)
+        return BodyState(
+            pose=_pose(angles), moving=self._goal is not None, gaze=self.gaze(angles),
+            left_arm=arm if self.part == "left_arm" else None,
+            right_arm=arm if self.part != "left_arm" else None,
+            looking_at=self._look.target if self._look is not None and self._rests_on(self._look, angles) else "",
+        )  # fmt: skip
+
+    def see(self, world: World) -> None:
+        before, self.world = self.world, world
+        if self._is_open:
+            self._follow(before)
+
+    def _measured(self) -> Angles:
+        """Measure the joints. Without a connection, as for `engage plan`, they are at rest."""
+        return self.angles() if self._is_open else self._home
+
+    # -- what moves in the world --------------------------------------------------------------------------------
+
+    def _rest_at(self, base: Angles, shift: BlockBehavior | None) -> None:
+        self._base, self._settled = base, shift
+        self._shifts += 1
+
+    def _follow(self, before: World) -> None:
+        """Aim anew where a target has moved. What is out of reach now is looked at where it was last."""
+        doing, has_moved = self._doing, False
+        if self._settled is not None and self._moved(self._settled, before):
+            with suppress(BehaviorRefused):
+                self._base = self._goals(self._settled, self.world)["end"]
+                has_moved = doing is None
+        if doing is not None and self._moved(doing.behavior, before):
+            with suppress(BehaviorRefused):
+                doing.goals = self._goals(doing.behavior, self.world)
+                has_moved = True
+        goal = self._base if doing is None else doing.goals.get(doing.sync)
+        if has_moved and goal is not None and self._goal is None:  # else who moves it sees the new goal
+            with suppress(BodyFailed):
+                if self._off(goal) is not None:
+                    self._command(goal)
+
+    def _moved(self, behavior: BlockBehavior, before: World) -> bool:
+        target = getattr(behavior, "target", "")
+        was, now = before.entity(target), self.world.entity(target)
+        return was is not None and now is not None and was.position != now.position
+
+    def _rests_on(self, look: _Look, angles: Angles) -> bool:
+        off = self._off(look.goal(), angles)
+        return off is None or abs(off[1]) <= self.capabilities.gaze_half_angle
+
+    # -- motion -------------------------------------------------------------------------------------------------
+
+    async def _reach(self, sync: str, doing: _Doing) -> Seconds | None:
+        """Move to where a sync point is. Returns when the joints were measured there; None: they were already."""
+        doing.sync = sync
+        if sync == "end":
+            arrived = await self._move(lambda: self._base, doing.authority, sync)
+            self._look_at(self._settled, lambda: self._base)
+            return arrived
+        arrived = await self._move(lambda: doing.goals[sync], doing.authority, sync)
+        is_look = TYPES[type_name(doing.behavior)].family == "gaze"
+        self._look_at(doing.behavior if is_look else None, lambda: doing.goals[sync])
+        return arrived
+
+    async def _stay(self, doing: _Doing) -> Seconds | None:
+        """Go back to where it waits if it is elsewhere: a motor gives way, a target moves on. Returns as `_reach`."""
+        return await self._reach(doing.sync, doing) if doing.sync else None
+
+    def _look_at(self, behavior: BlockBehavior | None, goal: Callable[[], Angles]) -> None:
+        target = getattr(behavior, "target", "")
+        self._look = _Look(target, goal) if target else None
+
+    async def _move(
+        self, goal: Callable[[], Angles], authority: MovementAuthority | None, sync: str
+    ) -> Seconds | None:
+        """Move until the measured angles are at the goal, which may move. Raises Revoked, TakenOver or BodyFailed."""
+        if authority is not None and authority.revoked:
+            raise Revoked
+        if self._off(goal()) is None and self._goal is None:
+            return None
+        self._look, to, time = None, None, Silences[str](self._sight)
+        seconds = began = 0.0
+        while to is None or _apart(to, goal()) > self.near or self._off(goal()) is not None:
+            if authority is not None and authority.revoked:
+                raise Revoked
+            if authority is None and self._doing is not None:
+                raise TakenOver((self.part,))
+            if to is None or _apart(to, goal()) > self.near:
+                to, began = goal(), _now()
+                seconds = self._command(to)
+                time.set(sync, began + self.patience * seconds + 1.0)
+            elif time.due(_now()) is not None:
+                raise BodyFailed(self._short(goal(), sync, _now() - began, seconds))
+            await asyncio.sleep(1.0 / self.rate)
+        self._goal = None
+        return _now()
+
+    def _short(self, goal: Angles, sync: str, waited: Seconds, planned: Seconds) -> Fault:
+        joint, angle = self._off(goal) or ("", 0.0)
+        where = f"{math.degrees(abs(angle)):.1f} degrees short of its goal"
+        return Fault(
+            reason=f"{joint} stands {where} {waited:.1f} s after the command to go to its {sync}; planned were "
+                   f"{planned:.1f} s",
+            advice="is the motor on, free and not too hot?", service="control",
+        )  # fmt: skip
+
+    def _command(self, goal: Angles) -> Seconds:
+        """Command the motors. Returns the time that is planned until the joints are measured there."""
+        seconds = self._seconds(self._measured(), goal)
+        self._goal = goal
+        self.go(goal, max(0.0, seconds - self.settling))
+        return seconds
+
+    def _note_arrival(self, angles: Angles) -> None:
+        """Note that a motion that nobody waits for has come to its end."""
+        if self._goal is not None and self._off(self._goal, angles) is None:
+            self._goal = None
+            if self._doing is None:
+                self._look_at(self._settled, lambda: self._base)
+
+    def _off(self, goal: Angles, here: Angles | None = None) -> tuple[str, Radians] | None:
+        """The joint that is farthest from the goal, and by how much; None: all are near. here: None: measured now."""
+        here = self._measured() if here is None else here
+        off = {joint: goal[joint] - here[joint] for joint in goal}
+        joint = max(off, key=lambda name: abs(off[name]), default="")
+        return (joint, off[joint]) if off and abs(off[joint]) > self.near else None
+
+
+def _apart(one: Angles, other: Angles) -> Radians:
+    return max((abs(one[joint] - other[joint]) for joint in one), default=0.0)
+
+
+def _last_of_instant(groups: Sequence[Sequence[str]], sync: str) -> str:
+    """The point at which the points of one instant wait together: the last one of them."""
+    return next((group[-1] for group in groups if sync in group), sync)
+
+
+def _pose(angles: Angles) -> BodyPose:
+    return BodyPose(joints=tuple(JointAngle(joint, angle) for joint, angle in angles.items()))
+
+
+def _now() -> Seconds:
+    return asyncio.get_running_loop().time()

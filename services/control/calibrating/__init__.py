@@ -1,0 +1,1 @@
+"""Calibration from measurements: what is measured, and what fits it."""

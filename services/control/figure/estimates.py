@@ -1,0 +1,148 @@
+"""Estimates of the simulated body, from the paths that it then moves along: without deviations they are exact."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+from msgspec.structs import replace
+
+from engage_hri.schemas.behaviors import BlockBehavior, Wait
+from engage_hri.schemas.body import BodyPose, Estimate, Phase
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.units import Degrees, Seconds
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.course import Course, CoursePoint, Impossible
+from engage_hri.services.control.figure.sizing import quickest
+from engage_hri.services.control.motion.motion import SLOWEST
+from engage_hri.services.control.motion.path import Array, Path
+
+Added = Callable[[Seconds], Array]
+"""What the trunk adds to the joints of a path so many seconds after it began."""
+
+
+def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
+    fault = Fault(reason=impossible.reason, where=behavior.id, advice=impossible.advice, service="control")
+    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=impossible.kind)
+
+
+def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
+    phases = _phases((CoursePoint("start"), CoursePoint("end", "end")), {"start": 0.0, "end": duration})
+    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
+
+
+def motion_estimate(
+    behavior: BlockBehavior,
+    course: Course,
+    path: Path,
+    pose: BodyPose,
+    pose_end: BodyPose,
+    added: Added | None = None,
+) -> Estimate:
+    """Estimate a behavior that moves along `path`. pose, pose_end: joint angles on target, and at the end.
+
+    added: what the trunk adds to the path, if it moves.
+    """
+    degrees = 0.0
+    if is_gaze(course) or is_arm(course):
+        until = path.marks.get("stroke", path.length)
+        degrees = math.degrees(path.travel(until) if added is None else _travel(path, until, added))
+    phases = _phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake)
+    return replace(posture_estimate(behavior, course, degrees, (pose, pose_end)), phases=phases)
+
+
+def posture_estimate(
+    behavior: BlockBehavior, course: Course, degrees: Degrees, poses: tuple[BodyPose, BodyPose] | None
+) -> Estimate:
+    """Estimate a behavior without phases. degrees: of head or arm, to the target.
+
+    poses: on target, at the end; None: not asked for, and neither is the ray.
+    """
+    return Estimate(
+        behavior=behavior.id,
+        feasible=True,
+        degraded=course.note,
+        parts=("head",) if course.parts == ("nod",) else course.parts,
+        head_degrees=degrees if is_gaze(course) else 0.0,
+        arm_degrees=degrees if is_arm(course) else 0.0,
+        ray=course.ray if poses else None,
+        pose_after=poses[0] if poses else None,
+        pose_end=poses[1] if poses else None,
+    )
+
+
+def is_gaze(course: Course) -> bool:
+    return course.parts == ("head",)
+
+
+def is_arm(course: Course) -> bool:
+    return course.parts[0].endswith("_arm")
+
+
+def poses(course: Course, pose: Mapping[str, float]) -> tuple[BodyPose, BodyPose]:
+    """Poses of all joints on target and at the end. pose: at the start, with the trunk where it is going to be."""
+    # A nod is on top of the gaze, and leaves the neck where that has it.
+    moved = () if course.parts == ("nod",) else zip(course.joints, course.legs[-1].goal, strict=True)
+    return kinematics.pose_message({**pose, **course.on_target}), kinematics.pose_message({**pose, **dict(moved)})
+
+
+def beneath_a_look(shift: Estimate) -> Estimate:
+    """The estimate of a shift of the head that begins under a look: nothing moves, and it ends at once."""
+    phases = tuple([replace(phase, shortest=0.0, natural=0.0, longest=None) for phase in shift.phases])
+    return replace(shift, phases=phases, head_degrees=0.0)
+
+
+def going_home(estimate: Estimate, leaves: str, back: Path) -> Estimate:
+    """The estimate of a behavior that goes home by another path than the one it was laid with.
+
+    leaves: the sync point from which the path `back` leads home.
+    """
+    syncs = [phase.since for phase in estimate.phases]
+    number = syncs.index(leaves)
+    at = {leaves: 0.0, **back.marks}
+    homeward = []
+    for phase in estimate.phases[number:]:
+        natural = at[phase.to] - at[phase.since]
+        longest = None if phase.hold or not natural else _longest(natural, SLOWEST, inf)
+        homeward.append(replace(phase, natural=natural, shortest=natural / back.fastest, longest=longest))
+    return replace(estimate, phases=(*estimate.phases[:number], *homeward))
+
+
+def _travel(path: Path, until: Seconds, added: Added) -> float:
+    """Way of all joints along `path` to which the trunk adds its share."""
+    seen = [path.at(s).q + added(s) for s in np.linspace(0.0, until, 9).tolist()]
+    return sum(float(np.sum(np.abs(after - before))) for before, after in pairwise(seen))
+
+
+def _phases(
+    points: Sequence[CoursePoint],
+    times: Mapping[str, Seconds],
+    quickest: Mapping[str, Seconds] | None = None,
+    slowest: float = 1.0,
+    brake: float = inf,
+) -> tuple[Phase, ...]:
+    """Phases from each sync point to the next. One that ends at a hold point or takes no time has no longest time.
+
+    times: of the points, at natural pace. quickest: in the greatest hurry. slowest: the least rate. brake: how fast
+    the rate may change, in 1/s: who passes a hold point without a stop cannot dawdle right behind it.
+    """
+    least = times if quickest is None else quickest
+    return tuple(
+        Phase(
+            since=since.sync,
+            to=to.sync,
+            shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
+            natural=natural,
+            longest=None
+            if to.held_with or not natural
+            else _longest(natural, slowest, brake if since.held_with else inf),
+            hold=to.held_with == to.sync,
+        )
+        for since, to in pairwise(points)
+    )
+
+
+def _longest(natural: Seconds, slowest: float, brake: float) -> Seconds:
+    """Seconds for a phase that is entered at the natural rate. A short one is over before the motion is slow."""
+    return natural if 2 * brake * natural < 1.0 else natural / slowest

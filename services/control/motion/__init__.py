@@ -1,0 +1,1 @@
+"""Motion of one joint in time: paths and their clocks. Pure."""

@@ -1,0 +1,208 @@
+"""Play of a path in time under a movement authority.
+
+s(t) is made of few parabolas, so that the instant at which a sync point is crossed is a formula, without stepping
+through the trajectory. A motion runs at a steady rate, brakes to a stop exactly at the authority's limit, and goes on
+without having stopped if the limit is moved in time.
+"""
+
+import math
+from collections.abc import Sequence
+from math import inf, sqrt
+
+import numpy as np
+from msgspec import Struct
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.motion.path import Array, JointMotion, Path, resting
+
+SLOWEST = 0.01
+"""The least steady rate: a time that the author of a block has fixed is kept, however slow that looks."""
+
+
+class _Piece(Struct, frozen=True):
+    """A parabola of s(t), from instant `t` on. slope: change of the rate per second."""
+
+    t: Seconds
+    s: Seconds
+    rate: float
+    slope: float
+
+    def s_at(self, t: Seconds) -> Seconds:
+        since = t - self.t
+        return self.s + self.rate * since + self.slope * since * since / 2
+
+    def rate_at(self, t: Seconds) -> float:
+        return max(0.0, self.rate + self.slope * (t - self.t))
+
+
+class Motion:
+    """A path that is played from `start` on. Pure: it answers for any instant from its last change on.
+
+    cruise: the steady rate, 1 = natural. limit: the s where it has to stop, until `extend` moves it.
+    """
+
+    def __init__(self, path: Path, start: Seconds, *, cruise: float = 1.0, limit: Seconds = inf) -> None:
+        self.path = path
+        self.cruise = min(cruise, path.fastest)
+        self.limit = limit
+        self._rest: JointMotion | None = None
+        """State of the joints after the end, once it has been asked for."""
+        # From rest the rate may jump: nothing moves yet. A path that starts in motion was built for rate 1.
+        self._replan(start, 0.0, self.cruise if path.start.at_rest else 1.0)
+
+    def extend(self, limit: Seconds, now: Seconds) -> None:
+        """Move the limit further along. A motion that still brakes for the old one picks up speed again."""
+        if limit > self.limit:
+            s, rate = self.s(now), self.rate(now)
+            self.limit = limit
+            self._replan(now, s, rate)
+
+    def run_at(self, cruise: float, now: Seconds) -> None:
+        """Go on at another steady rate, as far as the limits permit."""
+        s, rate = self.s(now), self.rate(now)
+        self.cruise = min(cruise, self.path.fastest)
+        # Where nothing moves yet the rate may jump.
+        self._replan(now, s, self.cruise if self.path.rests_at(s) else rate)
+
+    def reach(self, s: Seconds, at: Seconds, now: Seconds, fastest: float) -> None:
+        """Change the rate such that `s` is reached at `at`, or as near to that as between `SLOWEST` and `fastest`."""
+        here, rate = self.s(now), self.rate(now)
+        left, time, change = s - here, at - now, self.path.gentlest_brake
+        fastest = min(fastest, self.path.fastest)
+        if time <= 0.0 or left >= fastest * time:
+            cruise = fastest
+        elif self.path.rests_at(here):
+            cruise = left / time
+        elif left >= rate * time:
+            reach = rate + change * time
+            room = reach * reach - rate * rate - 2 * change * left
+            cruise = reach - sqrt(room) if room >= 0.0 else fastest
+        else:
+            reach = change * time - rate
+            cruise = sqrt(max(0.0, reach * reach - rate * rate + 2 * change * left)) - reach
+        self.run_at(min(max(cruise, SLOWEST), fastest), now)
+
+    def brake(self, now: Seconds, at: Seconds | None = None) -> None:
+        """Stop as soon as the limits permit, or at position `at`, where it can (see `can_stop_at`)."""
+        s, rate = self.s(now), self.rate(now)
+        self.limit = min(self.limit, s + rate * rate / (2 * self.path.gentlest_brake) if at is None else at)
+        self._replan(now, s, rate)
+
+    def reaches(self, s: Seconds, at: Seconds) -> bool:
+        """True if s is reached by `at`, as it moves now."""
+        crossing = self.crossing(s)
+        return crossing is not None and crossing <= at
+
+    def can_stop_at(self, s: Seconds, now: Seconds) -> bool:
+        """True if it has not passed s, and can come to rest there."""
+        left, rate = s - self.s(now), self.rate(now)
+        if left < -1e-9 or self.path.rests_at(s):
+            return left >= -1e-9
+        return rate * rate <= 2 * self.path.steepest_brake(s, rate) * left + 1e-9
+
+    def s(self, t: Seconds) -> Seconds:
+        if t >= self.end:
+            return self._stop
+        return min(self._piece(t).s_at(t), self._stop)
+
+    def rate(self, t: Seconds) -> float:
+        return 0.0 if t >= self.end else self._piece(t).rate_at(t)
+
+    def at(self, t: Seconds) -> JointMotion:
+        """Position, velocity and acceleration of the joints at t."""
+        if t >= self.end:
+            if self._rest is None:
+                self._rest = resting(self.path.at(self._stop).q)
+            return self._rest
+        piece = self._piece(t)
+        rate, state = piece.rate_at(t), self.path.at(min(piece.s_at(t), self._stop))
+        return JointMotion(state.q, state.v * rate, state.a * rate * rate + state.v * piece.slope)
+
+    def position(self, t: Seconds) -> Array:
+        """Position of the joints at t alone: after the end the same array each time."""
+        if t >= self.end:
+            return self.at(t).q
+        return self.path.position(min(self._piece(t).s_at(t), self._stop))
+
+    def positions(self, times: Sequence[Seconds] | Array) -> Array:
+        """Positions of the joints at instants in order: an array of instants x joints."""
+        length = self.path.length or 1.0
+        return self.path.positions(self._along(np.asarray(times, dtype=np.float64)) / length)
+
+    def _along(self, times: Array) -> Array:
+        """s at many instants: as `s` has it at each."""
+        pieces = np.array([(piece.t, piece.s, piece.rate, piece.slope) for piece in self._pieces])
+        number = np.maximum(np.searchsorted(pieces[:, 0], times, side="right") - 1, 0)
+        t, s, rate, slope = pieces[number].T
+        since = times - t
+        way = np.minimum(s + rate * since + slope * since * since / 2, self._stop)
+        return np.where(times >= self.end, self._stop, way)
+
+    def crossing(self, s: Seconds) -> Seconds | None:
+        """Instant at which s is reached; None if s lies beyond the limit."""
+        if s > self._stop + 1e-12:
+            return None
+        if s >= self._stop - 1e-12:
+            return self.end
+        piece = next((piece for piece in reversed(self._pieces) if piece.s <= s), self._pieces[0])
+        root = sqrt(max(0.0, piece.rate * piece.rate + 2 * piece.slope * (s - piece.s)))
+        return piece.t + 2 * (s - piece.s) / (piece.rate + root) if s > piece.s else piece.t
+
+    def _piece(self, t: Seconds) -> _Piece:
+        for piece in reversed(self._pieces):
+            if piece.t <= t:
+                return piece
+        return self._pieces[0]
+
+    def _replan(self, now: Seconds, s: Seconds, rate: float) -> None:
+        self._stop = max(s, min(self.limit, self.path.length))
+        self._rest = None
+        self._pieces: list[_Piece] = []
+        left = self._stop - s
+        if left <= 0.0:
+            self.end = now
+            self._pieces.append(_Piece(now, s, 0.0, 0.0))
+            return
+        if rate == 0.0 and self.path.rests_at(s):
+            rate = self.cruise
+        brake = inf
+        if not self.path.rests_at(self._stop):
+            brake = self.path.steepest_brake(self._stop, max(rate, self.cruise))
+        top, braking = _top_rate(rate, self.cruise, left, self.path.gentlest_brake, brake)
+        now, s, rate = self._ramp(now, s, rate, top)
+        steady = self._stop - s - braking
+        if rate > 0.0 and steady > 0.0:
+            self._pieces.append(_Piece(now, s, rate, 0.0))
+            now, s = now + steady / rate, s + steady
+        if braking > 0.0:
+            self._pieces.append(_Piece(now, s, rate, -rate * rate / (2 * (self._stop - s))))
+            now += 2 * (self._stop - s) / rate
+        if not self._pieces:
+            self._pieces.append(_Piece(now, s, 0.0, 0.0))
+        self.end = now
+
+    def _ramp(self, now: Seconds, s: Seconds, rate: float, to: float) -> tuple[Seconds, Seconds, float]:
+        if math.isclose(rate, to, rel_tol=1e-12, abs_tol=1e-12):
+            return now, s, to
+        slope, stop = math.copysign(self.path.gentlest_brake, to - rate), self._stop
+        seconds = (to - rate) / slope
+        piece = _Piece(now, s, rate, slope)
+        self._pieces.append(piece)
+        if piece.s_at(now + seconds) >= stop:
+            root = sqrt(max(0.0, rate * rate + 2 * slope * (stop - s)))
+            return now + 2 * (stop - s) / (rate + root), stop, root
+        return now + seconds, piece.s_at(now + seconds), to
+
+
+def _top_rate(rate: float, cruise: float, left: Seconds, change: float, brake: float) -> tuple[float, Seconds]:
+    """The highest rate from which the motion can stop within `left`, and the part of `left` that braking takes."""
+    if brake == inf:
+        return cruise, 0.0
+    ramp = abs(cruise * cruise - rate * rate) / (2 * change)
+    if ramp + cruise * cruise / (2 * brake) <= left:
+        return cruise, cruise * cruise / (2 * brake)
+    if rate * rate / (2 * brake) >= left:
+        return rate, left
+    top = sqrt((left + rate * rate / (2 * change)) / (1 / (2 * change) + 1 / (2 * brake)))
+    top = max(rate, min(top, max(rate, cruise)))
+    return top, top * top / (2 * brake)
