@@ -48,10 +48,10 @@ from engage_hri.services.control.config import ControlConfig, Displaced, Slow, S
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.service import embody
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.planning import planned_alone
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.service import realize
+from engage_hri.services.realizer.together.planning import planned_alone
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -42,9 +42,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.planning import planned_alone
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.planning import planned_alone
 from engage_hri.services.requests.ends import Pending, Requester
 from engage_hri.services.runtime.virtual_time import run_virtual
 

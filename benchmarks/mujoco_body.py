@@ -32,8 +32,8 @@ from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.pulse import Pulse
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.planning import planned_alone
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.planning import planned_alone
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.tangram.table import tangram_table
 

@@ -11,16 +11,16 @@ SHELLS = {
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
     "services/control/serving/fault_switch.py",  # publishes the faults that are on
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
-    "services/realizer/perform/feedback.py",  # publishes feedback
-    "services/realizer/perform/shared_context.py",  # what performances share: the bus, too
+    "services/realizer/report/feedback.py",  # publishes feedback
+    "services/realizer/together/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
     "services/realizer/perform/futures.py",  # resolves them
-    "services/realizer/perform/planning.py",  # asks the body
-    "services/realizer/perform/rehearsing.py",  # asks it again
+    "services/realizer/together/planning.py",  # asks the body
+    "services/realizer/together/rehearsal.py",  # asks it again
     "services/realizer/perform/ends_of_runs.py",  # awaits the ends of behaviors
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
-    "services/realizer/perform/live.py",  # resolved when a block has ended
+    "services/realizer/together/live.py",  # resolved when a block has ended
     "services/generation/body_link.py",  # asks the body
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/contract/body.py",  # the interface of bodies: coroutines

@@ -40,7 +40,7 @@ class Options(Embodied):
 
 def main(options: Options) -> int:
     from engage_hri.services.realizer import export
-    from engage_hri.services.realizer.perform.outcome import nothing_is_left
+    from engage_hri.services.realizer.report.outcome import nothing_is_left
 
     config = options.load()
     source = read_source(options.file)
@@ -85,7 +85,7 @@ def _as_text(plan: Plan) -> str:
 
 async def rehearsed(block: Block, world: World, config: Config) -> Plan:
     """Plan a block as a realizer does that has nothing else to perform, with the configured body at home."""
-    from engage_hri.services.realizer.perform.planning import planned_alone
+    from engage_hri.services.realizer.together.planning import planned_alone
 
     services = {"simulation": still(world), "control": roster.service("control", config, connects=False)}
     async with in_memory(config, services) as hub:

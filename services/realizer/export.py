@@ -10,9 +10,9 @@ from engage_hri.schemas.nets import NetPlanned
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import PetriNet, is_live, is_safe
-from engage_hri.services.realizer.perform.net_message import described
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
+from engage_hri.services.realizer.report.net_message import described
 
 ADDED = ("series", "handover")
 """Kinds of ties that nothing in the block asks for."""

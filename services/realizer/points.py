@@ -3,6 +3,7 @@
 Each type of behavior has a row in schemas/behavior_types.py.
 """
 
+import re
 from collections.abc import Iterable
 from functools import lru_cache
 from itertools import pairwise
@@ -41,6 +42,17 @@ Gate = Literal["start", "hold", "prompt", "passive"]
 start: it is not begun yet. hold: it comes there and holds. passive: it cannot wait there.
 prompt: it could hold, but sets out so late that it need not. (A look that is on its target too early misleads.)
 """
+
+
+LIFE = "\u2063"
+"""An invisible separator: in the name of a block, between its id and a number. No text that is told has it."""
+_LIVES = re.compile(rf"(?:{LIFE}|\\u2063)[0-9]+")
+"""The end of a name, also where the name was quoted."""
+
+
+def as_told(text: str) -> str:
+    """A text with the ids of blocks for their names."""
+    return _LIVES.sub("", text)
 
 
 T = TypeVar("T")

@@ -29,18 +29,18 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
-from engage_hri.services.realizer.perform.live import Ending, Live, absence, told
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance
-from engage_hri.services.realizer.perform.planning import Planning
-from engage_hri.services.realizer.perform.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.perform.steering import Steering
-from engage_hri.services.realizer.perform.waiting import WaitingBlock
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
 from engage_hri.services.realizer.plan.past import LASTING, Past
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.together.live import Ending, Live, absence, told
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.planning import Planning
+from engage_hri.services.realizer.together.shared_context import Moving, Presence, SharedContext
+from engage_hri.services.realizer.together.waiting_block import WaitingBlock
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.requests.silence import unfinished
 from engage_hri.services.runtime.service import Ready

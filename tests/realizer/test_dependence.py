@@ -13,12 +13,12 @@ import pytest
 from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Head, Mark, Speech, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.perform.dependence import needed_by, waiting_for
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, Known, qualified
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.dependence import needed_by, waiting_for
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block

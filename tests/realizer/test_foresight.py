@@ -7,8 +7,8 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, after, block, stage, together
 

@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Event, Pointing, Speech, Wait
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.puppet import BML_1_0, bml, puppet
 from tests.realizer.stage import FakeRecognition, after, block, stage

@@ -10,7 +10,7 @@ from engage_hri.services.control.config import Variability
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
-from engage_hri.services.realizer.foresee.foresight import differ_noticeably
+from engage_hri.services.realizer.foresee.expected_times import differ_noticeably
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point

@@ -10,7 +10,7 @@ from random import Random
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.services.realizer.perform.live_blocks import LIFE
+from engage_hri.services.realizer.points import LIFE
 from tests.judge import generate, playing
 from tests.judge.record import Record
 from tests.judge.story import Deed, Story

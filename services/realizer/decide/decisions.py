@@ -1,7 +1,7 @@
 """Decisions of the realizer, without a clock: how far each behavior may go, given the sync points measured so far.
 
 Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `deadline` when to ask again. What is
-decided comes from the marking of the net (grants.py) and from what is expected (foresee/foresight.py).
+decided comes from the marking of the net (grants.py) and from what is expected (foresee/expected_times.py).
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence, Set
@@ -17,7 +17,7 @@ from engage_hri.services.realizer.decide.grants import Grants
 from engage_hri.services.realizer.decide.held_up import HeldUp
 from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.decide.stopped import stopped
-from engage_hri.services.realizer.foresee.foresight import Foresight, differ_noticeably
+from engage_hri.services.realizer.foresee.expected_times import Foresight, differ_noticeably
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.net.stops import NO_STOPS, Stops

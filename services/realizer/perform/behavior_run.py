@@ -18,11 +18,11 @@ from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
-from engage_hri.services.realizer.perform.spoken import Spoken
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import EPSILON, Point, performer
+from engage_hri.services.realizer.report.spoken import Spoken
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
 
 

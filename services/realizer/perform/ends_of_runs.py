@@ -7,7 +7,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.live import Ending
+from engage_hri.services.realizer.together.live import Ending
 from engage_hri.services.requests.silence import unfinished
 
 

@@ -15,10 +15,10 @@ from engage_hri.schemas.nets import NetMarked, NetWaiting
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.perform.live import Live
-from engage_hri.services.realizer.perform.net_message import described, firings
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
+from engage_hri.services.realizer.report.net_message import described, firings
+from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.runtime.alarm import Timer
 
 EVERY: Seconds = 0.05

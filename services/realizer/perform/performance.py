@@ -24,22 +24,22 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.ends_of_runs import all_ended
-from engage_hri.services.realizer.perform.feedback import News, Reporter
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
-from engage_hri.services.realizer.perform.held_block import HeldBlock
-from engage_hri.services.realizer.perform.live import Ending, Live
 from engage_hri.services.realizer.perform.net_stream import NetStream
-from engage_hri.services.realizer.perform.outcome import completed, reasons
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
-from engage_hri.services.realizer.perform.rehearsing import Rehearsing
-from engage_hri.services.realizer.perform.shared_context import SharedContext
-from engage_hri.services.realizer.perform.spoken import Spoken
-from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.plan.again import planned_again, reestimated
 from engage_hri.services.realizer.plan.needs import events_needing, without
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point
+from engage_hri.services.realizer.report.feedback import News, Reporter
+from engage_hri.services.realizer.report.outcome import completed, reasons
+from engage_hri.services.realizer.report.spoken import Spoken
+from engage_hri.services.realizer.together.held_block import HeldBlock
+from engage_hri.services.realizer.together.live import Ending, Live
+from engage_hri.services.realizer.together.rehearsal import Rehearsing
+from engage_hri.services.realizer.together.shared_context import SharedContext
+from engage_hri.services.realizer.together.ties import Ties
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
 

@@ -13,8 +13,8 @@ from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTur
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.perform.shared_context import SharedContext
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.realizer.together.shared_context import SharedContext
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import Pending, RequestRefused, ServerRestarted
 

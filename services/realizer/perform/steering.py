@@ -11,11 +11,11 @@ from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.feedback import ON_REQUEST
-from engage_hri.services.realizer.perform.holding import Holds, Named
-from engage_hri.services.realizer.perform.live import Ending, Live, absence
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.realizer.report.feedback import ON_REQUEST
+from engage_hri.services.realizer.together.holds import Holds, Named
+from engage_hri.services.realizer.together.live import Ending, Live, absence
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.alarm import Timer
 

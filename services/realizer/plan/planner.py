@@ -15,7 +15,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
-from engage_hri.services.realizer.plan import foresight, unsupported
+from engage_hri.services.realizer.plan import points_of_others, unsupported
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
 from engage_hri.services.realizer.plan.comparison import compared
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
@@ -273,8 +273,8 @@ class _Planner:
             arranged, conflicts = yield from arrange(
                 self.chains, present, arrangement, everywhere, rounds, hands, self.known.begun
             )
-            undated = foresight.without_date(assembly, self.known) if given else ()
-            waits = foresight.waits(assembly, self.known)
+            undated = points_of_others.without_date(assembly, self.known) if given else ()
+            waits = points_of_others.waits(assembly, self.known)
             sharing = share(self.chains, present, self.known, arranged, everywhere, hands, undated, waits)
             arranged, others = yield from sharing
             conflicts = [
@@ -350,8 +350,8 @@ class _Planner:
                 classes.tie(Equal(terms), self.block.id)
             assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
-            times = foresight.foreseen(assembly, self.known, self.doubted)
-            behind = tuple(foresight.awaited(assembly, self.known, self.waived))
+            times = points_of_others.foreseen(assembly, self.known, self.doubted)
+            behind = tuple(points_of_others.awaited(assembly, self.known, self.waived))
             is_custom, may_be_late = (lambda ties: bool(assembly.waits(ties))), self.manner.may_be_late
             solution = yield from predict(net, is_custom, times, behind, may_be_late)
             if may_be_late:
@@ -368,26 +368,26 @@ class _Planner:
             if self.order.refute(impossible.circles, assembly.net):
                 self.parts.begin_anew()
                 raise Misordered from None
-            if tied := foresight.ties_within_turns(
+            if tied := points_of_others.ties_within_turns(
                 impossible, assembly, arrangement.turns, self.relations.constrained
             ).difference(self.untied):
                 self.untied |= tied
                 raise Misordered from None
-            if taken := foresight.losses_to_others(
+            if taken := points_of_others.losses_to_others(
                 impossible, assembly, arrangement.turns, self.chains, self.known, self.spelling
             ):
                 raise Losses(taken) from None
-            if early := foresight.lasting_for_ever(impossible, assembly, arrangement.lasting):
+            if early := points_of_others.lasting_for_ever(impossible, assembly, arrangement.lasting):
                 self.early |= early
                 raise Misordered from None
-            if futile := foresight.futile(impossible):
+            if futile := points_of_others.futile(impossible):
                 self.waived |= futile
-            elif late := foresight.too_late(impossible, assembly) - self.doubted:
+            elif late := points_of_others.too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
                 if foreign := {point for point in late if is_foreign(point.behavior)}:
                     self.untied |= foreign
                     raise Misordered from None
-            elif idle := foresight.idle(impossible, assembly, self.places):
+            elif idle := points_of_others.idle(impossible, assembly, self.places):
                 assembler.waive(idle)
             else:
                 yield 2 * len(self.chains)  # All that was asked of these circles.

@@ -1,6 +1,5 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost; and those of the past."""
 
-import re
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
@@ -15,24 +14,11 @@ from engage_hri.services.realizer.plan.known import at_home, block_of, qualified
 from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import extent
-from engage_hri.services.realizer.points import EPSILON, Point, frozen
+from engage_hri.services.realizer.points import EPSILON, LIFE, Point, frozen
 
 MOST_TELLINGS = 20
 """Most changes of one expected time that are told in a row. Blocks that wait for each other, by a tie and by a part
 that changes hands, may never agree on a time; they go on when something is measured."""
-
-
-LIFE = "\u2063"
-"""An invisible separator: in the name of a block, between its id and a number. No text that is told has it."""
-
-
-_LIVES = re.compile(rf"(?:{LIFE}|\\u2063)[0-9]+")
-"""The end of a name, also where the name was quoted."""
-
-
-def as_told(text: str) -> str:
-    """A text with the ids of blocks for their names."""
-    return _LIVES.sub("", text)
 
 
 class TiedBlock(Protocol):

@@ -10,7 +10,6 @@ from math import inf
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, Place
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.known import (
     BLOCK_END,
     BLOCK_START,
@@ -22,6 +21,7 @@ from engage_hri.services.realizer.plan.known import (
 )
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 
 Here = tuple[str, int]
 """A transition of the net of a block."""

@@ -6,9 +6,9 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import Block, BlockOutcome, SpokenText
 from engage_hri.schemas.faults import Fault
-from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import DROPPED
+from engage_hri.services.realizer.points import as_told
 
 _BEHAVIORS = ("BEHAVIOR_TYPE_NOT_SUPPORTED", "CUSTOM_BEHAVIOR_NOT_SUPPORTED")
 """Kinds of the notes about behaviors without an id, which no list of a block's behaviors has."""

@@ -6,10 +6,9 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetSpeech, NetTransition
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net.petri_net import Marking
-from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
-from engage_hri.services.realizer.points import FINISH, Point
+from engage_hri.services.realizer.points import FINISH, Point, as_told
 
 
 def described(

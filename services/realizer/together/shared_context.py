@@ -12,11 +12,11 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.perform.questions import is_crowd, parts_moved
-from engage_hri.services.realizer.perform.rehearsing import Ask, Rehearsing
-from engage_hri.services.realizer.perform.ties import Tied
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.together.body_questions import is_crowd, parts_moved
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing
+from engage_hri.services.realizer.together.ties import Tied
 from engage_hri.services.requests.ends import Requester
 
 

@@ -10,10 +10,10 @@ from typing import Protocol
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Effect
-from engage_hri.services.realizer.perform.feedback import Reporter
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.perform.ties import Ties
 from engage_hri.services.realizer.points import Point, frozen
+from engage_hri.services.realizer.report.feedback import Reporter
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.ties import Ties
 
 
 class Holdable(Protocol):

@@ -12,8 +12,6 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.perform.dependence import needed_by, waiting_for
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.known import (
     Holder,
     Known,
@@ -26,6 +24,8 @@ from engage_hri.services.realizer.plan.known import (
 from engage_hri.services.realizer.plan.phases import ARMS, chain
 from engage_hri.services.realizer.plan.relations import Elsewhere
 from engage_hri.services.realizer.points import Point, performer
+from engage_hri.services.realizer.together.dependence import needed_by, waiting_for
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 
 MOMENT: Seconds = 0.001
 """Least time that a behavior is expected to keep a part after now, if it has not let go of it yet."""

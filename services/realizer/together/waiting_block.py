@@ -3,10 +3,10 @@
 from collections.abc import Callable, Collection, Iterable, Mapping, Set
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 
 
 class WaitingBlock:

@@ -17,13 +17,18 @@ from engage_hri.schemas.body import Estimate, EstimateBehaviors
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Containing
-from engage_hri.services.realizer.perform.knowledge import Performed
-from engage_hri.services.realizer.perform.questions import meanwhile, parts_moved, question_about_rest, times_ahead
 from engage_hri.services.realizer.plan.agreement import STRAIGHT, between, difference
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE, poses_before
 from engage_hri.services.realizer.points import frozen
+from engage_hri.services.realizer.together.body_questions import (
+    meanwhile,
+    parts_moved,
+    question_about_rest,
+    times_ahead,
+)
+from engage_hri.services.realizer.together.knowledge import Performed
 
 MOST = 6
 """Most questions in a row, each because of the answer to the one before."""

@@ -13,10 +13,6 @@ from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, may_share, parts_of
-from engage_hri.services.realizer.perform.live import Live
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
-from engage_hri.services.realizer.perform.questions import is_crowd, meanwhile, parts_moved, question_about
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
@@ -26,6 +22,10 @@ from engage_hri.services.realizer.plan.planner import plan_steps
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.together.body_questions import is_crowd, meanwhile, parts_moved, question_about
+from engage_hri.services.realizer.together.knowledge import Asker, Performed, knowledge, may_share, parts_of
+from engage_hri.services.realizer.together.live import Live
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.runtime.unhurried import unhurried
 
 

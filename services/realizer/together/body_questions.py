@@ -5,12 +5,12 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, EstimateBehaviors, EstimateItem, PlannedTime
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.perform.knowledge import Performed
 from engage_hri.services.realizer.plan.known import Known, is_foreign
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import behavior_times
 from engage_hri.services.realizer.points import performer
+from engage_hri.services.realizer.together.knowledge import Performed
 
 CROWD = 48
 """Behaviors of all live blocks from which on the body is asked about each block by itself: each question is about all

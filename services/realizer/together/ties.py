@@ -11,14 +11,14 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.perform.feedback import Reporter
-from engage_hri.services.realizer.perform.knowledge import Asker, Performed, knowledge, parts_of
-from engage_hri.services.realizer.perform.live_blocks import LiveBlocks
 from engage_hri.services.realizer.plan.handover import is_overlaid
 from engage_hri.services.realizer.plan.known import Known, at_home, block_of, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import needing
 from engage_hri.services.realizer.points import EPSILON, Point, frozen
+from engage_hri.services.realizer.report.feedback import Reporter
+from engage_hri.services.realizer.together.knowledge import Asker, Performed, knowledge, parts_of
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 
 MOST_PLANS = 20
 """Most plans of one block, at one time, because of parts that it hands over to others."""

@@ -20,7 +20,6 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.lateness import Late
-from engage_hri.services.realizer.perform.live_blocks import as_told
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import Broken
@@ -28,7 +27,7 @@ from engage_hri.services.realizer.plan.relations import at_line
 from engage_hri.services.realizer.plan.slack import UNNOTICED
 from engage_hri.services.realizer.plan.waiting import waited_for
 from engage_hri.services.realizer.plan.words import Spelling
-from engage_hri.services.realizer.points import Point, frozen
+from engage_hri.services.realizer.points import Point, as_told, frozen
 
 MOVED: Seconds = 0.008
 """Seconds; a prediction that moves by less, as something was measured, is not told again."""

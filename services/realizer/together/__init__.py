@@ -1,0 +1,1 @@
+"""Live blocks among each other: ties, parts that change hands, holds, and planning beside those that run."""
