@@ -26,7 +26,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.session import QOS, open_session
-from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.commandline.shell.process import run, run_until_signal
 
 ROBOT = "benchmark"
 PING, PONG = "raw/ping", "raw/pong"

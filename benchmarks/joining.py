@@ -36,7 +36,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline.process import run
+from engage_hri.services.commandline.shell.process import run
 
 ROBOT = "robot"
 TOGETHER = 100
@@ -119,7 +119,7 @@ async def measure(numbers: list[int], *, with_keys: bool) -> list[dict[str, Any]
         ring: list[str] = []
         endpoint = free_endpoint()
         if with_keys:
-            from engage_hri.services.commandline.certificates import initialize
+            from engage_hri.services.commandline.robot.certificates import initialize
 
             ring = ["--keys", stack.enter_context(tempfile.TemporaryDirectory()) + "/keys"]
             crowds = [("manager", f"crowd{each}") for each in range(-(-max(numbers) // TOGETHER))]

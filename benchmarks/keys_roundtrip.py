@@ -26,7 +26,7 @@ from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import encrypted, open_router
-from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.commandline.shell.process import run, run_until_signal
 
 PING_KEY = keys.command(keys.BEHAVIOR, "realizer", "realizer")
 PONG_KEY = keys.SYNC_POINT
@@ -88,7 +88,7 @@ async def route(kind: str, endpoint: str, ring: str) -> None:
 
 
 async def measure(laps: int, trips: int, as_json: bool) -> None:
-    from engage_hri.services.commandline.certificates import initialize
+    from engage_hri.services.commandline.robot.certificates import initialize
 
     with ExitStack() as processes, tempfile.TemporaryDirectory() as folder:
         ring = str(Path(folder, "keys"))

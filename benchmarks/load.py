@@ -47,7 +47,7 @@ from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
-from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.commandline.shell.process import run, run_until_signal
 from engage_hri.services.requests.ends import Requester
 
 ROBOT = "loaded"

@@ -34,7 +34,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.process import run
+from engage_hri.services.commandline.shell.process import run
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import (

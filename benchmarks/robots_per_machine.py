@@ -36,8 +36,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Tap
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.commandline.process import run
-from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.shell.process import run
+from engage_hri.services.commandline.shell.roster import ROBOT
 
 TICKS = os.sysconf("SC_CLK_TCK")
 WAYS = {

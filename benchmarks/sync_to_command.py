@@ -50,7 +50,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.commandline.process import run, run_until_signal
+from engage_hri.services.commandline.shell.process import run, run_until_signal
 from engage_hri.services.console.follow import following
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize

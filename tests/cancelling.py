@@ -15,8 +15,8 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import stream
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 

@@ -382,7 +382,7 @@ def test_a_broken_rule_is_caught(path: str, text: str, reason: str) -> None:
         ("services/realizer/plan/x.py", "from engage_hri.services.tangram.table import TangramTable"),
         ("services/realizer/perform/performance.py", "import asyncio"),
         ("services/bus/zenoh/hub.py", "import time\nimport zenoh"),
-        ("services/commandline/demo.py", "from engage_hri.services.simulation import service\nimport asyncio"),
+        ("services/commandline/look/demo.py", "from engage_hri.services.simulation import service\nimport asyncio"),
         ("services/commandline/app.py", "from engage_hri.services.realizer.service import realize"),
         ("schemas/keys.py", "PREFIX = 'engage/v1'"),
         ("tests/test_x.py", "async def test_x():\n    await asyncio.sleep(5)  # virtual"),

@@ -18,8 +18,8 @@ from engage_hri.schemas.presence import PeerGone
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.runtime.service import running
 from tests.cancelling import whole_robot

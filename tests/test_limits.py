@@ -12,8 +12,8 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused

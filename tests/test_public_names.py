@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import engage_hri
-from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.shell.roster import ROBOT
 from tests.bus.places import free_endpoint
 
 SOURCE = Path(engage_hri.__file__).read_text(encoding="utf-8")

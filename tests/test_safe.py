@@ -18,8 +18,8 @@ from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.serving import GRACE
 from engage_hri.services.runtime.service import serve

@@ -1,4 +1,4 @@
-"""Command line: a command `X-Y` is the file `X_Y.py` beside this one, with its `Options` and its `main`.
+"""Command line: a command `X-Y` is the file `X_Y.py` in the folder of its family, with its `Options` and its `main`.
 
 The file is loaded when its command is called. The list of all commands needs only the table here.
 """
@@ -15,48 +15,71 @@ import typer
 from typer.core import TyperGroup
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline import logs
-from engage_hri.services.commandline.ends import exit_code
+from engage_hri.services.commandline.shell import logs
+from engage_hri.services.commandline.shell.exit_codes import exit_code
 
-COMMANDS = {
-    "demo": "Watch a robot and a person make a tangram: everything in this one process.",
-    "up": "Run the services as separate processes on this machine; Ctrl-C stops them all.",
-    "run": "Run one service, on whatever machine this is, until Ctrl-C.",
-    "play": "Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running.",
-    "plan": "Check a block and print its Petri net and predicted schedule. Nothing moves.",
-    "bml": "Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves.",
-    "explain": "Tell why each object reference is made as it is: all gestures with all phrases. Nothing moves.",
-    "tool": "Print the tool by which a language model speaks through the robot, for its API.",
-    "simulate": "Play many sessions in virtual time, and compare the conditions of the study. "
-    "Exit 3 if one did not finish.",
-    "watch": "Follow a running system: connection events, the open ones first, feedback, claims on the head, "
-    "as they come.",
-    "console": "Show a running robot in the browser: the scene in 3D, lanes of events and behaviors, the Petri net.",
-    "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
-    "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is there.",
-    "export": "Turn a recording into annotations (ELAN, Praat, CSV), or pictures of the scene.",
-    "analyse": "Make the tables of a study of recordings of people, or recognize them once more (--again).",
-    "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or everything. "
-    "Exit 2 if it is not being performed.",
-    "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. "
-    "Exit 2 if it cannot play them.",
-    "condition": "Begin a condition of a study on a running robot, or tell which one is in force. "
-    "Exit 2 if the name is too long.",
-    "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate body). "
-    "Exit 2 if nobody sees where it points.",
-    "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
-    "check-body": "Hold a body to the contract of bodies, and tell where it breaks which. Exit 1 if it breaks one.",
-    "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
-    "keys": "Make certificates for all that take part (init, add, renew, revoke), show when they expire (show), "
-    "and print the rules of who may do what (acl).",
-    "session": "",
+FAMILIES: dict[str, dict[str, str]] = {
+    "look": {
+        "demo": "Watch a robot and a person make a tangram: everything in this one process.",
+        "watch": "Follow a running system: connection events, the open ones first, feedback, claims on the head, "
+        "as they come.",
+        "console": "Show a running robot in the browser: the scene in 3D, lanes of events and behaviors, the "
+        "Petri net.",
+    },
+    "robot": {
+        "up": "Run the services as separate processes on this machine; Ctrl-C stops them all.",
+        "run": "Run one service, on whatever machine this is, until Ctrl-C.",
+        "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
+        "keys": "Make certificates for all that take part (init, add, renew, revoke), show when they expire "
+        "(show), and print the rules of who may do what (acl).",
+        "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
+    },
+    "talk": {
+        "play": "Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running.",
+        "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or "
+        "everything. Exit 2 if it is not being performed.",
+        "plan": "Check a block and print its Petri net and predicted schedule. Nothing moves.",
+        "bml": "Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves.",
+        "explain": "Tell why each object reference is made as it is: all gestures with all phrases. Nothing moves.",
+        "tool": "Print the tool by which a language model speaks through the robot, for its API.",
+    },
+    "study": {
+        "simulate": "Play many sessions in virtual time, and compare the conditions of the study. Exit 3 if one "
+        "did not finish.",
+        "condition": "Begin a condition of a study on a running robot, or tell which one is in force. Exit 2 if "
+        "the name is too long.",
+        "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
+        "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is "
+        "there.",
+        "export": "Turn a recording into annotations (ELAN, Praat, CSV), or pictures of the scene.",
+        "analyse": "Make the tables of a study of recordings of people, or recognize them once more (--again).",
+        "session": "",
+    },
+    "bodies": {
+        "check-body": "Hold a body to the contract of bodies, and tell where it breaks which. Exit 1 if it breaks"
+        " one.",
+        "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate "
+        "body). Exit 2 if nobody sees where it points.",
+        "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. Exit 2 "
+        "if it cannot play them.",
+    },
 }
-"""Commands with their help. One without help is for our own child processes."""
+"""Commands with their help, by folder. One without help is for our own child processes."""
+TITLES = {
+    "look": "Look at a robot",
+    "robot": "Run a robot",
+    "talk": "Make it talk",
+    "study": "Studies and recordings",
+    "bodies": "Bodies",
+}
+"""Headings of the folders in the list of all commands."""
+COMMANDS = {name: does for commands in FAMILIES.values() for name, does in commands.items()}
+_FOLDER = {name: folder for folder, commands in FAMILIES.items() for name in commands}
 
 
 def command(name: str) -> Any:
     """Load a command from its file. Its own options come first, then the shared ones."""
-    module = import_module(f"engage_hri.services.commandline.{name.replace('-', '_')}")
+    module = import_module(f"engage_hri.services.commandline.{_FOLDER[name]}.{name.replace('-', '_')}")
     taken = inspect.signature(module.Options).parameters
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
 
@@ -102,7 +125,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _name, _help in COMMANDS.items():
-    app.command(_name, help=_help, hidden=not _help)(_listed)
+    app.command(_name, help=_help, hidden=not _help, rich_help_panel=TITLES[_FOLDER[_name]])(_listed)
 
 
 def _print_version(asked: bool) -> None:

@@ -12,8 +12,8 @@ from contextlib import asynccontextmanager
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config, load
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.runtime.service import Service, running

@@ -17,9 +17,9 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.bus.keyring import read_keys
 from engage_hri.services.bus.zenoh.session import open_router
-from engage_hri.services.commandline.certificates import STANDARD
-from engage_hri.services.commandline.examine import _certificates
-from engage_hri.services.commandline.process import UNREADY
+from engage_hri.services.commandline.robot.certificates import STANDARD
+from engage_hri.services.commandline.robot.examine import _certificates
+from engage_hri.services.commandline.shell.process import UNREADY
 from tests.cli.command import Engage
 from tests.cli.command import engage as made
 from tests.random_cases import share_of
@@ -158,7 +158,7 @@ def test_show_marks_who_was_revoked_and_does_not_mind_that_it_expires(
         def now(cls, tz: tzinfo | None = None) -> "Later":
             return cls.fromtimestamp(datetime.now(tz).timestamp() + 8 * 86400, tz)
 
-    monkeypatch.setattr("engage_hri.services.commandline.keys.datetime", Later)
+    monkeypatch.setattr("engage_hri.services.commandline.robot.keys.datetime", Later)
     result = engage("keys", "show", ring)
     assert (result.code, result.out.splitlines()[-1][-16:]) == (0, "EXPIRED, REVOKED")
 

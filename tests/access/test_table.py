@@ -15,8 +15,8 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.perceive import perceive
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.follow import following
 from engage_hri.services.runtime.service import Ready, running
 from engage_hri.services.simulation.config import SimulationConfig

@@ -17,9 +17,9 @@ from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
-from engage_hri.services.commandline.config import load
-from engage_hri.services.commandline.roster import service
-from engage_hri.services.commandline.sources import still
+from engage_hri.services.commandline.shell.config import load
+from engage_hri.services.commandline.shell.roster import service
+from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.still import tangram_world

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import pytest
 
-from engage_hri.services.commandline import logs
 from engage_hri.services.commandline.app import main
-from engage_hri.services.commandline.certificates import initialize
+from engage_hri.services.commandline.robot.certificates import initialize
+from engage_hri.services.commandline.shell import logs
 from tests.bus.places import OWN_ADDRESS, free_endpoint
 
 GOOD_BLOCK = """\

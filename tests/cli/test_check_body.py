@@ -275,7 +275,7 @@ def test_what_cannot_be_checked_is_refused(
 
 
 def test_without_pytest_it_names_the_extra(engage: Engage, drivers: Path) -> None:
-    with patch("engage_hri.services.commandline.check_body.find_spec", lambda name: None):
+    with patch("engage_hri.services.commandline.bodies.check_body.find_spec", lambda name: None):
         ended = engage("check-body", "drivers.py:Good")
 
     assert ended.code == 2

@@ -10,7 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.claim import PATIENCE, StartClaim, claiming
+from engage_hri.services.commandline.robot.one_per_robot import PATIENCE, StartClaim, claiming
 
 EARLY, LATE = "00000000", "ffffffff"
 

@@ -6,10 +6,11 @@ import pytest
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.config import BusConfig, Mode, mode_of
-from engage_hri.services.commandline import simulate, up
-from engage_hri.services.commandline.config import Config, load
-from engage_hri.services.commandline.roster import NAMES, service
-from engage_hri.services.commandline.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.commandline.robot import up
+from engage_hri.services.commandline.shell.config import Config, load
+from engage_hri.services.commandline.shell.roster import NAMES, service
+from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.commandline.study import simulate
 from engage_hri.services.runtime.configuration import read
 from engage_hri.services.simulation.config import HumanKind
 

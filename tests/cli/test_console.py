@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline import console, windowed
-from engage_hri.services.commandline.console import kept_token
+from engage_hri.services.commandline.look import console, with_window
+from engage_hri.services.commandline.look.console import kept_token
 from engage_hri.services.recording.disk import read
 from tests.bus.places import free_endpoint
 from tests.cli.command import Engage
@@ -120,9 +120,9 @@ def test_the_demo_opens_a_window_only_where_somebody_sees_it(
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
 
-    assert windowed.can_open(terminal) is opens
-    monkeypatch.setattr(windowed, "NEEDED", ("no_such_package",))
-    assert windowed.can_open(terminal) is False
+    assert with_window.can_open(terminal) is opens
+    monkeypatch.setattr(with_window, "NEEDED", ("no_such_package",))
+    assert with_window.can_open(terminal) is False
 
 
 @needs_console

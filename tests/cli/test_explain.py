@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from engage_hri.schemas.fragments import PairConsidered, ReferenceChoice
-from engage_hri.services.commandline.explain import show_tables
+from engage_hri.services.commandline.talk.explain import show_tables
 from tests.cli.command import ALONE, GOOD_BLOCK, Engage
 
 KEYS = {

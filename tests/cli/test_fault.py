@@ -10,7 +10,7 @@ import pytest
 from engage_hri.schemas.body import Capabilities, FaultKind
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults, flaw, switched
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.fault import listed
+from engage_hri.services.commandline.bodies.fault import listed
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.bus.places import free_endpoint
 from tests.cli.command import start

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engage_hri.schemas.faults import RunFailed
-from engage_hri.services.commandline import logs
-from engage_hri.services.commandline.outputs import Outputs
-from engage_hri.services.commandline.patient import Patient, complain, without_waiting
+from engage_hri.services.commandline.shell import logs
+from engage_hri.services.commandline.shell.failing_output import Patient, complain, without_waiting
+from engage_hri.services.commandline.shell.outputs import Outputs
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage, start
 from tests.cli.test_processes import PATIENCE, line

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.up import TASK, in_one
+from engage_hri.services.commandline.robot.up import TASK, in_one
 from engage_hri.services.runtime.service import Ready
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK, closed, start

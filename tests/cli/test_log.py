@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.services.bus import journal
-from engage_hri.services.commandline import logs
+from engage_hri.services.commandline.shell import logs
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, Engage, start
 

@@ -10,10 +10,10 @@ import pytest
 
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.commandline import play
-from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.embedding import in_memory, services
-from engage_hri.services.commandline.sources import still
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.sources import still
+from engage_hri.services.commandline.talk import play
 from engage_hri.services.runtime.service import running
 from tests.cli.command import Engage
 

@@ -16,8 +16,8 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import connect
-from engage_hri.services.commandline.play import world_with_people
-from engage_hri.services.commandline.sources import Thing
+from engage_hri.services.commandline.shell.sources import Thing
+from engage_hri.services.commandline.talk.play import world_with_people
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import show_world, tangram_world
 from tests.bus.places import free_endpoint

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.commandline.process import UNREADY
-from engage_hri.services.commandline.roster import NAMES, ROBOT
+from engage_hri.services.commandline.shell.process import UNREADY
+from engage_hri.services.commandline.shell.roster import NAMES, ROBOT
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
 

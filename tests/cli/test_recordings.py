@@ -15,7 +15,7 @@ from engage_hri.schemas.settings import ServiceSettings, text_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording

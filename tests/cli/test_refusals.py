@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.services.commandline.process import UNREADY
+from engage_hri.services.commandline.shell.process import UNREADY
 from tests.cli.command import ALONE, FRAGMENT, GOOD_BLOCK, Engage
 
 BAD = {

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from engage_hri.services.commandline import session as playing
-from engage_hri.services.commandline import simulate, workers
-from engage_hri.services.commandline.config import Config, load
-from engage_hri.services.commandline.session import Order, SessionResult, play
-from engage_hri.services.commandline.workers import play_all
+from engage_hri.services.commandline.shell.config import Config, load
+from engage_hri.services.commandline.study import session as playing
+from engage_hri.services.commandline.study import simulate, workers
+from engage_hri.services.commandline.study.session import Order, SessionResult, play
+from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.virtual_time import Deadlock
 from engage_hri.services.study import summary
 from engage_hri.services.study.hypotheses import Finding

@@ -11,8 +11,10 @@ import pytest
 from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import connect
-from engage_hri.services.commandline import condition, fault, play, steer
-from engage_hri.services.commandline.process import UNREADY
+from engage_hri.services.commandline.bodies import fault
+from engage_hri.services.commandline.shell.process import UNREADY
+from engage_hri.services.commandline.study import condition
+from engage_hri.services.commandline.talk import play, steer
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK, Engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped

@@ -8,7 +8,7 @@ from asyncio.subprocess import Process
 
 import pytest
 
-from engage_hri.services.commandline.supervisor import (
+from engage_hri.services.commandline.shell.supervisor import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
     STABLE,

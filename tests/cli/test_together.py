@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.roster import NAMES, groups
+from engage_hri.services.commandline.shell.roster import NAMES, groups
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK, closed, start
 from tests.cli.test_processes import PATIENCE, children, line, stopped

@@ -17,8 +17,8 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import show_world, tangram_world
 from tests.bus.places import PATIENCE, free_endpoint

@@ -17,9 +17,9 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import Piece, perform_call, stream
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import load
-from engage_hri.services.commandline.sources import still
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
+from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import tangram_world
 from tests.cancelling import whole_robot

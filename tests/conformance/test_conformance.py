@@ -21,9 +21,9 @@ from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config, load
-from engage_hri.services.commandline.roster import service
-from engage_hri.services.commandline.sources import still
+from engage_hri.services.commandline.shell.config import Config, load
+from engage_hri.services.commandline.shell.roster import service
+from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.requests.ends import Requester, RequestRefused
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.simulation.still import tangram_world

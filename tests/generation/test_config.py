@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.generation.config import GenerationConfig
 
 

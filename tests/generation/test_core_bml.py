@@ -20,11 +20,11 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config, load
-from engage_hri.services.commandline.generating import generated
-from engage_hri.services.commandline.plan import rehearsed
-from engage_hri.services.commandline.roster import service
-from engage_hri.services.commandline.sources import still
+from engage_hri.services.commandline.shell.config import Config, load
+from engage_hri.services.commandline.shell.roster import service
+from engage_hri.services.commandline.shell.sources import still
+from engage_hri.services.commandline.talk.offline_plan import generated
+from engage_hri.services.commandline.talk.plan import rehearsed
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Requester

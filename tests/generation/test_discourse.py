@@ -10,8 +10,8 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.talk.offline_plan import generated
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.partners import Partners, stage

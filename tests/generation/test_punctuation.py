@@ -10,8 +10,8 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import encode_json, read
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.generating import generated
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.talk.offline_plan import generated
 from engage_hri.services.simulation.still import tangram_world
 from tests.generation.emitted import LOOK, Made, block, by_id, lines, reference, speech
 

@@ -17,9 +17,9 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.commandline.config import load
-from engage_hri.services.commandline.generating import generated
-from engage_hri.services.commandline.plan import rehearsed
+from engage_hri.services.commandline.shell.config import load
+from engage_hri.services.commandline.talk.offline_plan import generated
+from engage_hri.services.commandline.talk.plan import rehearsed
 from engage_hri.services.generation.block.rewriting import Operator
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation.still import tangram_world

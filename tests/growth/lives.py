@@ -25,8 +25,8 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.perceive import perceive
 from engage_hri.services.client.robot import Robot, connect
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.web import orders
 from engage_hri.services.console.web.frames import Viewer
 from engage_hri.services.console.web.receipts import Receipts

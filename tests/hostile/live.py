@@ -16,7 +16,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.shell.roster import ROBOT
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 from tests.rigs.hostile.payloads import Payloads

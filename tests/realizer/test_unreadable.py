@@ -11,8 +11,8 @@ from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.limits import LARGEST_XML_SENT
 from engage_hri.schemas.requests import Refused
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.roster import service
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.roster import service
 from engage_hri.services.runtime.service import running
 from tests.realizer.stage import stage
 

@@ -9,7 +9,7 @@ import pytest
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Received
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording

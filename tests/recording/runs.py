@@ -9,8 +9,8 @@ from types import MappingProxyType
 from engage_hri.schemas import keys
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.recording.service import Recorder, opened, record
 from engage_hri.services.runtime.service import Service, running

@@ -10,9 +10,9 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.analyse import compare, found, numbered
-from engage_hri.services.commandline.analysing import Session, sessions
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.study.analyse import compare, found, numbered
+from engage_hri.services.commandline.study.analysing import Session, sessions
 from engage_hri.services.recording.disk import read
 from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.study.permutation import separate

@@ -160,13 +160,13 @@ def test_the_files_of_a_task_are_valid_and_say_the_same(run: Engage, anchor: Anc
 def test_a_film_of_another_speed_or_of_another_kind_is_not_linked(
     run: Engage, anchor: Anchor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("engage_hri.services.commandline.export._draw", lambda *given: None)
+    monkeypatch.setattr("engage_hri.services.commandline.study.export._draw", lambda *given: None)
     path = tmp_path / "a.mcap"
     path.write_bytes(anchor.path.read_bytes())
 
     for has_ffmpeg, options, linked in (
         (True, (), True), (True, ("--speed", 2), False), (False, (), False),
     ):  # fmt: skip
-        monkeypatch.setattr("engage_hri.services.commandline.export._has_ffmpeg", lambda it=has_ffmpeg: it)
+        monkeypatch.setattr("engage_hri.services.commandline.study.export._has_ffmpeg", lambda it=has_ffmpeg: it)
         assert run("export", path, "--elan", "--film", "--overwrite", *options).code == 0
         assert (b"MEDIA_DESCRIPTOR" in (tmp_path / "a.eaf").read_bytes()) is linked

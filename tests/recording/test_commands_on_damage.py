@@ -17,8 +17,9 @@ from engage_hri.schemas import keys
 from engage_hri.services import commandline
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.subscription import Tap
-from engage_hri.services.commandline import console, replay
 from engage_hri.services.commandline.app import COMMANDS
+from engage_hri.services.commandline.look import console
+from engage_hri.services.commandline.study import replay
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
@@ -185,9 +186,10 @@ def made_of(commands: Commands, names: Sequence[str], path: Path, data: bytes) -
 def test_all_commands_that_open_recordings_are_tried() -> None:
     """The command line has a table of commands, each with a file of its own, and one way to open a recording."""
     folder = Path(commandline.__file__).parent
-    texts = {name: (folder / f"{name.replace('-', '_')}.py").read_text(encoding="utf-8") for name in COMMANDS}
+    places = {name: next(folder.glob(f"*/{name.replace('-', '_')}.py")) for name in COMMANDS}
+    texts = {name: place.read_text(encoding="utf-8") for name, place in places.items()}
     reads = {name for name, text in texts.items() if re.search(r"recording\.(reading|disk) import", text)}
-    opens = {name for name, text in texts.items() if re.search(r"kept import .*\bopened\b", text)}
+    opens = {name for name, text in texts.items() if re.search(r"recording_file import .*\bopened\b", text)}
 
     assert reads | opens == {"analyse", "console", "export", "record", "replay"} <= {*COMMANDS}
     assert reads | opens <= {*QUICK}

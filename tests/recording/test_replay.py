@@ -13,7 +13,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.replay import control_of, keys_in
+from engage_hri.services.commandline.study.replay import control_of, keys_in
 from engage_hri.services.console.follow import following
 from engage_hri.services.recording.player import Player
 from engage_hri.services.recording.reading import Recording

@@ -17,8 +17,8 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.settings import DEEPEST, ServiceSettings, SettingsFile, sections, text_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config, load
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.control.config import ControlConfig, Displaced, Variability
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.realizer.config import RealizerConfig

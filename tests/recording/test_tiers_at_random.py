@@ -21,8 +21,8 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.tiers import tiers
 from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker

@@ -16,8 +16,8 @@ from engage_hri.schemas.recognition import SignalTurn
 from engage_hri.schemas.requests import Refused, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.config import Config
-from engage_hri.services.commandline.roster import service
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.roster import service
 from engage_hri.services.requests.ends import Requester, RequestRefused
 from engage_hri.services.runtime.service import running
 from tests.commanding import command

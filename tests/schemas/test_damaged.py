@@ -16,7 +16,7 @@ from engage_hri.schemas.messages import Message, decode, encode, encode_json
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.syncref import is_id
 from engage_hri.schemas.utf8 import utf8
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.simulation.still import EXAMPLE, load_world
 from tests.random_cases import share_of
 from tests.schemas.feedback_reader import decode_feedback

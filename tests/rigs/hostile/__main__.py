@@ -9,7 +9,7 @@ import sys
 from collections import Counter
 from functools import partial
 
-from engage_hri.services.commandline.config import load
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.control.bases.drivers import made
 from tests.rigs.hostile.attacks import attack
 from tests.rigs.hostile.trial import KINDS, Report

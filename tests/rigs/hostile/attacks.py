@@ -5,10 +5,10 @@ from functools import partial
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.commandline import roster
-from engage_hri.services.commandline.config import Config
 from engage_hri.services.commandline.embedding import services
-from engage_hri.services.commandline.sources import still
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.runtime.service import Ready, Service

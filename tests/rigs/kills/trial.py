@@ -24,7 +24,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.commandline.roster import ROBOT
+from engage_hri.services.commandline.shell.roster import ROBOT
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 

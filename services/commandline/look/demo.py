@@ -1,0 +1,125 @@
+"""Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
+
+import asyncio
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.look.with_window import can_open, lacking, not_installed, windowed
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.options import Embodied, Shown, Simulated, VirtualTime, Written
+from engage_hri.services.commandline.shell.outputs import Outputs
+from engage_hri.services.commandline.shell.process import DONE, run
+from engage_hri.services.commandline.shell.recording_file import needed
+from engage_hri.services.commandline.study.tangram import DEFAULTS, play_tangram
+from engage_hri.services.console import tally
+from engage_hri.services.console.follow import Sink
+from engage_hri.services.console.live import LiveView, Log
+from engage_hri.services.console.log import Telling
+
+FOR_YOU = ("collaboration.mode=task",)
+"""Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Written, Simulated, Embodied, Shown):
+    """Options of the command. window: None: where somebody would see one."""
+
+    virtual_time: VirtualTime = False
+    window: Annotated[
+        bool | None,
+        typer.Option(
+            help="Show it in the browser, too; without a display or a terminal it is not.", show_default=False
+        ),
+    ] = None
+    you: Annotated[
+        bool, typer.Option("--you", help="You are the person: take the seat in the browser, and lay the pieces.")
+    ] = False
+
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Record all of it into FILE, as `engage record` does.", show_default=False),
+    ] = None
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options."""
+        return (*super().overrides, *(("simulation.human=none",) if self.you else ()))
+
+
+class Tallying:
+    """A sink that keeps the tally."""
+
+    def __init__(self, began: Seconds) -> None:
+        self.tally = tally.empty(began)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.tally = tally.feed(self.tally, message, at)
+
+
+def main(options: Options) -> int:
+    config = options.load(defaults=FOR_YOU if options.you else DEFAULTS)
+    _check(options)
+    with Outputs(options.events, options.feedback) as outputs:
+        console = outputs.console(quiet=options.quiet)
+        live = console.is_terminal and not options.virtual_time and not options.quiet
+        window = can_open(live) if options.window is None and not options.you else options.window is not False
+        result = run(demonstrate(config, outputs, console, live, options, window), virtual_time=options.virtual_time)
+        console.print(tally.render(result, config.robot, console.width))
+    return DONE
+
+
+def _check(options: Options) -> None:
+    """Refuse what needs a window that cannot be, or a file that cannot be written. Raises InputRefused."""
+    if options.record is not None:
+        needed()
+    for option, given in (("--window", options.window), ("--you", options.you)):
+        if given and options.virtual_time:
+            reason, advice = "the clock of a window cannot jump", "leave out --virtual-time"
+            raise InputRefused(Fault(reason=reason, where=option, advice=advice))
+    if options.you and options.window is False:
+        raise InputRefused(Fault(reason="the seat is in the window", where="--you", advice="leave out --no-window"))
+    if (options.you or options.window) and (package := lacking()):
+        raise InputRefused(not_installed(package))
+
+
+async def demonstrate(
+    config: Config, outputs: Sink, console: Console, live: bool, options: Options, window: bool = False
+) -> tally.Tally:
+    """Run everything until the task is over. Returns the tally of the events. window: show it in the browser, too.
+
+    Raises RunFailed: the window has ended, and the person would sit in it.
+    """
+    began = asyncio.get_running_loop().time()
+    tallying = Tallying(began)
+    with scene_view(console, config.robot, began, live) as show:
+        if not window:
+            await play_tangram(config, (show, tallying, outputs), record=options.record)
+            return tallying.tally
+        tell = partial(console.print, highlight=False, markup=False)
+        async with windowed(config.robot, options, began, tell) as beside:
+            task = play_tangram(config, (show, tallying, outputs), beside.hub, options.record)
+            playing = asyncio.create_task(task, name="tangram")
+            try:
+                waiting = {playing, beside.ended} if options.you else {playing}
+                await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+                if not playing.done():
+                    code = beside.ended.result()
+                    raise RunFailed(Fault(reason=f"the window has ended with exit code {code}", where="--you"))
+                playing.result()
+            finally:
+                playing.cancel()
+                await asyncio.wait([playing])
+    return tallying.tally
+
+
+def scene_view(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
+    """Choose the sink that shows the scene: a live view on a terminal, log lines anywhere else."""
+    return LiveView(console, robot, began) if live else Log(console, robot, began, Telling(points=False, head=False))

@@ -1,0 +1,179 @@
+"""Command `engage router`: passes on what the processes of several machines send one another."""
+
+import asyncio
+import os
+import re
+import sys
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from engage_hri.schemas.access import ROUTER
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.config import is_encrypted
+from engage_hri.services.bus.keyring import Keys, read_keys
+from engage_hri.services.commandline.robot.child_watch import EVERY, SIGN, watched
+from engage_hri.services.commandline.shell.failing_output import LOG, Patient, beneath, complain, without_waiting
+from engage_hri.services.commandline.shell.process import FAILED, run_until_signal, until_closed
+from engage_hri.services.runtime.configuration import bus_config
+
+FILES = 8192
+"""Files that a router may have open, for links, and more of them that are about to open."""
+ZENOH_THREADS = "(rx: (worker_threads: 32))"
+"""Threads of Zenoh that receive; it has two. One is busy for up to 10 s with closing the link of a machine that was
+cut off, and while all are, the router hears nobody, of no robot."""
+ARENAS = "2"
+"""Heaps among which the C library spreads what these threads take; else eight for each core. Floods of questions then
+leave holes in all of them: after twenty the router had 120 MB, with two it has 81, and grows no more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    listen: Annotated[
+        list[str],
+        typer.Option(
+            metavar="ENDPOINT", help="Where others connect: tcp/0.0.0.0:7447; may be repeated.", show_default=False
+        ),
+    ]
+    connect: Annotated[
+        list[str] | None, typer.Option(metavar="ENDPOINT", help="Another router; may be repeated.")
+    ] = None
+    keys: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Keys made by `engage keys`: strangers are refused, and all have a role.",
+            show_default="open to all",
+        ),
+    ] = None  # fmt: skip
+    robot_listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Where the robot's services connect: a router of their own, joined to this one."
+            " Whoever fills this one takes no place of theirs. May be repeated.",
+        ),
+    ] = None  # fmt: skip
+    attended: Annotated[int, typer.Option("--attended", hidden=True)] = 0
+
+
+def main(options: Options) -> int:
+    """Route until a signal, in a process of its own that is watched over.
+
+    options: attended: number of the pipe to whoever watches over this process.
+    """
+    keys = _keys(options)
+    if options.attended:
+        os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)  # read when the first session opens
+        return run_until_signal(_route(options, keys))
+    return run_until_signal(_watch(options))
+
+
+async def _watch(options: Options) -> int:
+    """Watch over the router, or the robot's and that of all others. Returns the exit code of one that refuses."""
+    from engage_hri.services.bus.zenoh.denials import Denials
+
+    connect = options.connect or []
+    os.environ.setdefault("MALLOC_ARENA_MAX", ARENAS)  # read when a process starts
+    commands = {"the router": _command(options, options.listen, connect)}
+    if options.robot_listen:
+        near = [_from_here(endpoint) for endpoint in options.robot_listen]
+        commands = {
+            "the robot's router": _command(options, options.robot_listen, connect),
+            "the router of all others": _command(options, options.listen, near),
+        }
+    tell = _teller("standard output", beneath(sys.stdout).fileno())
+    watching = [
+        asyncio.create_task(watched([*each, "--attended"], name, tell, LOG.warning, Denials(tell).feed))
+        for name, each in commands.items()
+    ]
+    try:
+        done, _ = await asyncio.wait(watching, return_when=asyncio.FIRST_COMPLETED)
+        return done.pop().result()
+    finally:
+        for each in watching:
+            each.cancel()
+        await asyncio.wait(watching)
+
+
+def _keys(options: Options) -> Keys | None:
+    """Read the keys. Raises InputRefused if they are not a router's, or an endpoint does not go with them."""
+    folder = bus_config(keys=str(options.keys or "")).keys
+    endpoints = (*options.listen, *(options.robot_listen or ()), *(options.connect or ()))
+    if not folder:
+        if closed := [each for each in endpoints if is_encrypted(each)]:
+            advice = "--keys FOLDER names those that `engage keys` has made"
+            raise InputRefused(Fault(reason=f"{closed[0]!r} without keys", where="engage router", advice=advice))
+        return None
+    own = read_keys(folder, ROUTER)
+    if own.holder.role != ROUTER:
+        reason = f"these are the keys of {own.holder.common_name}, not of a router"
+        raise InputRefused(Fault(reason=reason, where=str(own.folder)))
+    if plain := [each for each in endpoints if not is_encrypted(each)]:
+        raise InputRefused(Fault(reason=f"{plain[0]!r} with keys", where=str(own.folder), advice="tls/HOST:PORT"))
+    return own
+
+
+def _from_here(endpoint: str) -> str:
+    """Endpoint at which this machine reaches what listens at one for all machines."""
+    return re.sub(r"/(?:0\.0\.0\.0|\[::\]):", "/localhost:", endpoint)
+
+
+def _command(options: Options, listen: list[str], connect: list[str]) -> list[str]:
+    """Make the command line of a router's process."""
+    return [
+        *(sys.executable, "-P", "-m", "engage_hri", "router"),
+        *(part for endpoint in listen for part in ("--listen", endpoint)),
+        *(part for endpoint in connect for part in ("--connect", endpoint)),
+        *(("--keys", str(options.keys)) if options.keys else ()),
+    ]
+
+
+def _teller(name: str, number: int) -> Callable[[str], None]:
+    """name, number: of the file to which lines go."""
+    out = Patient(name, partial(without_waiting, number), LOG.warning)
+
+    def tell(line: str) -> None:
+        out.write(f"{line}\n")
+
+    return tell
+
+
+async def _route(options: Options, keys: Keys | None) -> None:
+    from engage_hri.services.bus.zenoh.router import routing
+    from engage_hri.services.bus.zenoh.session import MOST_SESSIONS
+
+    tell = _teller("the watch", options.attended)
+
+    def sign() -> None:
+        """Show a sign of life, in whatever thread: past what the loop has to write."""
+        without_waiting(options.attended, f"{SIGN}\n".encode())
+
+    _let_in_many()
+    async with (
+        routing(options.listen, options.connect or (), tell, keys, sign) as router,
+        asyncio.TaskGroup() as group,
+    ):
+        complain(f"router is ready at {', '.join(options.listen)} (at most {MOST_SESSIONS} links)")
+        group.create_task(_show(router.works, lambda: tell(SIGN)), name="signs of life")
+        await until_closed()
+        os._exit(FAILED)  # Who watched over it was killed, and may be started again at the same endpoints.
+
+
+def _let_in_many() -> None:
+    """Let this process have as many open files as it may: each link is one, and many systems begin with 1024."""
+    with suppress(ImportError, OSError, ValueError):
+        from resource import RLIMIT_NOFILE, getrlimit, setrlimit
+
+        soft, hard = getrlimit(RLIMIT_NOFILE)
+        setrlimit(RLIMIT_NOFILE, (max(soft, min(FILES, hard) if hard >= 0 else FILES), hard))
+
+
+async def _show(works: Callable[[], Awaitable[None]], sign: Callable[[], None]) -> None:
+    while True:
+        await works()
+        sign()
+        await asyncio.sleep(EVERY)

@@ -1,0 +1,85 @@
+"""Command `engage run SERVICES`: one service, or several together, as one process on the real bus."""
+
+import asyncio
+from collections.abc import Mapping
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.interface import Hub
+from engage_hri.services.commandline.shell import forced_exit, roster
+from engage_hri.services.commandline.shell.failing_output import complain
+from engage_hri.services.commandline.shell.options import Embodied, Listening
+from engage_hri.services.commandline.shell.process import DONE, run_until_signal, unique_name, until_closed
+from engage_hri.services.commandline.shell.roster import ROBOT
+from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.runtime.service import Service, running
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Embodied, Listening):
+    """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
+
+    services: Annotated[
+        str,
+        typer.Argument(
+            metavar="SERVICE[,SERVICE...]",
+            help=f"One of {', '.join(roster.NAMES)}; several share the process, and speak in memory.",
+            show_default=False,
+            autocompletion=lambda: list(roster.NAMES),
+        ),
+    ]
+    attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
+
+
+def ready_line(name: str) -> str:
+    """Line that a service prints on standard error when it serves. `engage up` waits for it."""
+    return f"{name} is ready"
+
+
+def main(options: Options) -> int:
+    """Serve until a signal."""
+    names = roster.group(options.services)
+    if (options.body or options.voice) and "control" not in names:
+        raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
+    if options.attended:
+        forced_exit.end_after_the_parent()
+    on_robot = {*names} <= {*ROBOT}
+    config = options.read(RobotConfig, elsewhere=ELSEWHERE) if on_robot else options.load()
+    run_until_signal(_serve(options, names, config))
+    return DONE
+
+
+async def _serve(options: Options, names: tuple[str, ...], config: RobotConfig) -> None:
+    from engage_hri.services.bus.zenoh.neighbors import hinting
+
+    services = {name: roster.service(name, config) for name in names}
+    async with AsyncExitStack() as stack:
+        hub = await stack.enter_async_context(await options.open(config.bus, names[0], options.listen or ()))
+        others = await stack.enter_async_context(options.hubs(config.bus, names[1:], hub))
+        if not options.attended:  # `engage up` sees for itself who is there
+            await stack.enter_async_context(
+                hinting(hub.join(unique_name("run")), config.bus.connect, {*ROBOT} - {*names})
+            )
+        serving = asyncio.create_task(_until_over({names[0]: hub, **others}, services), name=options.services)
+        waiting = {serving}
+        if options.attended:
+            waiting.add(asyncio.create_task(until_closed(), name="parent"))
+        try:
+            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in waiting:
+                task.cancel()
+            await asyncio.wait(waiting)
+    if not serving.cancelled():
+        serving.result()
+
+
+async def _until_over(hubs: Mapping[str, Hub], services: Mapping[str, Service]) -> None:
+    async with running(hubs, services) as over:
+        for name in services:
+            complain(ready_line(name))
+        await over.wait()

@@ -1,0 +1,1 @@
+"""Parts that all commands share: options, configuration, processes, exit codes and output."""

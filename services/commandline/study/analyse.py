@@ -1,0 +1,277 @@
+"""Command `engage analyse`: recorded sessions in the tables of `engage simulate`, and recognition once more."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.options import Quiet
+from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.process import DONE
+from engage_hri.services.commandline.shell.recording_file import opened
+from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.services.commandline.study.analysing import Compared, Session, again, sessions, with_settings
+from engage_hri.services.commandline.study.simulate import PLOTS, plotting, rendered
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recording.conditions import UNNAMED
+from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
+from engage_hri.services.runtime.settings import shown
+from engage_hri.services.study import files, summary
+from engage_hri.services.study.conditions import BASELINE
+from engage_hri.services.study.hypotheses import Finding, findings
+from engage_hri.services.study.summary import BETWEEN, WITHIN, Table
+
+FILES = ("recordings.csv", "settings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
+DIFFERENT = 1
+"""Exit code if recognition again gives other events with the same settings, and nothing is missing."""
+SHOWN = 10
+"""Differences that are printed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="FILE...|DIR", help="Recordings, or a folder of them.", show_default=False)
+    ]
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where tables and plots go; else they are only printed.")
+    ] = None
+    baseline: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Condition that others are compared with.", show_default=BASELINE),
+    ] = None
+    again: Annotated[
+        bool, typer.Option("--again", help="Recognize once more, and compare. Exit 1 if other events come of it.")
+    ] = False
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="With --again: recognition.KEY=VALUE, in place of what it had."
+        ),
+    ] = None
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False
+    quiet: Quiet = False
+
+
+def main(options: Options) -> int:
+    paths = found(options.recordings)
+    console = Terminal(quiet=options.quiet)
+    if options.again:
+        return _recognize(paths, options, console)
+    if options.settings:
+        raise InputRefused(Fault(reason="is for --again: all else is as it was recorded", where="--set"))
+    draw = plotting() if options.out is not None else None
+    folder = Folder(options.out, FILES, overwrite=options.overwrite) if options.out is not None else None
+    played, is_within = numbered([one for path in paths for one in sessions(opened(path))])
+    compared, tables = compare(played, options.baseline, is_within=is_within)
+    tables.append(configured(played))
+    for table in tables:
+        console.print("", rendered(table), sep="\n")
+    if folder is not None and draw is not None:
+        records, events = [one.record for one in played], [event for one in played for event in one.events]
+        texts = {
+            "recordings.csv": listed(played), "settings.csv": settings(played),
+            "events.csv": files.events(events),
+            "sessions.csv": files.sessions(records), "summary.md": "\n".join(table.markdown() for table in tables),
+        }  # fmt: skip
+        if compared:
+            texts["hypotheses.csv"] = files.findings(compared)
+        folder.write({name: text.encode() for name, text in texts.items()} | draw(records, events))
+        console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
+    return DONE
+
+
+def found(given: Sequence[Path]) -> list[Path]:
+    """Files of recordings: those that are given, and those in folders. Raises InputRefused: there are none."""
+    paths = [path for one in given for path in (sorted(one.glob("*.mcap")) if one.is_dir() else [one])]
+    if not paths:
+        raise InputRefused(Fault(reason="no recordings (*.mcap) in it", where=", ".join(map(str, given))))
+    return list(dict.fromkeys(paths))
+
+
+def numbered(sessions: Sequence[Session]) -> tuple[list[Session], bool]:
+    """Number the sessions. Returns them, and whether sessions of one number are of one participant.
+
+    They are if all participants are named, none has two sessions in one condition, and any has some in several.
+    """
+    seen = Counter((one.participant, one.condition) for one in sessions)
+    conditions = {one.participant: set[str]() for one in sessions}
+    for one in sessions:
+        conditions[one.participant].add(one.condition)
+    is_within = (
+        all(one.participant for one in sessions)
+        and max(seen.values()) == 1
+        and any(len(names) > 1 for names in conditions.values())
+    )
+    if is_within:
+        numbers = {name: number for number, name in enumerate(conditions)}
+        return [_with_number(one, numbers[one.participant]) for one in sessions], True
+    return [_with_number(one, number) for number, one in enumerate(sessions)], False
+
+
+def _with_number(one: Session, number: int) -> Session:
+    from msgspec.structs import replace
+
+    events = tuple(replace(event, session=number) for event in one.events)
+    return replace(one, record=replace(one.record, session=number), events=events)
+
+
+def compare(
+    sessions: Sequence[Session], baseline: str | None, *, is_within: bool
+) -> tuple[list[Finding], list[Table]]:
+    """Make the findings and all tables. Raises InputRefused: there is no such baseline."""
+    records = [one.record for one in sessions]
+    conditions = list(dict.fromkeys(record.condition for record in records))
+    if baseline is not None and baseline not in conditions:
+        advice = f"there are: {', '.join(conditions)}"
+        raise InputRefused(
+            Fault(reason=f"no recording has the condition {baseline!r}", where="--baseline", advice=advice)
+        )
+    tables = [summary.overview(records)]
+    against = baseline or BASELINE
+    found: list[Finding] = []
+    if len(conditions) > 1 and against in conditions:
+        others = [name for name in conditions if name != against]
+        found = findings(records, baseline=against, others=others, is_paired=is_within)
+        tables.append(summary.hypotheses(found, WITHIN if is_within else BETWEEN))
+    tables.append(overview(sessions, against))
+    return found, tables
+
+
+def overview(sessions: Sequence[Session], baseline: str) -> Table:
+    """Table with a row for each session, and what to doubt."""
+    rows = tuple(
+        (
+            one.path.name, one.condition, one.participant or summary.MISSING, f"{one.record.duration:.0f}",
+            str(one.record.statistics.events), summary.number(one.record.statistics.mtbce),
+        )
+        for one in sessions
+    )  # fmt: skip
+    conditions = {one.condition for one in sessions}
+    notes = list(dict.fromkeys(f"{one.path.name}: {doubt}." for one in sessions for doubt in one.doubts))
+    if len(conditions) > 1 and baseline not in conditions:
+        notes.append(f"No recording has the condition {baseline!r}, so nothing is compared: name one by --baseline.")
+    if UNNAMED in conditions:
+        notes.append("Some name no condition (by `engage record --condition` or the window): they count together.")
+    columns = ("", "condition", "participant", "seconds", "events", "MTBCE (s)")
+    return Table(title="Recordings", columns=columns, rows=rows, notes=tuple(notes))
+
+
+def configured(sessions: Sequence[Session]) -> Table:
+    """Table with the settings of the services that are not as by default, and those of later lives that changed."""
+    by_default = dict(flat(shown(Config())))
+    found: list[tuple[str, ...]] = []
+    notes = []
+    for one in {one.path: one for one in sessions}.values():
+        before: dict[str, Mapping[str, str]] = {}
+        for life in one.settings:
+            told = life.told
+            if life.unread:
+                notes.append(f"{one.path.name}: {told.participant}, life {life.number}: not read: {life.unread}.")
+                continue
+            others = before.get(told.participant, by_default)
+            since = "" if life.number == 1 else f"life {life.number}, from {life.since:.1f} s"
+            found += [(one.path.name, told.participant, since, line) for line in changed(life, others)]
+            before[told.participant] = life.values
+        if not one.settings:
+            notes.append(f"{one.path.name}: it has no settings of its services.")
+    notes.append("All others are as by default in this Engage; `engage export --settings` has them all.")
+    return Table(
+        title="Settings", columns=("", "service", "life", "setting"), rows=tuple(found), notes=tuple(notes)
+    )  # fmt: skip
+
+
+def settings(sessions: Sequence[Session]) -> str:
+    """CSV of all settings of all services of all recordings."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("session", "condition", *COLUMNS))
+    for one in sessions:
+        writer.writerows((one.record.session, one.condition, *row) for row in rows(one.settings))
+    return text.getvalue()
+
+
+def listed(sessions: Sequence[Session]) -> str:
+    """CSV of the recordings: what `session` in the other files stands for."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("session", "condition", "file", "participant", "doubts"))
+    writer.writerows(
+        (one.record.session, one.condition, one.path.name, one.participant, "; ".join(one.doubts)) for one in sessions
+    )
+    return text.getvalue()
+
+
+# -- recognition again ------------------------------------------------------------------------------------------
+
+
+def _recognize(paths: Sequence[Path], options: Options, console: Console) -> int:
+    code, settings = DONE, options.settings or ()
+
+    def choose(config: RecognitionConfig) -> RecognitionConfig:
+        return with_settings(config, settings) if settings else config
+
+    for path in paths:
+        recording = opened(path)
+        lives = again(recording, choose)
+        if not lives:
+            reason = "recognition told nothing of what it took: it was not there, or is of an older Engage"
+            raise InputRefused(Fault(reason=reason, where=str(path)))
+        for life in lives:
+            for line in told(life, path.name, has_other_settings=bool(settings)):
+                console.print(line, markup=False, highlight=False, soft_wrap=True)
+            if not settings and life.lack.is_nothing and not life.is_same:
+                code = DIFFERENT
+    return code
+
+
+def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
+    """Lines about one life of recognition, live and again."""
+    ids = len({one.id for one in life.live})
+    head = f"{name}, life {life.session}: {ids} events, {len(life.live)} changes"
+    lines = []
+    lack = life.lack
+    if lack.settings:
+        lines.append(
+            "  the settings that recognition had are not in the recording, or cannot be read: "
+            "again it has those by default"
+        )
+    if lack.before:
+        lines.append(f"  {lack.before} steps are from before the recording: what had begun by then is not known")
+    if lack.gaps or lack.messages:
+        lines.append(f"  {lack.gaps} steps and {lack.messages} messages that it took are missing in the recording")
+    if life.is_same:
+        return [f"{head}: again the same, to the last bit", *lines]
+    different = life.differences()
+    if not different and lack.before:
+        return [f"{head}: again the same, but for the numbers of the events", *lines]
+    why = "with other settings" if has_other_settings else "again"
+    lines.append(f"  live:  {_counts(life.live)}")
+    lines.append(f"  again: {_counts(life.again)}")
+    for was, now in different[:SHOWN]:
+        one = was or now
+        assert one is not None
+        lines.append(f"  {one.id} {one.kind} {one.state}: {_delay(was)}, again {_delay(now)}")
+    if len(different) > SHOWN:
+        lines.append(f"  and {len(different) - SHOWN} more")
+    return [f"{head}; {why} {len(different)} differ", *lines]
+
+
+def _counts(events: Sequence[object]) -> str:
+    states = Counter(getattr(one, "state", "") for one in events)
+    return ", ".join(f"{count} {state}" for state, count in sorted(states.items())) or "none"
+
+
+def _delay(event: object) -> str:
+    if event is None:
+        return "not there"
+    delay = getattr(event, "delay", None)
+    return "there" if delay is None else f"{delay:.6f} s"

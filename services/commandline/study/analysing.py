@@ -1,0 +1,293 @@
+"""Recorded sessions in numbers: each recording as a record of the study, and recognition once more over it."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from math import inf
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+from msgspec import Struct, structs
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.ledger import Taken
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics, session_of
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.samples import Received
+from engage_hri.services.console.follow import FOLLOWED
+from engage_hri.services.console.heard import Heard
+from engage_hri.services.recognition.again import Again, Lack, events_in
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recording.conditions import Stretch, stretches
+from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.settings import Life, flat, settings_of
+from engage_hri.services.recording.times import Times, messages, moved
+from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.records import Recording as Record
+
+WINDOW: Seconds = 30.0
+"""Window of a tally whose recent numbers nobody reads."""
+
+
+COUNTED = (*FOLLOWED, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING)
+"""Expressions for all messages that the numbers come from."""
+
+
+class Told(NamedTuple):
+    """A message, and the time in the recording that it tells of. past: it is from before the recording."""
+
+    message: Message
+    at: Seconds
+    past: bool = False
+
+
+class Session(Struct, frozen=True, kw_only=True):
+    """A recording in numbers, or the part of it under one condition. participant: empty: not told.
+
+    published: what recognition said itself in the end; None: it said nothing, or of more than this part.
+    doubts: what may be wrong with these numbers, in words. settings: those under which its services ran.
+    """
+
+    path: Path
+    condition: str
+    participant: str
+    record: SessionRecord
+    events: tuple[EventRecord, ...]
+    published: WindowStatistics | None
+    doubts: tuple[str, ...] = ()
+    settings: tuple[Life, ...] = ()
+
+
+def sessions(recording: Recording) -> list[Session]:
+    """Take a recording's numbers: a session for each condition that was set in it, or one of all of it.
+
+    Of several, those under no condition, and those with nobody there, are left out; a doubt says so.
+    """
+    times = Times(recording)
+    told = [*_told(recording, times)]
+    doubts, settings = tuple(_doubts(recording, told, times)), tuple(settings_of(recording))
+    parts = stretches(
+        ((one.message, one.at) for one in told), recording.facts.get("condition", ""), recording.duration
+    )
+    found = (_session(recording, told, times, part) for part in parts if part.name)
+    made = [structs.replace(one, doubts=doubts, settings=settings) for one in found]
+    if len(parts) == 1:
+        return made
+    kept = [one for one in made if one.events or one.record.eye_contact is not None] or made
+    lost = [f"{part.seconds:.0f} s under no condition" for part in parts if not part.name]
+    lost += [f"{one.record.duration:.0f} s of {one.condition} with nobody there" for one in made if one not in kept]
+    if lost:
+        kept[0] = structs.replace(kept[0], doubts=(*kept[0].doubts, f"left out: {', '.join(lost)}"))
+    return kept
+
+
+def _told(recording: Recording, times: Times) -> Iterator[Told]:
+    """The messages that count, as people are to hear them: what a killed program told is over with it."""
+    heard = Heard(recording.robot, recording.clock, times.at, times.told)
+    for received, _ in messages(recording):
+        if keys.is_presence(received.key) or keys.first(COUNTED, received.key) is not None:
+            came = max(0.0, received.at - recording.began)
+            yield from (Told(*one) for one in heard.advance(came))
+            taken = heard.take(structs.replace(received, at=came), came)
+            yield from (Told(message, at, received.past) for message, at in taken)
+    yield from (Told(*one) for one in heard.advance(recording.duration))
+
+
+def _session(recording: Recording, told: Sequence[Told], times: Times, part: Stretch) -> Session:
+    """Take the numbers of a part: of all connection events that began in it, as recognition decided them."""
+    tally, record = Tally(WINDOW), Record(recording.robot)
+    published: WindowStatistics | None = None
+    until = part.end if part.end < recording.duration else inf
+    within: dict[str, bool] = {}
+    for message, at, past in told:
+        if isinstance(message, Statistics):
+            published = message.session if message.actor == "" else published
+            continue
+        if isinstance(message, ConnectionEvent):
+            if not within.setdefault(message.id, not past and _began(message, times, recording, part.begin, until)):
+                continue
+            tally.feed(message)
+        elif at >= until or (at < part.begin and not _lasts(message)):
+            continue
+        record(_in_time(message, times, at, part.begin), min(max(0.0, at - part.begin), part.seconds))
+    end = Stamp("recording", part.seconds)
+    record(Statistics(actor="", at=end, session=tally.session(), recent=WindowStatistics()), part.seconds)
+    is_all = part.begin == 0.0 and until == inf
+    return Session(
+        path=Path(recording.name), condition=part.name, participant=recording.facts.get("participant", ""),
+        record=record.session(session=0, condition=part.name, seed=0),
+        events=record.events(session=0, condition=part.name), published=published if is_all else None,
+    )  # fmt: skip
+
+
+def _began(event: ConnectionEvent, times: Times, recording: Recording, begin: Seconds, until: Seconds) -> bool:
+    """Tell whether an event began between these times."""
+    began = times.at(event.started, recording.duration)
+    return began is not None and begin <= began < until
+
+
+def _lasts(message: Message) -> bool:
+    """True if a message tells what may still be so when a later part begins: who is there, and looks where."""
+    is_look = isinstance(message, ActionBegan | ActionEnded) and message.action == "look"
+    return is_look or isinstance(message, ActorFound | ActorLost)
+
+
+def _in_time(message: Message, times: Times, at: Seconds, begin: Seconds) -> Message:
+    """The message with its instants in seconds since `begin`. at: when it came, in the recording."""
+
+    def instant(stamp: Stamp) -> Stamp:
+        found = times.at(stamp, at)
+        return Stamp("recording", (at if found is None else found) - begin)
+
+    told: Message = moved(message, instant)
+    return told
+
+
+def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterable[str]:
+    """List what is doubtful in all numbers of a recording."""
+    lives, known = set[str](), dict[str, bool]()
+    for event, _, past in told:
+        if isinstance(event, ConnectionEvent):
+            is_here = known.setdefault(event.id, not past and _began(event, times, recording, 0.0, inf))
+            lives |= {event.session} if is_here else set()
+    before = sum(not counts for counts in known.values())
+    if not recording.is_whole:
+        yield f"its end is missing or damaged: the numbers are of the first {recording.duration:.0f} s"
+    if recording.losses.total:
+        yield f"{recording.losses.total} messages are missing"
+    if recording.losses.still:
+        yield f"the recorder stood still for {recording.losses.still:.1f} s: motion of that time is missing"
+    if recording.damaged:
+        yield f"{len(recording.damaged)} places in the file are damaged, and what they held is left out"
+    if before:
+        yield f"{before} events that began before the recording are not counted"
+    if len(lives) > 1:
+        often = "once" if len(lives) == 2 else f"{len(lives) - 1} times"
+        yield f"recognition was restarted {often}: what was open then is lost"
+    if not lives:
+        yield "there is no connection event in it"
+
+
+# -- recognition again ------------------------------------------------------------------------------------------
+
+
+class Compared(Struct, frozen=True, kw_only=True):
+    """One life of recognition, live and again. live, again: changes of events.
+
+    sure: number of changes that have to be there live. What the last steps led to comes after them, and the recording
+    may have ended, or recognition may have been killed, in between.
+    """
+
+    session: str
+    live: tuple[ConnectionEvent, ...]
+    again: tuple[ConnectionEvent, ...]
+    lack: Lack
+    sure: int
+
+    @property
+    def is_same(self) -> bool:
+        return self.live == self.again[: len(self.live)] and len(self.live) >= self.sure
+
+    def differences(self) -> list[tuple[ConnectionEvent | None, ConnectionEvent | None]]:
+        """Changes that only one side has, or that differ: of one event and state together.
+
+        If the first steps are missing, events are numbered otherwise again, and are known by what they are.
+        """
+        live, again = self._named(self.live), self._named(self.again)
+        names = [*live, *(name for name in again if name not in live)]
+        pairs = ((live.get(name), again.get(name)) for name in names)
+        return [(one, other) for one, other in pairs if not self._is_one(one, other)]
+
+    def _named(self, changes: Iterable[ConnectionEvent]) -> dict[tuple[object, ...], ConnectionEvent]:
+        """Changes by their event, their state, and how often that was told before."""
+        told = Counter[tuple[object, ...]]()
+        named = dict[tuple[object, ...], ConnectionEvent]()
+        for one in changes:
+            event = (one.kind, one.initiator, one.responder, one.started) if self.lack.before else (one.id,)
+            name = (*event, one.state)
+            named[*name, told[name]] = one
+            told[name] += 1
+        return named
+
+    def _is_one(self, one: ConnectionEvent | None, other: ConnectionEvent | None) -> bool:
+        if self.lack.before and one is not None and other is not None:
+            return structs.replace(one, id="") == structs.replace(other, id="")
+        return one == other
+
+
+Choose = Callable[[RecognitionConfig], RecognitionConfig]
+"""Settings for recognition again, given those that it had."""
+
+
+def again(recording: Recording, choose: Choose = lambda config: config) -> list[Compared]:
+    """Recognize once more, each life of recognition for itself."""
+    found: dict[str, tuple[Again, list[ConnectionEvent]]] = {}
+    live: dict[str, list[ConnectionEvent]] = {}
+    sure: dict[str, int] = {}
+    numbers, configs = _numbers(recording), configurations(recording)
+
+    def find(life: str, number: int) -> Received | None:
+        place = numbers.get((life, number & 0xFFFFFFFF))
+        return None if place is None else recording.received(place)
+
+    for place in range(len(recording)):
+        key = recording.key(place)
+        if key != keys.TAKEN and not keys.matches(keys.ANY_CONNECTION_EVENT, key):
+            continue
+        message = getattr(recording.received(place), "message", None)
+        if isinstance(message, ConnectionEvent):
+            live.setdefault(message.session, []).append(message)
+        elif isinstance(message, Taken):
+            if message.session not in found:
+                known = configs.get(message.session)
+                config = choose(known or RecognitionConfig())
+                lack = Lack(settings=known is None)
+                life = Again(recording.robot, message.session, message.at.clock, config, lack)
+                found[message.session] = (life, [])
+            life, events = found[message.session]
+            sure[message.session] = len(events)
+            events += events_in(life.take(message, find))
+    return [
+        Compared(session=name, live=tuple(live.get(name, ())), again=tuple(events), lack=life.lack, sure=sure[name])
+        for name, (life, events) in found.items()
+    ]
+
+
+def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
+    """Configuration of each life of recognition, by the session of its events. Raises InputRefused."""
+    found = {}
+    for life in settings_of(recording):
+        if life.told.participant != "recognition" or life.unread:
+            continue
+        try:
+            config = msgspec.convert(life.sections.get("recognition"), RecognitionConfig)
+        except msgspec.ValidationError as error:
+            reason = f"recognition of Engage {life.told.version} had settings that this one does not know: {error}"
+            fault = Fault(reason=reason, where=recording.name, advice=f"use Engage {life.told.version}")
+            raise InputRefused(fault) from error
+        found[session_of(life.told.run)] = config
+    return found
+
+
+def _numbers(recording: Recording) -> dict[tuple[str, int], int]:
+    """Places of the ordered events and states, by life and number."""
+    found = {}
+    for place in range(len(recording)):
+        key = recording.key(place)
+        if key and keys.key_class(key) in ("evt", "state"):
+            life, number = recording.life(place), recording.number(place)
+            if number:
+                found[life, number] = place
+    return found
+
+
+def with_settings(config: RecognitionConfig, settings: Sequence[str]) -> RecognitionConfig:
+    """The same with other settings, `recognition.KEY=VALUE`. Raises InputRefused."""
+    from engage_hri.services.commandline.shell.config import load
+
+    had = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), "recognition.") if value]
+    return load(settings=settings, defaults=had).recognition

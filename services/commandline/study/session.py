@@ -1,0 +1,112 @@
+"""Sessions of a study, and the child process that plays them on order.
+
+The child reads orders from standard input and answers each on standard output, a line of JSON both ways: it needs no
+bus, and ends with its parent.
+"""
+
+import asyncio
+import random
+import sys
+import traceback
+from dataclasses import dataclass
+
+import msgspec
+from msgspec import Struct
+
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.process import DONE
+from engage_hri.services.commandline.study.tangram import play_tangram
+from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.runtime.virtual_time import run_virtual
+from engage_hri.services.simulation import human_session
+from engage_hri.services.study.records import EventRecord, Recording, SessionRecord
+
+A_WHILE: Seconds = 120.0
+"""Time after the last drawn event by which all open events have ended."""
+
+
+class Order(Struct, frozen=True, kw_only=True):
+    """Order to play one session.
+
+    limit: time after which it is broken off, in virtual time.
+    people: no robot, but two people drawn from Table 2.1; only the configuration of recognition counts.
+    """
+
+    session: int
+    condition: str
+    seed: int
+    limit: Seconds
+    config: Config
+    people: bool = False
+
+
+class SessionResult(Struct, frozen=True, kw_only=True):
+    """Result of a session. trace: of the exception, if it failed by a bug of ours."""
+
+    record: SessionRecord
+    events: tuple[EventRecord, ...] = ()
+    trace: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command: none."""
+
+
+def main(options: Options) -> int:
+    """Play the orders on standard input, until it ends."""
+    orders = msgspec.json.Decoder(Order)
+    for line in sys.stdin.buffer:
+        sys.stdout.buffer.write(msgspec.json.encode(play(orders.decode(line))) + b"\n")
+        sys.stdout.buffer.flush()
+    return DONE
+
+
+def play(order: Order) -> SessionResult:
+    """Play one session in virtual time. An error is in the result; nothing is raised."""
+    recording = Recording(order.config.robot)
+    reason = trace = ""
+    try:
+        if order.people:
+            _play_people(order, recording)
+        else:
+            run_virtual(_play_robot(order, recording))
+    except TimeoutError:
+        reason = f"not over after {order.limit:g} s"
+    except Exception as error:  # a bug of ours: this session tells of it, the others go on
+        reason, trace = _reason(error), traceback.format_exc()
+    record = recording.session(session=order.session, condition=order.condition, seed=order.seed, reason=reason)
+    events = recording.events(session=order.session, condition=order.condition)
+    return SessionResult(record=record, events=events, trace=trace)
+
+
+async def _play_robot(order: Order, recording: Recording) -> None:
+    """Play the tangram. Raises TimeoutError at the limit."""
+    async with asyncio.timeout(order.limit):
+        await play_tangram(order.config, (recording,))
+
+
+def _play_people(order: Order, recording: Recording) -> None:
+    config = order.config.recognition
+    session, tally = Session(order.config.robot, config), Tally(config.window)
+    plan = human_session.draw(random.Random(order.seed))
+    observations = human_session.observations(plan)
+    effects = [effect for observation, at in observations for effect in session.feed(observation, at)]
+    effects += session.advance(observations[-1][1] + A_WHILE)
+    changes = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
+    for change in changes:
+        tally.feed(change)
+        recording(change, change.at.seconds)
+    end = Stamp("loop", observations[-1][1])
+    statistics = Statistics(actor="", at=end, session=tally.session(), recent=WindowStatistics())
+    recording(statistics, end.seconds)
+
+
+def _reason(error: BaseException) -> str:
+    """First cause of an exception, on one line."""
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,0 +1,249 @@
+"""Command `engage simulate`: many sessions in virtual time, their results, and tests of the hypotheses."""
+
+import os
+import platform
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+import typer
+from msgspec import Struct
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.options import Configured, Quiet, Resolution, simulation_settings
+from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.process import DONE, FAILED, interrupted, run
+from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.services.commandline.study.progress import ProgressReport
+from engage_hri.services.commandline.study.session import Order, SessionResult
+from engage_hri.services.commandline.study.tangram import DEFAULTS
+from engage_hri.services.commandline.study.validation import beside_table_2_1
+from engage_hri.services.commandline.study.workers import play_all
+from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.service import installed_version
+from engage_hri.services.study import files, summary
+from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
+from engage_hri.services.study.hypotheses import Finding, findings
+from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.summary import Table
+
+PEOPLE = "table-2-1"
+"""Name of the human for sessions of two people, without a robot and so without a condition."""
+TWO_PEOPLE = "human-human"
+"""Value of their column `condition`."""
+BY_WORDS = ("collaboration.mode=task",)
+"""Setting for people who follow the robot's words and no script: the robot may choose its words."""
+USUAL = {"listening": BY_WORDS, "stochastic": BY_WORDS, PEOPLE: ()}
+"""Settings for each human, weaker than the user's; humans that are not listed act the transcript."""
+DECIDED = {
+    "simulation.human": "--human",
+    "simulation.seed": "--seed",
+    "control.variability.seed": "--seed",
+    "generation.condition": "--condition",
+}
+"""Keys that are set for each session, with the option for each."""
+PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
+FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
+
+Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Configured):
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the results go.", show_default=False)]
+    sessions: Annotated[int, typer.Option(metavar="N", min=1, help="In each condition.")] = 20
+    seed: Annotated[int, typer.Option(metavar="S", help="Session k has the seed S + k, in each condition.")] = 0
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="operational|degraded-generation|degraded-recognition",
+            help="Repeatable; else all three.",
+        ),
+    ] = None
+    human: Annotated[
+        Literal["stochastic", "listening", "appendix-b", "misplacing", "table-2-1"],
+        typer.Option(help="How the simulated human behaves; table-2-1: two people and no robot."),
+    ] = "stochastic"
+    resolution: Resolution = None
+    jobs: Annotated[
+        int | None, typer.Option(metavar="J", min=1, help="Processes; as many as processors.", show_default=False)
+    ] = None
+    limit: Annotated[
+        Seconds,
+        typer.Option(metavar="SECONDS", min=1, max=86_400, help="Break a session off after so long in its own time."),
+    ] = 3600.0
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False
+    quiet: Quiet = False
+
+
+def main(options: Options) -> int:
+    draw = plotting()
+    orders = orders_of(options)
+    folder = Folder(options.out, FILES, overwrite=options.overwrite)
+    console = Terminal(quiet=options.quiet)
+    played: list[SessionResult] = []
+    is_broken_off = False
+    with ProgressReport(console, len(orders)) as report:
+
+        def tell(one: SessionResult) -> None:
+            played.append(one)
+            report(one.record)
+
+        try:
+            run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
+        except KeyboardInterrupt:
+            is_broken_off = True
+    if played:
+        place = {(order.condition, order.session): number for number, order in enumerate(orders)}
+        played.sort(key=lambda one: place[one.record.condition, one.record.session])
+        records = [one.record for one in played]
+        found = findings(records)
+        ordered = Counter(order.condition for order in orders)
+        tables = tables_of(records, found, ordered, people=options.human == PEOPLE)
+        folder.write(contents(options, orders, played, found, tables, draw))
+        for table in tables:
+            console.print("", rendered(table), sep="\n")
+        console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
+    if is_broken_off:
+        return interrupted()
+    return DONE if all(one.record.finished for one in played) else FAILED
+
+
+def plotting() -> Draw:
+    """Import the function that draws. Raises InputRefused without matplotlib, before any session is played."""
+    try:
+        from engage_hri.services.study.plots import draw
+    except ImportError as error:
+        fault = Fault(reason=f"plots need matplotlib: {error}", advice=extra_command("study"))
+        raise InputRefused(fault) from error
+    return draw
+
+
+# -- what to play -----------------------------------------------------------------------------------------------
+
+
+def orders_of(options: Options) -> list[Order]:
+    """Make the orders, by condition, then by number; a number has the same seed everywhere. Raises InputRefused."""
+    for setting in options.overrides:
+        key = setting.partition("=")[0].strip()
+        if key in DECIDED:
+            raise InputRefused(Fault(reason=f"a study decides {key!r} itself", advice=f"use {DECIDED[key]}"))
+    if options.human == PEOPLE:
+        if options.condition:
+            raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))
+        return [_order(options, TWO_PEOPLE, number) for number in range(options.sessions)]
+    conditions = dict.fromkeys(options.condition or CONDITIONS)
+    for condition in conditions:
+        if condition not in CONDITIONS:
+            advice = f"one of {', '.join(CONDITIONS)}"
+            raise InputRefused(Fault(reason=f"no condition {condition!r}", advice=advice))
+    return [_order(options, condition, number) for condition in conditions for number in range(options.sessions)]
+
+
+def _order(options: Options, condition: str, number: int) -> Order:
+    """Make one order. The user's settings override what makes a condition worse, but not seed and condition."""
+    seed, people = options.seed + number, options.human == PEOPLE
+    defaults = [*USUAL.get(options.human, DEFAULTS)]
+    chosen = [*simulation_settings(seed, None if people else options.human, options.resolution)]
+    if not people:
+        defaults += DEGRADATIONS[condition]
+        chosen.append(f"generation.condition={condition}")
+    config = replace(options, settings=[*options.overrides, *chosen]).load(defaults=defaults)
+    return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config, people=people)
+
+
+# -- what came of it --------------------------------------------------------------------------------------------
+
+
+def tables_of(
+    records: Sequence[SessionRecord], found: Sequence[Finding], ordered: Mapping[str, int], *, people: bool
+) -> list[Table]:
+    """Tables for the terminal and for summary.md. ordered: number of sessions by condition, played or not."""
+    tables = [summary.overview(records, ordered)]
+    if people:
+        tables.append(beside_table_2_1(records))
+    if found:
+        tables.append(summary.hypotheses(found))
+    if any(not record.finished for record in records):
+        tables.append(summary.unfinished(records))
+    return tables
+
+
+def contents(
+    options: Options,
+    orders: Sequence[Order],
+    played: Sequence[SessionResult],
+    found: Sequence[Finding],
+    tables: Sequence[Table],
+    draw: Draw,
+) -> dict[str, bytes]:
+    """Results by file name. Nothing in them depends on the number of processes."""
+    records = [one.record for one in played]
+    events = [event for one in played for event in one.events]
+    texts = {
+        "events.csv": files.events(events),
+        "sessions.csv": files.sessions(records),
+        "summary.md": "\n".join(table.markdown() for table in tables),
+        "study.json": msgspec.json.format(msgspec.json.encode(_study(options, orders, len(played)))).decode() + "\n",
+    }
+    if found:
+        texts["hypotheses.csv"] = files.findings(found)
+    if failed := [one for one in played if one.trace]:
+        texts["failures.txt"] = "\n".join(
+            f"{one.record.condition} {one.record.session}, seed {one.record.seed}\n{one.trace}" for one in failed
+        )
+    return {name: text.encode() for name, text in texts.items()} | draw(records, events)
+
+
+class Study(Struct, frozen=True, kw_only=True):
+    """Content of study.json: all that is needed to play the same sessions again.
+
+    played: fewer than ordered if it was interrupted. settings: those of the user. configurations: complete, by
+    condition, of the first session; session k has the seed `seed` + k.
+    """
+
+    versions: dict[str, str]
+    human: str
+    conditions: tuple[str, ...]
+    sessions: int
+    seed: int
+    limit: Seconds
+    ordered: int
+    played: int
+    settings: tuple[str, ...]
+    configurations: dict[str, Config]
+
+
+def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
+    first = {order.condition: order.config for order in orders if order.session == 0}
+    return Study(
+        versions={"engage": installed_version(), "python": platform.python_version(), "numpy": np.__version__},
+        human=options.human, conditions=tuple(first), sessions=options.sessions, seed=options.seed,
+        limit=options.limit, ordered=len(orders), played=played, settings=options.overrides,
+        configurations=first,
+    )  # fmt: skip
+
+
+def rendered(table: Table) -> RenderableType:
+    """Draw a table with its notes, for a terminal."""
+    return Group(grid(table), *(Text(note, style="dim") for note in table.notes))
+
+
+def grid(table: Table) -> RichTable:
+    """Draw a table without its notes."""
+    made = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
+    for index, column in enumerate(table.columns):
+        made.add_column(column, justify="right" if index else "left", overflow="fold")
+    for row in table.rows:
+        made.add_row(*map(Text, row))
+    return made
