@@ -46,8 +46,8 @@ if TYPE_CHECKING:
     from engage_hri.schemas.world import World as World
     from engage_hri.services.client.language_models import perform_call as perform_call
     from engage_hri.services.client.language_models import stream as stream
-    from engage_hri.services.client.perceive import perceive as perceive
-    from engage_hri.services.client.perceived_person import PerceivedPerson as PerceivedPerson
+    from engage_hri.services.client.people.perceive import perceive as perceive
+    from engage_hri.services.client.people.perceived_person import PerceivedPerson as PerceivedPerson
     from engage_hri.services.client.results import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
@@ -70,8 +70,8 @@ _PLACES = {
     "engage_hri.schemas.summary": ("Summary", "summary"),
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
-    "engage_hri.services.client.perceive": ("perceive",),
-    "engage_hri.services.client.perceived_person": ("PerceivedPerson",),
+    "engage_hri.services.client.people.perceive": ("perceive",),
+    "engage_hri.services.client.people.perceived_person": ("PerceivedPerson",),
     "engage_hri.services.client.results": ("PerformFailed",),
     "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.commandline.embedding": ("embedded",),

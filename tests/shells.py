@@ -42,7 +42,7 @@ SHELLS = {
     "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
     "services/console/follow.py",  # subscribes
-    "services/console/live.py",  # draws
+    "services/console/terminal/live.py",  # draws
     "services/console/web/server.py",  # serves the page
     "services/console/web/visitor.py",  # carries out orders
 }

@@ -37,8 +37,8 @@ PURE_MACHINERY = {
     "services/runtime/action_reports.py", "services/runtime/reporters.py", "services/runtime/reports.py",
     "services/runtime/world_report.py", "services/runtime/in_force.py",
     "services/client/chunking.py",
-    "services/client/event_stream.py", "services/client/person_actions.py", "services/client/shared_world.py",
-    "services/client/utterances.py",
+    "services/client/event_stream.py", "services/client/people/person_actions.py", "services/client/people/shared_world.py",
+    "services/client/people/utterances.py",
     "services/bus/samples.py", "services/bus/payloads.py", "services/bus/often.py", "services/bus/sight.py",
     "services/bus/zenoh/turns.py",
 }  # fmt: skip

@@ -10,7 +10,7 @@ from engage_hri.schemas.body import RobotSeen
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.client.person_actions import PersonActions
+from engage_hri.services.client.people.person_actions import PersonActions
 from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import (
     FACE,

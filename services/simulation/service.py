@@ -10,8 +10,8 @@ from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Subscription
-from engage_hri.services.client.perceived_actions import PerceivedActions
-from engage_hri.services.client.shared_world import SharedWorld
+from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.simulation.appendix_b import misplacing_rules, rules

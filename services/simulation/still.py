@@ -15,9 +15,9 @@ from engage_hri.schemas.units import FARTHEST, Stamp
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.client.perceived_actions import PerceivedActions
-from engage_hri.services.client.person_actions import PersonActions
-from engage_hri.services.client.shared_world import SharedWorld
+from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.person_actions import PersonActions
+from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.attentive import AttentiveHuman

@@ -13,7 +13,7 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.client.perceive import perceive
+from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config

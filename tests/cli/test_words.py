@@ -13,7 +13,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.console.log import Telling, line
+from engage_hri.services.console.terminal.log import Telling, line
 from engage_hri.services.console.view import empty, feed
 from tests.cli.command import Engage
 

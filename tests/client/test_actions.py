@@ -6,7 +6,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.feeds import Feed
-from engage_hri.services.client.perceived_person import PerceivedPerson
+from engage_hri.services.client.people.perceived_person import PerceivedPerson
 from engage_hri.services.client.robot import connect
 from engage_hri.services.runtime.action_reports import REPORT_GRACE
 

@@ -12,7 +12,7 @@ from engage_hri.schemas.tool import MOST_LETTERS, MOST_VALUES, _lists, tool_defi
 from engage_hri.schemas.units import A_DAY, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.client.inputs import call_in, fragment_in, taken
-from engage_hri.services.client.perceived_person import Duration
+from engage_hri.services.client.people.perceived_person import Duration
 
 CALL = {"turn_status": "full", "parts": [{"say": "hi"}]}
 TEXT = json.dumps(CALL)

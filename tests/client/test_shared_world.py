@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.client.shared_world import GRACE, SharedWorld
+from engage_hri.services.client.people.shared_world import GRACE, SharedWorld
 
 
 def thing(id: str, x: float = 0.5) -> Entity:

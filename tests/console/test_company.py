@@ -3,7 +3,7 @@
 import asyncio
 
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.perceive import perceive
+from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.console.web.company import invitation
 from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.service import window

@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.services.console.log import Telling, line
+from engage_hri.services.console.terminal.log import Telling, line
 from engage_hri.services.console.view import empty, feed
 from tests.console.scenes import at
 from tests.console.test_picture import picture, section

@@ -12,8 +12,9 @@ from engage_hri.schemas.holds import BodyHeld, Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console import log, tally, view
-from engage_hri.services.console.log import Telling
+from engage_hri.services.console import view
+from engage_hri.services.console.terminal import log, tally
+from engage_hri.services.console.terminal.log import Telling
 from tests.console.scenes import SCENE, at, event, fed
 
 

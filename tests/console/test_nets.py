@@ -12,9 +12,9 @@ from rich.console import Console
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.console import nets
-from engage_hri.services.console.live import LiveNets, NetLog
-from engage_hri.services.console.net_drawing import drawing, legend, picture
 from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
+from engage_hri.services.console.terminal.live import LiveNets, NetLog
+from engage_hri.services.console.terminal.net_drawing import drawing, legend, picture
 from engage_hri.services.console.web.net_layout import laid_out
 from tests.random_cases import share_of
 

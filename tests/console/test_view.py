@@ -20,9 +20,10 @@ from engage_hri.schemas.feedback import (
 )
 from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.services.console import tally, view
-from engage_hri.services.console.log import Telling, line
-from engage_hri.services.console.render import render
+from engage_hri.services.console import view
+from engage_hri.services.console.terminal import tally
+from engage_hri.services.console.terminal.log import Telling, line
+from engage_hri.services.console.terminal.render import render
 from engage_hri.services.console.web.picture import Picture
 from tests.console.scenes import SCENE, at, event, fed
 

@@ -23,7 +23,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.perceive import perceive
+from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config

@@ -14,7 +14,7 @@ from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.recognition import RequestEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_actions import PerceivedActions
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.study.analysing import again, with_settings
 from engage_hri.services.recognition.config import RecognitionConfig

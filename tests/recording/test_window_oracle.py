@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import msgspec
 import pytest
 
-from engage_hri.services.console import tally
+from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.recording.reading import Recording

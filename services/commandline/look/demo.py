@@ -19,10 +19,10 @@ from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run
 from engage_hri.services.commandline.shell.recording_file import needed
 from engage_hri.services.commandline.study.tangram import DEFAULTS, play_tangram
-from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink
-from engage_hri.services.console.live import LiveView, Log
-from engage_hri.services.console.log import Telling
+from engage_hri.services.console.terminal import tally
+from engage_hri.services.console.terminal.live import LiveView, Log
+from engage_hri.services.console.terminal.log import Telling
 
 FOR_YOU = ("collaboration.mode=task",)
 """Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""

@@ -25,8 +25,8 @@ from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
-from engage_hri.services.console.live import LiveNets, Log, NetLog
-from engage_hri.services.console.log import Telling
+from engage_hri.services.console.terminal.live import LiveNets, Log, NetLog
+from engage_hri.services.console.terminal.log import Telling
 
 OTHERS = (
     keys.UTTERANCE,

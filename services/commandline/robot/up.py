@@ -27,8 +27,8 @@ from engage_hri.services.commandline.shell.process import DONE, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, TASK, Groups, groups
 from engage_hri.services.commandline.shell.supervisor import Child, supervised
 from engage_hri.services.commandline.study.tangram import DEFAULTS
-from engage_hri.services.console import tally
 from engage_hri.services.console.follow import Sink, following
+from engage_hri.services.console.terminal import tally
 from engage_hri.services.control.bases import drivers
 from engage_hri.services.runtime.service import Service, running
 

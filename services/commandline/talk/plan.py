@@ -73,8 +73,8 @@ def main(options: Options) -> int:
 
 
 def _as_text(plan: Plan) -> str:
-    from engage_hri.services.console.net_drawing import drawing, legend
     from engage_hri.services.console.nets import in_view
+    from engage_hri.services.console.terminal.net_drawing import drawing, legend
     from engage_hri.services.realizer import export
 
     net = in_view(export.as_message(plan))

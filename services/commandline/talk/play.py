@@ -33,8 +33,8 @@ from engage_hri.services.commandline.talk import input_check
 from engage_hri.services.commandline.talk.play_state import Played
 from engage_hri.services.commandline.talk.prose import Prose, Warnings, strict_refusal
 from engage_hri.services.console.follow import Sink, following
-from engage_hri.services.console.live import Log
-from engage_hri.services.console.log import Telling
+from engage_hri.services.console.terminal.live import Log
+from engage_hri.services.console.terminal.log import Telling
 
 NOTHING = World(entities=())
 PATIENCE: Seconds = 5.0

@@ -16,8 +16,8 @@ from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.services.client.chunking import parts_of
 from engage_hri.services.client.inputs import fragment_in
-from engage_hri.services.client.perceive import check_id, perceive
-from engage_hri.services.client.perceived_person import PerceivedPerson, free_seat, not_a_thing
+from engage_hri.services.client.people.perceive import check_id, perceive
+from engage_hri.services.client.people.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
 from engage_hri.services.console.web.company import Invitation
 from engage_hri.services.console.web.frames import Viewer, You

@@ -10,9 +10,10 @@ from rich.live import Live
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
-from engage_hri.services.console import log, nets, view, wording
-from engage_hri.services.console.net_drawing import picture
-from engage_hri.services.console.render import render
+from engage_hri.services.console import nets, view, wording
+from engage_hri.services.console.terminal import log
+from engage_hri.services.console.terminal.net_drawing import picture
+from engage_hri.services.console.terminal.render import render
 
 REDRAW: Seconds = 0.1
 """Least time between two pictures; each is drawn because of a message."""

@@ -18,7 +18,7 @@ from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
-from engage_hri.services.client.perceived_person import PerceivedPerson
+from engage_hri.services.client.people.perceived_person import PerceivedPerson
 from engage_hri.services.runtime.configuration import bus_config
 
 PATIENCE: Seconds = 3.0

@@ -20,10 +20,10 @@ from engage_hri.schemas.utf8 import is_utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.inputs import taken
-from engage_hri.services.client.perceived_actions import PerceivedActions
-from engage_hri.services.client.person_actions import PersonActions
-from engage_hri.services.client.shared_world import SharedWorld
-from engage_hri.services.client.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
+from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.person_actions import PersonActions
+from engage_hri.services.client.people.shared_world import SharedWorld
+from engage_hri.services.client.people.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
 from engage_hri.services.runtime.ongoing_actions import ActionEvent
 
 Duration = Annotated[float, Meta(ge=0.0, le=A_DAY)]
