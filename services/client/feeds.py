@@ -10,9 +10,9 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, events
-from engage_hri.services.runtime.ongoing_actions import ActionEvent
-from engage_hri.services.runtime.reports import Told
+from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
+from engage_hri.services.reports.ongoing_actions import ActionEvent
+from engage_hri.services.reports.reports import Told
 
 M = TypeVar("M")
 

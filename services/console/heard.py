@@ -1,7 +1,7 @@
 """Messages as people are to see them: actions as all their reporters together tell them, and the world. Pure.
 
 Actions of the bus are not passed on as they came: some are over without anybody who says so, since their reporter was
-killed, and of some only a state tells (`services/runtime/action_reports.py`). A world ends when its publisher was
+killed, and of some only a state tells (`services/reports/action_reports.py`). A world ends when its publisher was
 killed.
 """
 
@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, events
-from engage_hri.services.runtime.ongoing_actions import ActionEvent
-from engage_hri.services.runtime.world_report import WorldReport
+from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
+from engage_hri.services.reports.ongoing_actions import ActionEvent
+from engage_hri.services.reports.world_report import WorldReport
 
 
 class Heard:

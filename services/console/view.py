@@ -24,7 +24,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowSt
 from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.shelf import Shelf
-from engage_hri.services.runtime.in_force import InForce
+from engage_hri.services.reports.in_force import InForce
 
 UTTERANCES_KEPT = 160
 EVENTS_KEPT = 100

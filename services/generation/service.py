@@ -28,14 +28,14 @@ from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragment_runner import FragmentRunner
 from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
+from engage_hri.services.reports.publisher import Publisher
+from engage_hri.services.reports.reports import GoesOn, Told
+from engage_hri.services.reports.world_report import WorldReport
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import RequestDesk, Requester
-from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports
-from engage_hri.services.runtime.publisher import Publisher
-from engage_hri.services.runtime.reports import GoesOn, Told
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
-from engage_hri.services.runtime.world_report import WorldReport
 
 NAME = "generation"
 PATTERNS = (

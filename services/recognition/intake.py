@@ -33,9 +33,9 @@ from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.words import HeardWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.runtime.action_reports import REPORT_GRACE, ActionReports, Read
-from engage_hri.services.runtime.reporters import OLDEST
-from engage_hri.services.runtime.reports import GoesOn, Told
+from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, Read
+from engage_hri.services.reports.reporters import OLDEST
+from engage_hri.services.reports.reports import GoesOn, Told
 
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""

@@ -23,7 +23,7 @@ from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
 from engage_hri.services.recognition.perceive.words import HeardWords, Words
-from engage_hri.services.runtime.reports import GoesOn
+from engage_hri.services.reports.reports import GoesOn
 
 Perceived = Observation | HeadPose | VoiceActivity | RobotState | HeardWords
 Result = Effect | Symbolic

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.runtime.in_force import InForce
+from engage_hri.services.reports.in_force import InForce
 
 UNNAMED = "recorded"
 """Condition of recordings that name none."""

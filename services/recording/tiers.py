@@ -21,7 +21,7 @@ from engage_hri.services.bus.samples import Received
 from engage_hri.services.recording.lanes import Annotation, Tier, apart
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.times import Times, messages
-from engage_hri.services.runtime.ongoing_actions import ends
+from engage_hri.services.reports.ongoing_actions import ends
 
 NAMES = {
     "speak": "speech", "look": "gaze", "point": "points", "nod": "nods", "shake": "shakes", "act": "manipulations",

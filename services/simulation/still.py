@@ -18,7 +18,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.people.perceived_actions import PerceivedActions
 from engage_hri.services.client.people.person_actions import PersonActions
 from engage_hri.services.client.people.shared_world import SharedWorld
-from engage_hri.services.runtime.ongoing_actions import ActionEvent
+from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.config import SimulationConfig

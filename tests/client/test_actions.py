@@ -8,7 +8,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.people.perceived_person import PerceivedPerson
 from engage_hri.services.client.robot import connect
-from engage_hri.services.runtime.action_reports import REPORT_GRACE
+from engage_hri.services.reports.action_reports import REPORT_GRACE
 
 Event = ActionBegan | ActionEnded | ActorFound | ActorLost
 

@@ -17,7 +17,7 @@ from engage_hri.services.client.people.perceived_person import PerceivedPerson
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.service import PATTERNS
-from engage_hri.services.runtime.action_reports import REPORT_GRACE
+from engage_hri.services.reports.action_reports import REPORT_GRACE
 
 CUP = Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7))
 

@@ -12,9 +12,9 @@ from engage_hri.services.recognition.events.machine import Forgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.runtime.action_reports import REPORT_GRACE
-from engage_hri.services.runtime.ongoing_actions import ActionEvent, OngoingActionTracker
-from engage_hri.services.runtime.reporters import Reporters
+from engage_hri.services.reports.action_reports import REPORT_GRACE
+from engage_hri.services.reports.ongoing_actions import ActionEvent, OngoingActionTracker
+from engage_hri.services.reports.reporters import Reporters
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
 

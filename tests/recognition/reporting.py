@@ -19,9 +19,9 @@ from engage_hri.services.recognition import intake, service
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.recognizer import Recognizer
+from engage_hri.services.reports.action_reports import REPORT_GRACE
+from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.requests.ends import Requester
-from engage_hri.services.runtime.action_reports import REPORT_GRACE
-from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.service import serve
 from tests.bus.cuttable import CuttableHub
 from tests.recognition.observations import ROBOT, world

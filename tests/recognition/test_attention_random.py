@@ -11,7 +11,7 @@ from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.recognizer import Recognizer
-from engage_hri.services.runtime.action_reports import FACE_GRACE
+from engage_hri.services.reports.action_reports import FACE_GRACE
 from tests.recognition.observations import ROBOT, stamp
 from tests.recognition.raw import EYES, PLACES, face, hand, pose, table, voice
 from tests.recognition.test_random_streams import ACTORS, Chance

@@ -8,7 +8,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.messages import Message, encode_json
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.runtime.ongoing_actions import MOST
+from engage_hri.services.reports.ongoing_actions import MOST
 from tests.recognition.observations import ROBOT
 from tests.recognition.reporting import Actor, Belief, Running, Stage, all_of
 

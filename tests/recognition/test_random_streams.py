@@ -17,8 +17,8 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.statistics.tally import KINDS
-from engage_hri.services.runtime.action_reports import FACE_GRACE
-from engage_hri.services.runtime.reports import GoesOn
+from engage_hri.services.reports.action_reports import FACE_GRACE
+from engage_hri.services.reports.reports import GoesOn
 from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 

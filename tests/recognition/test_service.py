@@ -17,8 +17,8 @@ from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
+from engage_hri.services.reports.action_reports import REPORT_GRACE
 from engage_hri.services.requests.ends import Requester, RequestRefused
-from engage_hri.services.runtime.action_reports import REPORT_GRACE
 from engage_hri.services.runtime.service import Service, running
 from tests.commanding import command
 from tests.recognition.observations import HUMAN, ROBOT, world

@@ -20,7 +20,7 @@ from engage_hri.services.recognition.events.machine import (
     table,
 )
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
-from engage_hri.services.runtime import reporters
+from engage_hri.services.reports import reporters
 
 TABLES = {
     "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,

@@ -25,7 +25,7 @@ from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.tiers import tiers
-from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
+from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.config import SimulationConfig
 from tests.recording.conftest import Anchor

@@ -18,7 +18,7 @@ from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, Warnin
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
 from engage_hri.services.collaboration.relations import Relation, relation
-from engage_hri.services.runtime.action_reports import FACE_GRACE
+from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.bus.faulty import Faults
 from tests.scenario.playing import Record, play

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.runtime.ongoing_actions import ActionEvent, OngoingActionTracker
+from engage_hri.services.reports.ongoing_actions import ActionEvent, OngoingActionTracker
 
 
 class PerceivedActions:

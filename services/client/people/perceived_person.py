@@ -24,7 +24,7 @@ from engage_hri.services.client.people.perceived_actions import PerceivedActions
 from engage_hri.services.client.people.person_actions import PersonActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.client.people.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
-from engage_hri.services.runtime.ongoing_actions import ActionEvent
+from engage_hri.services.reports.ongoing_actions import ActionEvent
 
 Duration = Annotated[float, Meta(ge=0.0, le=A_DAY)]
 """Seconds that something takes."""

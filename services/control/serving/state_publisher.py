@@ -13,8 +13,8 @@ from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.contract.calibration import Calibration
 from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.serving.actions import ActionMessage, ActionReporter
+from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.alarm import Timer
-from engage_hri.services.runtime.ongoing_actions import OngoingActionTracker
 
 IDLE: Seconds = 1.0
 """Interval of `RobotState` messages while nothing moves."""

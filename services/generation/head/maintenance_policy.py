@@ -15,8 +15,8 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.absent import Absent
-from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 
 class _Hand(Struct):

@@ -18,8 +18,8 @@ from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.runtime.action_reports import FACE_GRACE
 from engage_hri.services.text.listening import is_listening
 
 LONGEST_LISTENING: Seconds = 3.0

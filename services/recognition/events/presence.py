@@ -1,7 +1,7 @@
 """Presence of a person: faces get lost and found again, and reports of it may come late or twice."""
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.runtime.action_reports import FACE_GRACE
+from engage_hri.services.reports.action_reports import FACE_GRACE
 
 NEVER: Seconds = float("-inf")
 

@@ -28,7 +28,7 @@ from engage_hri.services.recognition.events.machine import Effect, EventWriter, 
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
-from engage_hri.services.runtime.reports import GoesOn
+from engage_hri.services.reports.reports import GoesOn
 
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel

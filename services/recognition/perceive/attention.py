@@ -26,8 +26,8 @@ from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, i
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import Voice
+from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.absent import Absent
-from engage_hri.services.runtime.action_reports import FACE_GRACE
 
 Raw = HeadPose | VoiceActivity | World | RobotState
 

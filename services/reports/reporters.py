@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.runtime.ongoing_actions import ActionEvent
-from engage_hri.services.runtime.reports import Report, Told
+from engage_hri.services.reports.ongoing_actions import ActionEvent
+from engage_hri.services.reports.reports import Report, Told
 
 OLDEST: Seconds = 60.0
 """Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""

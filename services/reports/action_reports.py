@@ -17,9 +17,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent
-from engage_hri.services.runtime.reporters import Reporters
-from engage_hri.services.runtime.reports import GoesOn, Told
+from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent
+from engage_hri.services.reports.reporters import Reporters
+from engage_hri.services.reports.reports import GoesOn, Told
 
 FACE_GRACE: Seconds = 2.0
 """Time for which a person may be out of sight, and come back under the same id, before the person has gone. Trackers

@@ -8,7 +8,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.runtime.ongoing_actions import MOST, ActionEvent, Ongoing, which
+from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent, Ongoing, which
 
 
 class GoesOn(Struct, frozen=True):

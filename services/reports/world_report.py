@@ -3,7 +3,7 @@
 from engage_hri.schemas.presence import PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.runtime.publisher import Publisher
+from engage_hri.services.reports.publisher import Publisher
 
 NOTHING = World(entities=())
 

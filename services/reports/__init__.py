@@ -1,0 +1,1 @@
+"""Publishers of what is in force: actions, worlds and other states, as their readers need them."""
