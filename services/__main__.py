@@ -6,7 +6,7 @@ import os
 def main(arguments: list[str] | None = None) -> None:
     """Run a command of `services/commandline/app.py`."""
     # Loading takes half a second. A KeyboardInterrupt during it would be a traceback, or lost in a callback. Nothing
-    # has begun yet, so leaving at once is orderly. `services/commandline/shell/process.py` takes over when something runs.
+    # has begun yet, so leaving at once is orderly. `services/commandline/shell/process.py` takes over later.
     try:
         import signal
 

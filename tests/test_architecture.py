@@ -32,13 +32,9 @@ PURE_MACHINERY = {
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
-    "services/runtime/absent.py", "services/runtime/installation.py",
-    "services/reports/publisher.py", "services/runtime/steps.py", "services/reports/ongoing_actions.py",
-    "services/reports/action_reports.py", "services/reports/reporters.py", "services/reports/reports.py",
-    "services/reports/world_report.py", "services/reports/in_force.py",
-    "services/client/chunking.py",
-    "services/client/event_stream.py", "services/client/people/person_actions.py", "services/client/people/shared_world.py",
-    "services/client/people/utterances.py",
+    "services/runtime/absent.py", "services/runtime/installation.py", "services/runtime/steps.py",
+    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/person_actions.py",
+    "services/client/people/shared_world.py", "services/client/people/utterances.py",
     "services/bus/samples.py", "services/bus/payloads.py", "services/bus/often.py", "services/bus/sight.py",
     "services/bus/zenoh/turns.py",
 }  # fmt: skip
@@ -47,24 +43,26 @@ VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
 """Packages of `services` that are no service: they put services together and may import all of them."""
-SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording", "text"}
+SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording", "reports", "text"}
 """Packages of `services` that are no service, and that services may import."""
-PURE_SHARED = {"recording", "text"}
+PURE_SHARED = {"recording", "reports", "text"}
 """Those of them whose files are pure, as those of a service are."""
 LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation realizer recognition"
-    " simulation study > client > recording > requests > runtime > bus > tangram text",
+    " simulation study > client > recording > reports requests > runtime > bus > tangram text",
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
     "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often sight"
     " > config journal keyring",
-    "services/control": "testing > measuring service > drivers > mujoco reachy_mini > torso"
-    " > composed guarded ordinary voice > driven members > performing questions shown"
-    " > actions blame estimates refusals spoken switching told unheard waiting > live warned > body"
-    " > calibration > extras fitting > variability > config",
+    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating figure serving voice"
+    " > contract > config motion",
+    "services/commandline": "robot > look > study talk > app bodies embedding > shell",
+    "services/client": "language_models > robot > hearing > studied > faulting > feeds people > chunking event_stream"
+    " inputs results steering",
     "services/generation": "service > fragment_runner > performance > body_link choosing_again"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
-    "services/realizer": "export service > perform > decide > foresee > plan > net > config points",
+    "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
+    " > config points",
     "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what

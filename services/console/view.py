@@ -1,6 +1,7 @@
 """Scene: one value with the actors, words, blocks with their sync points, and connection events of a running system.
 
-`feed(scene, message, at)` gives the next scene; `services/console/terminal/render.py` draws one. Nothing here knows the bus.
+`feed(scene, message, at)` gives the next scene; `services/console/terminal/render.py` draws one. Nothing here knows
+the bus.
 """
 
 from collections.abc import Iterable

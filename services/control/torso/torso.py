@@ -111,11 +111,8 @@ class Torso:
             here.update(self.misbelieved)
         rest = {**tracks.bases(self.tracks), **self._gaze_at_rest(here)}
         is_sure = real or self.misbelieved.keys().isdisjoint(TRUNK)
-        trunks = (
-            table_clearance.places(self, now)
-            if is_sure
-            else table_clearance.way_along([[here[joint] for joint in TRUNK]])
-        )
+        here_only = [[here[joint] for joint in TRUNK]]
+        trunks = table_clearance.places(self, now) if is_sure else table_clearance.way_along(here_only)
         described = Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk, trunks)
         return described if pose is None else self.placed(described, pose)
 
