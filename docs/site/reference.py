@@ -39,14 +39,15 @@ BESIDE = {
     "Driving a robot": ("services.client.feeds.Feed", "services.client.feeds.EventFeed"),
     "What comes back": ("schemas.blocks.BlockOutcome", "schemas.recognition.OpenEvents"),
     "Writing a body": (
-        "schemas.body.Capabilities", "schemas.body.Estimate", "schemas.body.Phase", "services.control.body.BodyState",
-        "services.control.body.Spoke", "services.control.body.MouthShape",
+        "schemas.body.Capabilities", "schemas.body.Estimate", "schemas.body.Phase",
+        "services.control.contract.body.BodyState", "services.control.contract.body.Spoke",
+        "services.control.contract.body.MouthShape",
         "services.control.voice.synthesis.Synthesizer", "services.control.voice.synthesis.Phrase",
         "services.control.voice.synthesis.Said", "services.control.voice.synthesis.Heard",
         "services.control.voice.synthesis.Phone", "services.control.voice.sounding.SoundingVoice",
         "services.control.voice.settings.VoiceSettings",
     ),
-    "What goes wrong": ("services.control.body.BodyFailed", "schemas.faults.NoReply"),
+    "What goes wrong": ("services.control.contract.body.BodyFailed", "schemas.faults.NoReply"),
 }  # fmt: skip
 """What the public names take and return, by its place in the package."""
 RAISES = re.compile(r"^Raises:\n((?:    .*(?:\n|$)|\n)+)", re.MULTILINE)

@@ -6,7 +6,7 @@ import sys
 WATCHED = """
 import gc
 
-from engage_hri.services.commandline import plan
+from engage_hri.services.commandline.talk import plan
 
 garbage_is_searched_for = []
 garbage_is_searched_for.append(gc.isenabled())
