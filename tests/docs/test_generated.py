@@ -44,6 +44,25 @@ def test_the_table_of_laws_is_not_stale(monkeypatch: pytest.MonkeyPatch) -> None
     del sys.modules["laws_table"]
 
 
+def test_the_list_of_decisions_is_not_stale_and_tells_what_is_overtaken(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
+    import decisions_list
+
+    text = (decisions_list.FOLDER / "README.md").read_text(encoding="utf-8")
+    assert decisions_list.page(text) == text, "make generate"
+    (tmp_path / "0001-a.md").write_text("# 0001 An idea\n\n*Overtaken by [0002](0002-b.md): a better one.*\n")
+    (tmp_path / "0002-b.md").write_text("# 0002 A better one\n\n**Asked.**\n")
+    first, second = decisions_list.listed(tmp_path).splitlines()[2:]
+    assert first == "- 0001 [An idea](0001-a.md), overtaken by [0002](0002-b.md)"
+    assert second == "- 0002 [A better one](0002-b.md)"
+    (tmp_path / "0003-c.md").write_text("# 0004 Another number\n")
+    with pytest.raises(ValueError, match="0003 TITLE"):
+        decisions_list.listed(tmp_path)
+    del sys.modules["decisions_list"]
+
+
 def test_make_generate_writes_all_of_it() -> None:
     """Compared elsewhere: the schemas (tests/schemas/test_export.py), docs/vocabulary.md (tests/realizer)."""
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\ngenerate:")[2].partition("\n\n")[0]
@@ -54,3 +73,4 @@ def test_make_generate_writes_all_of_it() -> None:
     assert "docs/site/laws_table.py" in recipe
     assert "docs/site/vocabulary_table.py" in recipe
     assert "docs/site/faults_table.py" in recipe
+    assert "docs/site/decisions_list.py" in recipe
