@@ -13,11 +13,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from pathlib import Path
 
+from mcap.records import Metadata, MetadataIndex
+
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recording import descriptor
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.writing import Sealed, Writer, end, written
+from engage_hri.services.recording.writing import REPAIRED, Sealed, Writer, end, written
 
 WAITING = 32 * 1024 * 1024
 """Bytes of chunks that may wait for room on the disk."""
@@ -184,6 +186,10 @@ class Aside:
         os.close(self._file)
 
 
+MOST_PLACES = 10
+"""Damaged places that the note of a repair tells one by one."""
+
+
 def read(path: Path) -> Recording:
     """Open a recording. Raises InputRefused: there is none."""
     try:
@@ -217,6 +223,10 @@ def repair(path: Path) -> int:
                 last.message_index_offsets[index.channel_id] = until + len(tail)
                 tail += written(index)
             last.message_index_length = len(tail)
+    if found := "; ".join(_found(recording)):
+        note = written(Metadata(name=REPAIRED, metadata={"found": found}))
+        contents.metadata.append(MetadataIndex(offset=until + len(tail), length=len(note), name=REPAIRED))
+        tail += note
     checksum = zlib.crc32(tail, recording.checksum(until))
     channels, chunks = map(written, contents.channels), map(written, contents.chunks)
     try:
@@ -237,6 +247,20 @@ def repair(path: Path) -> int:
     except OSError as error:
         raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
     return 0 if recording.has_all_data else recording.lost_bytes
+
+
+def _found(recording: Recording) -> Iterator[str]:
+    """What a repair has to leave a note of: it takes away the signs, a missing end and a wrong checksum."""
+    if recording.has_all_data and not recording.damaged:
+        return
+    if recording.repaired:
+        yield recording.repaired
+    if not recording.has_all_data:
+        yield f"what came after {recording.duration:.2f} s is missing"
+    for place in recording.damaged[:MOST_PLACES]:
+        yield f"damaged at byte {place.offset}: {place.reason}"
+    if (more := len(recording.damaged) - MOST_PLACES) > 0:
+        yield f"and {more} more such places"
 
 
 def _sync_folder(path: Path) -> None:

@@ -46,7 +46,7 @@ from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.bus.samples import Received, Sample
 from engage_hri.services.recording.form import Form, payload
 from engage_hri.services.recording.losses import CHUNK, LOST, MORE, OWN, Losses, Mark
-from engage_hri.services.recording.writing import PROFILE, Contents
+from engage_hri.services.recording.writing import PROFILE, REPAIRED, Contents
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -58,6 +58,8 @@ _BAD = (
 """Errors of the libraries over bytes that nobody wrote; lz4 has a `RuntimeError`."""
 _CHUNK = re.compile(rb"\x06.{4}\0{4}.{16}.{4}\0{4}.{4}(?:\x04\0{3}zstd|\x03\0{3}lz4|\0{4})", re.DOTALL)
 """Beginning of a chunk of less than 4 GiB."""
+_BEGINNING = re.compile(rb".{8}\x01.{8}....engage", re.DOTALL)
+"""Beginning of a recording of ours: a mark of eight bytes, and the record that names what wrote it."""
 _DATA_END = _HEAD.size + 4
 """Bytes of the record at the end of the data."""
 LARGEST_CHUNK = 64 * 1024 * 1024
@@ -158,6 +160,11 @@ class Recording:
         return self.time(len(self) - 1) if len(self) else 0.0
 
     @property
+    def repaired(self) -> str:
+        """What repairs have found, in words; empty: there was none that has found something."""
+        return self.notes.get(REPAIRED, {}).get("found", "")
+
+    @property
     def contents(self) -> Contents:
         """Everything that the end of the file tells of, or would have to."""
         return self._contents
@@ -253,7 +260,10 @@ class Recording:
         """Read all records. Returns where the last of those in the middle ends."""
         data, size = self._data, len(self._data)
         if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
-            raise InputRefused(Fault(reason="this is no MCAP file", where=self.name))
+            if not _BEGINNING.match(data):
+                reason = "this is no MCAP file" if size else "this file is empty, and no MCAP file"
+                raise InputRefused(Fault(reason=reason, where=self.name))
+            self._damage(0, "the mark of its format is damaged")
         until = self._read_index()
         self.is_whole = self.has_all_data = until is not None
         until = size if until is None else until
@@ -315,7 +325,10 @@ class Recording:
         if self.is_whole and not is_end:
             self._damage(at, "the record at the end of the data is damaged")
         elif is_end and not is_right and not self.damaged:  # what is damaged differs from the checksum, of course
-            self._damage(at, "the data differs from its checksum outside of the messages")
+            self._damage(
+                at,
+                "the data differs from its checksum: something is missing, or was changed where no chunk tells of it",
+            )
 
     def _check_beginning(self) -> None:
         """Compare the time of the beginning with what has a checksum: a replay waits from then for the first message.

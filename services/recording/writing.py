@@ -42,6 +42,8 @@ from engage_hri.services.recording.form import JSON
 from engage_hri.services.recording.losses import CHUNK, Mark
 
 PROFILE = "engage"
+REPAIRED = "engage-repaired"
+"""Name of the note of a repair: what it has found, in words."""
 MOST_CHANNELS = 60_000
 """Number of channels: MCAP has room for 65 535."""
 LEVEL = 3

@@ -219,6 +219,58 @@ def test_what_is_no_recording_is_refused(tmp_path: Path, data: bytes, reason: st
         read(path)
 
 
+@pytest.mark.parametrize("byte", [0, 2, 7])
+def test_a_changed_byte_in_the_mark_of_the_format_costs_no_message(byte: int) -> None:
+    data = bytearray(bytes_of(told()))
+    data[byte] ^= 1
+
+    recording = Recording(bytes(data))
+
+    assert all_of(recording) == told()
+    assert [(each.offset, each.reason) for each in recording.damaged] == [(0, "the mark of its format is damaged")]
+
+
+@pytest.mark.parametrize("cut", [80, 700])
+def test_a_repaired_recording_tells_for_ever_what_was_missing(tmp_path: Path, cut: int) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told(), is_whole=False)
+    path.write_bytes(data[:-cut])
+    before = read(path)
+
+    repair(path)
+
+    after = read(path)
+    assert (after.is_whole, after.damaged, all_of(after)) == (True, [], all_of(before))
+    assert after.repaired == f"what came after {before.duration:.2f} s is missing"
+    with path.open("rb") as file:
+        assert [each.name for each in make_reader(file).iter_metadata()] == ["engage", "engage-repaired"]
+
+    path.write_bytes(path.read_bytes()[:-10])  # its index is damaged: another repair forgets nothing
+    repair(path)
+    assert read(path).repaired == after.repaired
+
+
+def test_a_repair_of_a_recording_without_a_message_leaves_a_note_of_it(tmp_path: Path) -> None:
+    """The index says that all is well, but for the checksum of the data, which a repair writes anew."""
+    path, whole = tmp_path / "a.mcap", bytes_of(told())
+    first, second = Recording(whole).contents.chunks[1:3]
+    path.write_bytes(whole[: first.chunk_start_offset] + whole[second.chunk_start_offset :])
+    before = read(path)
+    assert before.damaged
+
+    repair(path)
+
+    assert before.damaged[0].reason in read(path).repaired
+
+
+def test_a_repair_that_takes_away_nothing_leaves_no_note(tmp_path: Path) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told())
+    path.write_bytes(data[:-10])
+
+    repair(path)
+
+    assert (path.read_bytes(), read(path).repaired) == (data, "")
+
+
 def test_a_recording_of_nothing_opens(tmp_path: Path) -> None:
     recording = read(saved(tmp_path / "empty.mcap", []))
 

@@ -38,6 +38,8 @@ def opened(path: Path) -> "Recording":
             f"{path}: its end is missing or damaged; {len(recording)} messages until {recording.duration:.2f} s"
             f" are whole{behind}"
         )
+    if recording.repaired:
+        complain(f"{path}: it was repaired before, and then: {recording.repaired}")
     for place in recording.damaged:
         complain(f"{path}: damaged at byte {place.offset}: {place.reason}")
     if recording.losses.total:

@@ -155,14 +155,19 @@ def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterabl
             is_here = known.setdefault(event.id, not past and _began(event, times, recording, 0.0, inf))
             lives |= {event.session} if is_here else set()
     before = sum(not counts for counts in known.values())
-    if not recording.is_whole:
+    if recording.another is not None:
+        yield "another recording begins behind it in the file, and is not counted"
+    if not recording.has_all_data:
         yield f"its end is missing or damaged: the numbers are of the first {recording.duration:.0f} s"
+    if recording.repaired:
+        yield f"it was repaired before, and then: {recording.repaired}"
     if recording.losses.total:
         yield f"{recording.losses.total} messages are missing"
     if recording.losses.still:
         yield f"the recorder stood still for {recording.losses.still:.1f} s: motion of that time is missing"
     if recording.damaged:
-        yield f"{len(recording.damaged)} places in the file are damaged, and what they held is left out"
+        places = "one place" if len(recording.damaged) == 1 else f"{len(recording.damaged)} places"
+        yield f"damaged in {places}, and what was there is left out"
     if before:
         yield f"{before} events that began before the recording are not counted"
     if len(lives) > 1:
