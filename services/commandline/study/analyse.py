@@ -182,8 +182,9 @@ def configured(sessions: Sequence[Session]) -> Table:
             found += [(one.path.name, told.participant, since, line) for line in changed(life, others)]
             before[told.participant] = life.values
         if not one.settings:
-            notes.append(f"{one.path.name}: it has no settings of its services.")
-    notes.append("All others are as by default in this Engage; `engage export --settings` has them all.")
+            notes.append(f"{one.path.name}: it has no settings of its services; nobody knows what they were.")
+    if any(one.settings for one in sessions):
+        notes.append("All others are as by default in this Engage; `engage export --settings` has them all.")
     return Table(
         title="Settings", columns=("", "service", "life", "setting"), rows=tuple(found), notes=tuple(notes)
     )  # fmt: skip
