@@ -250,7 +250,7 @@ def repair(path: Path) -> int:
 
 
 def _found(recording: Recording) -> Iterator[str]:
-    """What a repair has to leave a note of: it takes away the signs, a missing end and a wrong checksum."""
+    """Note of a repair, in parts: it takes away the signs itself, a missing end and a wrong checksum."""
     if recording.has_all_data and not recording.damaged:
         return
     if recording.repaired:

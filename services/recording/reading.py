@@ -161,7 +161,7 @@ class Recording:
 
     @property
     def repaired(self) -> str:
-        """What repairs have found, in words; empty: there was none that has found something."""
+        """Findings of repairs, in words; empty: there was none that has found something."""
         return self.notes.get(REPAIRED, {}).get("found", "")
 
     @property
