@@ -21,6 +21,8 @@ from engage_hri.services.recording import descriptor
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.writing import REPAIRED, Sealed, Writer, end, written
 
+MOST_PLACES = 10
+"""Damaged places that the note of a repair tells one by one."""
 WAITING = 32 * 1024 * 1024
 """Bytes of chunks that may wait for room on the disk."""
 Tell = Callable[[str], None]
@@ -184,10 +186,6 @@ class Aside:
 
     def close(self) -> None:
         os.close(self._file)
-
-
-MOST_PLACES = 10
-"""Damaged places that the note of a repair tells one by one."""
 
 
 def read(path: Path) -> Recording:

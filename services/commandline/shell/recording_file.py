@@ -32,7 +32,7 @@ def opened(path: Path) -> "Recording":
     elif not recording.is_whole and recording.has_all_data:
         whole = f"its data is there, {len(recording)} messages"
         complain(f"{path}: the index at its end is damaged, or more stands behind it; {whole}")
-    if not recording.is_whole and not recording.has_all_data:
+    if not recording.has_all_data:
         behind = f", {recording.lost_bytes} bytes behind them are not" if recording.lost_bytes else ""
         complain(
             f"{path}: its end is missing or damaged; {len(recording)} messages until {recording.duration:.2f} s"
