@@ -30,7 +30,8 @@ from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
-from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.realizer.perform.performance import BlockPerformance, SharedContext
+from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
 from engage_hri.services.realizer.plan.past import LASTING, Past
@@ -39,7 +40,6 @@ from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.together.live import Ending, Live, absence, told
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.realizer.together.planning import Planning
-from engage_hri.services.realizer.together.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.together.waiting_block import WaitingBlock
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.requests.silence import unfinished
@@ -58,14 +58,14 @@ class _Realizer:
         self.live: dict[str, Live] = {}
         self.performances: dict[str, BlockPerformance] = {}
         """Blocks of `live` that are being performed, by the id of the request."""
-        self.routes: dict[str, Moving] = {}
+        self.routes: dict[str, BlockPerformance] = {}
         self.peers = Presence()
         self.live_blocks = LiveBlocks(bus.now)
         self.endings = Past[Ending](bus.now)
         """How the blocks have ended that are over, by id."""
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
-        self.planning = Planning(bus, config, self.live_blocks, self.performing)
+        self.planning = Planning(bus, config, self.live_blocks, lambda: self.shared.performed())
         self.steering = Steering(bus, self.desk, config, self.live, self.performances, self.live_blocks)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,
@@ -146,7 +146,7 @@ class _Realizer:
                 performance.spoken.hear(word.behavior, word.position)
                 if performance.decisions.say(word.behavior, word.position, self.bus.local(word.at), self.bus.now()):
                     performance.take_in()
-                performance.held.tell()  # A voice that is held may stand now.
+                performance.tell_stuck()  # A voice that is held may stand now.
 
     async def _perform(self, live: Live) -> None:
         """Perform a block; an exception that nothing else catches ends this block only, and takes its parts home."""
