@@ -1,12 +1,11 @@
 """One behavior of a live block: an asyncio task that awaits its sync points, and talks to what performs it."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import EngageError, Fault
@@ -16,7 +15,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.futures import Reached, SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.phases import with_planned_hand
@@ -32,15 +31,6 @@ class Arrived(NamedTuple):
 
     point: Point
     at: Seconds
-
-
-class Reached(NamedTuple):
-    """A behavior has passed `point`. arrived: when it had come there, if it waited. by_body: told by the body."""
-
-    point: Point
-    at: Seconds
-    arrived: Seconds | None = None
-    by_body: bool = False
 
 
 class Lost(NamedTuple):
@@ -86,7 +76,7 @@ class BehaviorRun:
     pending: the request to what performs it.
     """
 
-    __slots__ = ("_asked", "_block", "_hold_changed", "behavior", "id", "pending")
+    __slots__ = ("_asked", "_block", "_hold_changed", "_points", "behavior", "id", "pending")
 
     def __init__(self, block: Stage, id: str) -> None:
         self.id = id
@@ -95,6 +85,7 @@ class BehaviorRun:
         self._block = block
         self._asked: Begin | Extend | None = None
         self._hold_changed: asyncio.Future[None] | None = None
+        self._points: Sequence[Point] = ()
 
     @property
     def is_by_body(self) -> bool:
@@ -114,7 +105,7 @@ class BehaviorRun:
             self._send()
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
-        """Take a report of the body."""
+        """Take a report of the body: it resolves the future of its sync point, which the behavior awaits."""
         block, point = self._block, Point(self.id, message.sync)
         if self.pending is None or self.pending.request.id != message.id or self.pending.outcome.done():
             return
@@ -122,10 +113,15 @@ class BehaviorRun:
         at = facts.plausible(point, bus.local(message.at), bus.now())
         if isinstance(message, SyncPointArrived):
             block.tell(Arrived(point, at))
-        else:
+        elif point in self._points:
             same = message.arrived == message.at
             arrived = at if same else facts.plausible(point, bus.local(message.arrived), at)
-            block.tell(Reached(point, at, arrived, by_body=True))
+            self._report(point, Reached(point, at, arrived, by_body=True))
+
+    def _report(self, point: Point, news: Reached | None) -> None:
+        """Resolve the future of a sync point. Earlier ones that nobody has reported are made good by this one."""
+        for each in self._points[: self._points.index(point) + 1]:
+            self._block.futures.report(each, news if each == point else None)
 
     async def perform(self) -> None:
         """Wait until it may begin, and perform it to its end."""
@@ -145,7 +141,7 @@ class BehaviorRun:
             case _ if performer(behavior) == "clock":
                 await self._wait(0.0)
             case _:
-                await self._by_body(behavior)
+                await self._by_body(behavior, chain.points)
 
     def _send(self) -> Pending:
         assert self.behavior is not None
@@ -153,11 +149,21 @@ class BehaviorRun:
         self.pending = self._block.body.perform(self.behavior, self._asked)
         return self.pending
 
-    async def _by_body(self, behavior: BlockBehavior) -> None:
+    async def _by_body(self, behavior: BlockBehavior, points: Sequence[Point]) -> None:
+        """Follow the body through the sync points of the behavior.
+
+        A report of the body resolves the future of a point: the behavior tells it, and the net fires. What the net
+        grants then is sent at once (`command`), whichever point the behavior awaits.
+        """
         block = self._block
         block.decisions.count_from(self.id, block.bus.now())
+        ended, self._points = self._send().outcome, points
+        ended.add_done_callback(lambda _: self._report(points[-1], None))
+        for point in points:
+            if (reached := await block.futures.reported(point)) is not None:
+                block.tell(reached)
         try:
-            outcome = await self._send().outcome
+            outcome = await ended
         except (RequestRefused, NeverEnded) as error:
             refused = isinstance(error, RequestRefused)
             self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
@@ -174,7 +180,7 @@ class BehaviorRun:
             unsaid = Fault(reason="nobody has renewed it", where=block.plan.block.id, cause="unrenewed")
             block.tell(BodyLost(outcome.fault or unsaid))
             return
-        facts, end = block.decisions.facts, Point(self.id, sync_points(behavior)[-1])
+        facts, end = block.decisions.facts, points[-1]
         at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
         if outcome.status == "taken_over":  # its last report may be lost
             block.tell(Reached(Point(self.id, outcome.passed), at, by_body=True))

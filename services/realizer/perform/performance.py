@@ -28,13 +28,12 @@ from engage_hri.services.realizer.perform.behavior_run import (
     BehaviorRun,
     BodyLost,
     Lost,
-    Reached,
     RunNews,
     Stage,
 )
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.ends_of_runs import all_ended
-from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.futures import Reached, SyncPointFutures
 from engage_hri.services.realizer.perform.net_stream import NetStream
 from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink

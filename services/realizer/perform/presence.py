@@ -1,4 +1,4 @@
-"""Which services are on the bus, or were."""
+"""Services that are on the bus, or were."""
 
 import asyncio
 
