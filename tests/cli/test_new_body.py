@@ -21,7 +21,7 @@ def test_it_writes_a_driver_that_keeps_the_contract_and_says_what_is_next(engage
     check, up = (line.split() for line in result.out.splitlines() if line.startswith("  engage "))
     assert up == ["engage", "up", "--body", "my_robot.py", "--voice", "silent"]
     checked = engage(*check[1:])
-    assert "42 laws hold, none is broken" in checked.out
+    assert "43 laws hold, none is broken" in checked.out
     assert checked.code == 0
 
 
