@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.commandline.embedding import embedded as embedded
     from engage_hri.services.control.bases.one_part_motion import OrdinaryBody as OrdinaryBody
+    from engage_hri.services.control.bases.setpoints import SetPointBody as SetPointBody
+    from engage_hri.services.control.bases.setpoints import SimulatedServos as SimulatedServos
     from engage_hri.services.control.contract.body import Arrived as Arrived
     from engage_hri.services.control.contract.body import BehaviorRefused as BehaviorRefused
     from engage_hri.services.control.contract.body import Body as Body
@@ -83,6 +85,7 @@ _PLACES = {
         "Reached",
     ),
     "engage_hri.services.control.bases.one_part_motion": ("OrdinaryBody",),
+    "engage_hri.services.control.bases.setpoints": ("SetPointBody", "SimulatedServos"),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
@@ -112,6 +115,8 @@ __all__ = [
     "RequestRefused",
     "Robot",
     "RunFailed",
+    "SetPointBody",
+    "SimulatedServos",
     "Speech",
     "SpeechOption",
     "Statistics",

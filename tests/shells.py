@@ -25,6 +25,7 @@ SHELLS = {
     "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/contract/body.py",  # the interface of bodies: coroutines
     "services/control/bases/one_part_motion.py",  # a body that moves on the loop's clock
+    "services/control/bases/setpoints.py",  # set points on the loop's clock
     "services/control/bases/composed.py",  # takes several bodies home at once
     "services/control/mujoco/film.py",  # hands pictures to ffmpeg
     "services/control/mujoco/pulse.py",  # steps of a physics on loop time

@@ -56,6 +56,7 @@ FAMILIES: dict[str, dict[str, str]] = {
         "session": "",
     },
     "bodies": {
+        "new-body": "Write a file with the driver of a robot that takes set points, to go on from.",
         "check-body": "Hold a body to the contract of bodies, and tell where it breaks which. Exit 1 if it breaks"
         " one.",
         "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate "

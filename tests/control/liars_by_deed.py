@@ -2,9 +2,11 @@
 
 import asyncio
 import math
+import time
 from collections.abc import AsyncGenerator, Iterable, Iterator
 from contextlib import aclosing
 from random import Random
+from select import select
 
 from msgspec.structs import replace
 
@@ -315,3 +317,23 @@ class Unending(Teller):
         now = self._loop.time()
         yield Reached(points[0], now, now)
         await asyncio.Event().wait()
+
+
+class Blocking(Teller):
+    """Waits for its motors in a call that blocks, as of a serial port."""
+
+    def tell(self, behavior, authority, progress):
+        if isinstance(behavior, Head):
+            select([], [], [], 0.03)  # seconds in which nothing comes, as on a port
+        return (progress,)
+
+
+class Pondering(Teller):
+    """Computes for long at a stretch."""
+
+    def tell(self, behavior, authority, progress):
+        if isinstance(behavior, Head):
+            until = time.thread_time() + 0.03
+            while time.thread_time() < until:
+                pass
+        return (progress,)

@@ -19,8 +19,10 @@ PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 CONTRACT = PAGE.with_name("contract.md")
 
 
-CODE, SDK, TEST, VOICE, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-"""The driver, a simulated SDK for it, its test, and a voice."""
+CODE, SDK, SET_POINTS, TEST, VOICE, *_ = re.findall(
+    r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
+)
+"""A driver, a simulated SDK for it, part of another driver, a test, and a voice."""
 
 
 @contextmanager

@@ -71,13 +71,6 @@ class Serial(Bare):
         self.settings = settings
 
 
-class Offering:
-    name, group = "offered", drivers.GROUP
-
-    def load(self) -> type[Body]:
-        return Bare
-
-
 @pytest.fixture
 def file(tmp_path: Path) -> Iterator[Path]:
     path = tmp_path / "my_robot.py"
@@ -115,16 +108,6 @@ async def test_a_driver_is_made_with_its_settings():
 
     assert isinstance(body, Serial)
     assert body.settings == Port(baud=4800)
-
-
-async def test_an_installed_package_offers_bodies(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(
-        "importlib.metadata.entry_points", lambda group: [Offering()] if group == drivers.GROUP else []
-    )
-
-    assert type(_made(ControlConfig(body="offered"))) is Bare
-    with pytest.raises(InputRefused, match="do you mean offered"):
-        drivers.made(ControlConfig(body="offred"))
 
 
 async def test_a_module_may_lie_in_the_current_folder(file: Path, monkeypatch: pytest.MonkeyPatch):

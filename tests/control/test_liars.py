@@ -49,6 +49,8 @@ LIARS: tuple[tuple[type[SimulatedBody], str, str], ...] = (
     (liars_by_deed.Wandering, "home_is_reached_from_anything", "the safe pose some time later"),
     (liars_by_deed.Homeless, "leaves_no_task_once_it_is_disconnected", "these go on: way home"),
     (liars_by_deed.Ticking, "leaves_no_task_once_it_is_disconnected", "this is set anew: Ticking.tick"),
+    (liars_by_deed.Blocking, "keeps_the_loop_free", "it waits: by `await asyncio.to_thread"),
+    (liars_by_deed.Pondering, "keeps_the_loop_free", "it computes: in a process of its own"),
     (liars_by_deed.Abrupt, "brakes_within_the_limits_of_its_joints", "degrees/s^2"),
     (liars_by_deed.Understating, "keeps_its_limits_whatever_comes", "speed of torso_turn"),
     (liars.Boaster, "a_later_behavior_takes_over_the_part", "taken_over"),

@@ -2,8 +2,8 @@
 
     body = made(config)             # of `control.body`, `control.voice` and `control.drivers`, inside the event loop
 
-A name is one of ours (`BUILT_IN`), an entry point of the group `engage_hri.bodies`, `package.module:Class`, which
-may lie in the current folder, or `FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
+A name is one that an installed package offers (`offers.py`), ours among them; `package.module:Class`, which may lie
+in the current folder; or `FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
 """
 
 import inspect
@@ -16,7 +16,7 @@ from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 from msgspec import Struct
@@ -28,28 +28,13 @@ from engage_hri.services.control.bases.composed import composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.bases.error_place import seen_at, words_of
 from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.bases.offers import BODIES, VOICES, Offer, offers, unreadable
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.installation import packages_command
 
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
-
-GROUP = "engage_hri.bodies"
-"""Group of entry points by which an installed package offers its drivers."""
-BUILT_IN = {
-    "simulated": "engage_hri.services.control.torso.body:SimulatedBody",
-    "silent": "engage_hri.services.control.voice.silent:SilentVoice",
-    "mujoco": "engage_hri.services.control.mujoco.body:MujocoBody",
-    "reachy_mini": "engage_hri.services.control.reachy_mini.body:ReachyMini",
-    "espeak": "engage_hri.services.control.voice.sounding:EspeakVoice",
-}
-"""Drivers of this package, each imported only when it is asked for."""
-VOICES = ("espeak", "silent")
-"""Those of them that are voices alone, and are offered where a voice is asked for."""
-EXTRAS = {"mujoco": "mujoco", "reachy_mini": "reachy-mini"}
-"""The extra of this package that a driver needs."""
 FORMS = "NAME, FILE.py:CLASS or package.module:CLASS"
+_OWN = __name__.partition(".")[0]
 Driver = Callable[..., Body]
 
 
@@ -87,7 +72,7 @@ def made(config: ControlConfig, *, is_guarded: bool = True) -> Body:
     for each in _asked(config):
         with _called(each):
             body = make(each, config)
-            if is_guarded and each.spec not in BUILT_IN:
+            if is_guarded and not type(body).__module__.startswith(f"{_OWN}."):
                 body = GuardedBody(each.spec, body)
             members.append(Member(each.spec, body, _parts(each, body, own_voice=not config.voice)))
     return composed(members)
@@ -149,25 +134,50 @@ def _is_configured(driver: Driver) -> bool:
 def load(spec: str, *, is_voice: bool = False) -> Driver:
     """Import a driver by its name. is_voice: only voices are offered for a wrong one. Raises InputRefused."""
     where, colon, name = spec.rpartition(":")
-    if spec in BUILT_IN:
-        where, _, name = BUILT_IN[spec].partition(":")
-        return _attribute(_imported(where, spec, EXTRAS.get(spec, "")), name, spec)
     if (file := where if colon else spec).endswith(".py"):
         module = _file(Path(file), spec)
         return _attribute(module, name, spec) if colon else _only(module, spec)
     if colon:
         _find_beside(Path.cwd())
         return _attribute(_imported(where, spec), name, spec)
-    offered = {point.name: point for point in _offered()}
-    if spec in offered:
-        try:
-            return offered[spec].load()  # type: ignore[no-any-return]
-        except Exception as error:
-            raise _refusal(f"it cannot be imported: {words_of(error)}", spec, seen_at(error)) from error
-    known = sorted({*(VOICES if is_voice else BUILT_IN), *offered})
+    return _offered(spec, is_voice=is_voice)
+
+
+def _offered(spec: str, *, is_voice: bool) -> Driver:
+    """Import the driver that an installed package offers under a name. Raises InputRefused."""
+    groups = (VOICES, BODIES) if is_voice else (BODIES, VOICES)
+    found = next(filter(None, ([each for each in offers(group) if each.name == spec] for group in groups)), [])
+    if not found:
+        raise _unknown(spec, [each.name for group in groups[: 1 if is_voice else 2] for each in offers(group)])
+    if len(found) > 1:
+        them = " and ".join(_package(each) for each in found)
+        raise _refusal(
+            f"two packages offer it: {them}", spec, "uninstall one, or name the class: package.module:CLASS"
+        )
+    (offer,) = found
+    try:
+        return offer.load()  # type: ignore[no-any-return]
+    except (Exception, SystemExit) as error:
+        whose = "it" if offer.is_ours else f"the driver of the package {_package(offer)}"
+        reason = f"{whose} cannot be imported: {words_of(error)}"
+        raise _refusal(reason, spec, offer.advice(error) or seen_at(error)) from error
+
+
+def _package(offer: Offer) -> str:
+    return f"{offer.package} {offer.version} ({offer.value})"
+
+
+def _unknown(spec: str, offered: Sequence[str]) -> InputRefused:
+    """Refuse a name that nobody offers, with the names that somebody does."""
+    known = sorted(set(offered))
+    if not known:  # not even our own: the source is newer than what is installed
+        return _refusal(f"no body {spec!r}", spec, f"install Engage once more: {packages_command('-e', '.')}")
     close = get_close_matches(spec, known, n=1)
     advice = f"do you mean {close[0]}? " if close else ""
-    raise _refusal(f"no body {spec!r}", spec, f"{advice}known are {', '.join(known)}; or {FORMS}")
+    advice += f"known are {', '.join(known)}; or {FORMS}"
+    if bad := unreadable():
+        advice += f"; the entry points of the package {', '.join(bad)} cannot be read"
+    return _refusal(f"no body {spec!r}", spec, advice)
 
 
 # -- parts and settings -------------------------------------------------------------------------------------------
@@ -214,29 +224,20 @@ def _given(asked: Named, driver: Driver, config: ControlConfig) -> tuple[Mapping
 
 def _known(config: ControlConfig) -> set[str]:
     """Names that settings may have."""
-    return {*(each.name for each in _asked(config)), *BUILT_IN, *(point.name for point in _offered())}
-
-
-def _offered() -> "EntryPoints":
-    """Entry points of the drivers of all installed packages."""
-    from importlib.metadata import entry_points  # loads the parser of e-mail, and a body of ours needs none
-
-    return entry_points(group=GROUP)
+    return {*(each.name for each in _asked(config)), *(each.name for each in (*offers(BODIES), *offers(VOICES)))}
 
 
 # -- imports ------------------------------------------------------------------------------------------------------
 
 
-def _imported(module: str, spec: str, extra: str = "") -> ModuleType:
+def _imported(module: str, spec: str) -> ModuleType:
     try:
         return import_module(module)
     except Exception as error:
         advice = seen_at(error)
         if isinstance(error, ModuleNotFoundError):
             missing = error.name or ""
-            if extra:
-                advice = extra_command(extra)
-            elif missing and f"{module}.".startswith(f"{missing}."):
+            if missing and f"{module}.".startswith(f"{missing}."):
                 advice = f"is the package installed here? Of a file: {FORMS.partition(', ')[2]}"
         raise _refusal(f"it cannot be imported: {words_of(error)}", spec, advice) from error
 

@@ -2,7 +2,7 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Mapping, Sequence
 from typing import ClassVar
 
 from engage_hri.schemas.behavior_types import TYPES
@@ -70,8 +70,11 @@ class DrivenBody(Body):
         """Measure the joint angles, radians."""
 
     @abstractmethod
-    def go(self, goal: Angles, seconds: Seconds) -> None:
+    def go(self, goal: Angles, seconds: Seconds) -> Awaitable[None] | None:
         """Command the motors to a goal, and return at once.
+
+        It may be a coroutine, for an SDK that blocks: `await asyncio.to_thread(...)` in it. While one is under way no
+        other begins; then the last goal is sent.
 
         goal: the angle of each joint, radians.
         seconds: time in which they are to be there, from wherever they are, seconds.

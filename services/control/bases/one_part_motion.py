@@ -75,6 +75,12 @@ class OrdinaryBody(DrivenBody):
         self._goal: Angles | None = None
         """Where the joints are on their way to; None: they stand."""
         self._is_open = False
+        self._sending: asyncio.Future[None] | None = None
+        """Of a command that takes time."""
+        self._next: tuple[Angles, Seconds] | None = None
+        """The command that comes after that one."""
+        self._failure: Exception | None = None
+        """What the motors have answered to a command since it was sent; the motion that waits raises it."""
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -86,6 +92,9 @@ class OrdinaryBody(DrivenBody):
             yield
         finally:
             self._is_open = False
+            if self._sending is not None:
+                self._sending.cancel()
+                await asyncio.gather(self._sending, return_exceptions=True)
             await self.close()
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
@@ -260,6 +269,8 @@ class OrdinaryBody(DrivenBody):
                 to, began = goal(), _now()
                 seconds = self._command(to)
                 time.set(sync, began + self.patience * seconds + 1.0)
+            elif self._failure is not None:
+                raise self._failure
             elif time.due(_now()) is not None:
                 raise BodyFailed(self._short(goal(), sync, _now() - began, seconds))
             await asyncio.sleep(1.0 / self.rate)
@@ -278,9 +289,35 @@ class OrdinaryBody(DrivenBody):
     def _command(self, goal: Angles) -> Seconds:
         """Command the motors. Returns the time that is planned until the joints are measured there."""
         seconds = self._seconds(self._measured(), goal)
-        self._goal = goal
-        self.go(goal, max(0.0, seconds - self.settling))
+        self._goal, self._failure = goal, None
+        self._next = (goal, max(0.0, seconds - self.settling))
+        self._send_next()
         return seconds
+
+    def _send_next(self) -> None:
+        """Send the command that is due, or, while one that takes time is under way, the last one after it.
+
+        Two at once would reach the motors in any order.
+        """
+        while self._next is not None and self._sending is None:
+            command, self._next = self._next, None
+            if (sent := self.go(*command)) is not None:
+                self._sending = asyncio.ensure_future(sent)
+                self._sending.add_done_callback(self._was_sent)
+
+    def _was_sent(self, sent: "asyncio.Future[None]") -> None:
+        self._sending = None
+        if sent.cancelled():
+            return
+        try:
+            sent.result()
+            self._send_next()
+        except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        """Let the motion fail that is under way, since the motors did not take a command."""
+        self._failure = error
 
     def _note_arrival(self, angles: Angles) -> None:
         """Note that a motion that nobody waits for has come to its end."""

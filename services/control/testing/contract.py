@@ -10,6 +10,7 @@ Each test is a law. Its docstring says what holds, and, after that, what it usua
 
 from engage_hri.services.control.testing.claims import ClaimLaws
 from engage_hri.services.control.testing.endings import EndingLaws
+from engage_hri.services.control.testing.freedom import FreedomLaws
 from engage_hri.services.control.testing.holding import HoldingLaws
 from engage_hri.services.control.testing.looking import LookingLaws
 from engage_hri.services.control.testing.points import PointsLaws
@@ -19,6 +20,6 @@ from engage_hri.services.control.testing.truth import TruthLaws
 
 
 class BodyContract(
-    PointsLaws, HoldingLaws, EndingLaws, TakeoverLaws, PredictionLaws, ClaimLaws, TruthLaws, LookingLaws
+    PointsLaws, HoldingLaws, EndingLaws, TakeoverLaws, PredictionLaws, ClaimLaws, TruthLaws, LookingLaws, FreedomLaws
 ):
     """All laws of the contract. Subclass it in a test file; `Suite` has what a subclass may set."""

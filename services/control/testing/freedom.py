@@ -1,0 +1,108 @@
+"""Law of the loop: a body never keeps others from their turn.
+
+All services of a process share one event loop. While a driver waits for its SDK in a call that blocks, as of a serial
+port or of HTTP, no sync point is told, no keep-alive is sent, and other behaviors stand. In virtual time nothing of
+this shows: the clock stands as well.
+
+A machine that is busy takes the processor away in any call, which is no fault of a driver. So what counts is how long
+a call computes, by the clock of the thread, and how long it takes where it has *given* the processor away, which the
+system counts apart from what it takes away. The best of several tries is judged.
+"""
+
+import asyncio
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.contract.body import Body
+from engage_hri.services.control.testing.laws import broken, ms
+from engage_hri.services.control.testing.motions import recorded
+from engage_hri.services.control.testing.stage import done
+from engage_hri.services.control.testing.suite import Suite
+
+LONGEST: Seconds = 0.02
+"""Most that one call of the loop may hold it: less than half of the time in which a point has to be told."""
+TRIES = 3
+
+
+class FreedomLaws(Suite):
+    """Part of `BodyContract`."""
+
+    topic = "the loop"
+
+    async def test_keeps_the_loop_free(self, body: Body) -> None:
+        """Nothing that a body does holds the loop for more than 20 ms: others have their turn meanwhile.
+
+        Usually `go`, `angles` or a task of the driver calls an SDK that blocks (a serial port, HTTP, `time.sleep`):
+        `await asyncio.to_thread(...)` in the driver, or a process of its own for the SDK.
+        """
+        for case in self.cases(body):
+            async with case as behavior:
+                turns: list[Turn] = []
+                while len(turns) < TRIES and (not turns or turns[-1].held > LONGEST):
+                    async with recorded(body):
+                        with longest_turn() as turn:
+                            body.see(self.world)
+                            await done(body, behavior)
+                            await body.home()
+                    turns.append(turn)
+                best = min(turns, key=lambda each: each.held)
+                if best.held > LONGEST:
+                    broken(
+                        behavior,
+                        expected=f"at most {ms(LONGEST)} in one call of the loop",
+                        measured=f"{ms(best.held)}, of which it computes {ms(best.computes)}",
+                        advice="it computes: in a process of its own, or with an `await` in between"
+                        if best.computes > best.held / 2
+                        else "it waits: by `await asyncio.to_thread(...)`, or in a process of its own",
+                    )
+
+
+class Turn(Struct):
+    """The longest turn of the loop. held: time for which it is to blame. computes: time of the processor in it."""
+
+    held: Seconds = 0.0
+    computes: Seconds = 0.0
+
+
+@contextmanager
+def longest_turn() -> Iterator[Turn]:
+    """Time each call that the running loop makes meanwhile. What is given to it before is not timed."""
+    loop, longest = asyncio.get_running_loop(), Turn()
+    soon, at = loop.call_soon, loop.call_at
+
+    def timed(callback: Callable[..., object], *args: Any) -> None:
+        waits, computed, since = _waits(), time.thread_time(), time.perf_counter()
+        try:
+            callback(*args)
+        finally:
+            took, computes = time.perf_counter() - since, time.thread_time() - computed
+            held = took if waits is None or _waits() != waits else computes
+            if held > longest.held:
+                longest.held, longest.computes = held, computes
+
+    loop.call_soon = lambda callback, *args, context=None: soon(  # type: ignore[method-assign]
+        partial(timed, callback), *args, context=context
+    )
+    loop.call_at = lambda when, callback, *args, context=None: at(  # type: ignore[method-assign]
+        when, partial(timed, callback), *args, context=context
+    )
+    try:
+        yield longest
+    finally:
+        del loop.call_soon, loop.call_at
+
+
+def _waits() -> int | None:
+    """Count how often this thread has given the processor away by itself; None: this system does not tell."""
+    if sys.platform != "linux":
+        return None
+    from resource import RUSAGE_THREAD, getrusage
+
+    return getrusage(RUSAGE_THREAD).ru_nvcsw
