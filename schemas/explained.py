@@ -10,7 +10,10 @@ from msgspec import Struct
 
 
 def explained(error: msgspec.ValidationError, kind: Any) -> tuple[str, str]:
-    """Explain an error of a value of this type: what is wrong and would be right, and the key; empty: the whole."""
+    """Explain an error of a value of this type: what is wrong and would be right, and the key; empty: the whole.
+
+    A type may have a table `FIXED` of keys that it had once, with the value that each of them has for good.
+    """
     reason, _, place = str(error).partition(" - at `$")
     key = place.strip("`").lstrip(".")
     kinds = _inside(kind, key)
@@ -18,6 +21,9 @@ def explained(error: msgspec.ValidationError, kind: Any) -> tuple[str, str]:
         choices = [repr(choice) for each in kinds for choice in _choices(each)]
         reason = f"{reason.removeprefix('Invalid enum value ')} is none of {', '.join(choices)}"
     elif unknown := re.fullmatch(r"Object contains unknown field `(.*)`", reason):
+        fixed = {name: value for each in kinds for name, value in getattr(each, "FIXED", {}).items()}
+        if unknown[1] in fixed:
+            return f"`{unknown[1]}` is no setting any more, it is fixed at {fixed[unknown[1]]}; take it out", key
         fields = [field for each in kinds for field in getattr(each, "__struct_fields__", ())]
         close = get_close_matches(unknown[1], fields, n=1)
         known = f"do you mean `{close[0]}`?" if close else f"known are {', '.join(fields)}"

@@ -1,8 +1,11 @@
+import ast
 import re
+from contextlib import suppress
 from pathlib import Path
-from typing import get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import pytest
+from msgspec.structs import fields
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.config import BusConfig, Mode, mode_of
@@ -96,9 +99,8 @@ def test_a_bad_setting_is_refused_with_its_key(setting: str, reason: str) -> Non
 @pytest.mark.parametrize(
     ("setting", "reason"),
     [
-        ("collaboration.pause=-1", "pause must not be negative"),
+        ("collaboration.placement=-1", "placement must not be negative"),
         ("collaboration.attempts=0", "attempts must be at least 1"),
-        ("collaboration.piece_reliability=1.0", r"piece_reliability must be in \(0, 1\)"),
         ("realizer.late=-0.1", "late must not be negative, not -0.1, in `realizer`"),
         ("realizer.abort=inf", "abort must be a finite number, not inf, in `realizer`"),
         ("realizer.stall=0.0", "stall and stall_factor must not be below late and late_factor"),
@@ -111,6 +113,50 @@ def test_a_bad_setting_is_refused_with_its_key(setting: str, reason: str) -> Non
 def test_a_number_out_of_its_range_is_refused_and_says_the_range(setting: str, reason: str) -> None:
     with pytest.raises(InputRefused, match=reason):
         load(settings=[setting])
+
+
+@pytest.mark.parametrize(
+    ("setting", "reason"),
+    [
+        (
+            "collaboration.pause=0.5",
+            "`pause` is no setting any more, it is fixed at 0.4; take it out",
+        ),
+        (
+            "simulation.stochastic.hears=1",
+            "`stochastic` is no setting any more, it is fixed at what",
+        ),
+    ],
+)
+def test_a_former_setting_is_refused_with_the_value_that_it_has_now(setting: str, reason: str) -> None:
+    with pytest.raises(InputRefused, match=re.escape(reason)):
+        load(settings=[setting])
+
+
+SECTIONS = [
+    (section.name, type(value).FIXED)
+    for section in fields(Config)
+    if hasattr(type(value := section.default), "FIXED")
+]
+
+
+@pytest.mark.parametrize(("section", "fixed"), SECTIONS)
+def test_a_former_setting_has_the_value_of_a_constant_with_its_name(section: str, fixed: Any) -> None:
+    constants: dict[str, set[object]] = {}
+    for path in (ROOT / "services" / section).rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            match node:
+                case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                    with suppress(ValueError, TypeError, SyntaxError):
+                        constants.setdefault(name, set()).add(ast.literal_eval(node.value))  # type: ignore[arg-type]
+
+    wrong = {
+        name: value
+        for name, value in fixed.items()
+        if not isinstance(value, str) and value not in constants.get(name.upper(), ())
+    }
+    assert fixed
+    assert not wrong
 
 
 def test_a_setting_is_stronger_than_an_option_of_the_simulation_and_the_robots_name_than_a_setting() -> None:
