@@ -1,6 +1,7 @@
 """Explanation of a value that is not of its type: what is wrong, what would be right, and the key."""
 
 import re
+from collections.abc import Mapping
 from difflib import get_close_matches
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -29,6 +30,21 @@ def explained(error: msgspec.ValidationError, kind: Any) -> tuple[str, str]:
         known = f"do you mean `{close[0]}`?" if close else f"known are {', '.join(fields)}"
         reason = f"unknown key `{unknown[1]}`; {known}"
     return reason, key
+
+
+def without_former(table: Any, kind: Any) -> Any:
+    """The table without keys that this type had once, where it gives them the value that they have for good.
+
+    Files and recordings from before stay good so long as they ask for nothing else.
+    """
+    if not isinstance(table, Mapping) or not _is_struct(kind):
+        return table
+    fixed, inner = getattr(kind, "FIXED", {}), get_type_hints(kind)
+    return {
+        key: without_former(value, inner.get(key))
+        for key, value in table.items()
+        if key not in fixed or msgspec.json.decode(msgspec.json.encode(fixed[key])) != value
+    }
 
 
 def _inside(kind: Any, key: str) -> list[Any]:

@@ -14,6 +14,7 @@ from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.commandline.shell.roster import NAMES, service
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.commandline.study import simulate
+from engage_hri.services.recognition.config import RecognitionConfig, Sensing
 from engage_hri.services.runtime.configuration import read
 from engage_hri.services.simulation.config import HumanKind
 
@@ -133,11 +134,22 @@ def test_a_former_setting_is_refused_with_the_value_that_it_has_now(setting: str
         load(settings=[setting])
 
 
+def test_a_former_setting_that_asks_for_the_value_that_it_has_now_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "engage.toml"
+    path.write_text("[recognition]\nwindow = 20.0\nturn_patience = 12\nsensing.robot_face = [0.05, 0, 1.17]\n")
+
+    assert load(path).recognition == RecognitionConfig(window=20.0)
+    path.write_text("[recognition]\nsensing.dwell = 0.2\n")
+    with pytest.raises(InputRefused, match=r"`dwell` is no setting any more, it is fixed at 0\.15"):
+        load(path)
+
+
 SECTIONS = [
     (section.name, type(value).FIXED)
     for section in fields(Config)
     if hasattr(type(value := section.default), "FIXED")
 ]
+SECTIONS.append(("recognition", Sensing.FIXED))
 
 
 @pytest.mark.parametrize(("section", "fixed"), SECTIONS)
