@@ -145,7 +145,7 @@ def test_the_robot_says_what_it_says_in_appendix_b(step: str, words: str) -> Non
 
 @pytest.mark.parametrize("mode", ["scripted", "task"])
 def test_when_somebody_leaves_the_robot_goes_on_with_who_is_there_then(mode: str) -> None:
-    player, the_manager = Player(people=("ann", "ben")), manager(arrival=4.0)
+    player, the_manager = Player(people=("ann", "ben")), manager()
     plan = script(the_manager, appendix_b.turns(the_manager)) if mode == "scripted" else task(the_manager)
     performed = player.play(plan)
     spoken_to = [fragment.addressee for fragment in performed]

@@ -17,13 +17,13 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.perceive.words import HeardWords
+from engage_hri.services.recognition.perceive.words import WORDS_MARGIN, HeardWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer
 from tests.recognition.observations import ROBOT, stamp, world
 
 PEOPLE = ("ann", "bob", "carl")
-MARGIN = 5
-CONFIG = RecognitionConfig(words_margin=MARGIN / 10, words_patience=1e6)
+MARGIN = round(10 * WORDS_MARGIN)
+CONFIG = RecognitionConfig(words_patience=1e6)
 LENGTH = 300
 """Tenths of a second of a talk."""
 
