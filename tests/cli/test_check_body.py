@@ -7,6 +7,8 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from unittest.mock import patch
 
@@ -14,8 +16,10 @@ import pytest
 from rich.console import Console
 
 from engage_hri.schemas.body import Capabilities, JointLimit
-from engage_hri.services.control.testing.render import rendered
+from engage_hri.services.control.testing.check import check
+from engage_hri.services.control.testing.render import Printed
 from engage_hri.services.control.testing.report import BodyReport, Stated
+from engage_hri.services.control.torso.body import SimulatedBody
 from tests.cli.command import Engage
 
 DRIVERS = '''
@@ -314,6 +318,26 @@ def test_who_is_stopped_leaves_the_robot(drivers: Path, stop: signal.Signals, co
     assert "reports every sync point once and in order" in out
 
 
+def test_a_law_is_told_as_it_is_judged() -> None:
+    out, told = io.StringIO(), list[str]()
+
+    class Reading(SimulatedBody):
+        @asynccontextmanager
+        async def connected(self) -> AsyncIterator[None]:
+            told.append(out.getvalue())
+            async with super().connected():
+                yield
+
+    stated = Stated(tolerance=0.1, noise=0.0, accuracy=0.02)
+    check(Reading, stated, driver="reading", law="aborted", printed=Printed(Console(file=out)))
+
+    looked, first, second, *_ = told
+    assert looked == ""
+    assert "held to the contract" in first
+    assert "holds" not in first
+    assert second.count("holds   ") == 1
+
+
 @pytest.mark.parametrize("is_seen", [True, False])
 def test_the_speeds_that_joints_were_seen_to_have_are_beside_those_that_the_body_states(is_seen: bool) -> None:
     able = Capabilities(
@@ -328,7 +352,7 @@ def test_the_speeds_that_joints_were_seen_to_have_are_beside_those_that_the_body
         not_asked=(), unknown=(), estimate=0.0, fastest={"tilt": 0.25} if is_seen else {},
     )  # fmt: skip
     out = io.StringIO()
-    Console(file=out, width=120).print(rendered(report))
+    Printed(Console(file=out, width=120)).end(report)
 
     lines = [re.split(r"  +", line.strip()) for line in out.getvalue().splitlines()]
     head = next(number for number, line in enumerate(lines) if line[0] == "joint")

@@ -1,10 +1,9 @@
 """Command `engage check-body`: hold a body to the contract of bodies, and say what to do where it breaks it."""
 
 import math
-import shutil
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -25,7 +24,6 @@ from engage_hri.services.runtime.installation import extra_command
 if TYPE_CHECKING:
     from engage_hri.services.control.config import ControlConfig
     from engage_hri.services.control.contract.body import Body
-    from engage_hri.services.control.testing.check import Progress
 
 BROKEN = 1
 """Exit code if a law is broken, or none could be checked."""
@@ -66,7 +64,7 @@ def main(options: Options) -> int:
         reason = f"check-body needs {' and '.join(missing).replace('_', '-')}"
         raise InputRefused(Fault(reason=reason, advice=extra_command("check")))
     from engage_hri.services.control.testing.check import check
-    from engage_hri.services.control.testing.render import rendered
+    from engage_hri.services.control.testing.render import Printed
     from engage_hri.services.control.testing.report import Stated, as_json
 
     stated = Stated(
@@ -74,14 +72,14 @@ def main(options: Options) -> int:
         real_time=options.real_time, world=read_world(options.world) if options.world else None,
     )  # fmt: skip
     end_like_ctrl_c()
-    # What a driver prints is no part of the report.
-    with redirect_stdout(sys.stderr), _told_progress() as progress:
+    printed = None if options.json else Printed(Terminal(highlight=False, file=sys.stdout))
+    with redirect_stdout(sys.stderr):  # what a driver prints is no part of the report
         make = maker(options.body, options.load().control)
-        report = check(make, stated, driver=options.body, law=options.law, progress=progress)
-    if options.json:
+        report = check(make, stated, driver=options.body, law=options.law, printed=printed)
+    if printed is None:
         print_format(as_json(report))
     else:
-        Terminal(highlight=False).print(rendered(report))
+        printed.end(report)
     if report.is_stopped:
         raise KeyboardInterrupt
     return DONE if report.is_good else BROKEN
@@ -94,20 +92,3 @@ def maker(name: str, config: "ControlConfig") -> "Callable[[], Body]":
     asked = replace(config, body=name)
     drivers.check(asked)
     return partial(drivers.made, asked, is_guarded=False)
-
-
-@contextmanager
-def _told_progress() -> "Iterator[Progress | None]":
-    """Tell on one line of a terminal which law is tried. Somewhere else nothing is told."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    columns = shutil.get_terminal_size().columns
-
-    def tell(law: str, done: int, count: int) -> None:
-        print(f"\r\x1b[K{f'{done} of {count}: {law}':.{columns - 1}}", end="", file=sys.stderr, flush=True)
-
-    try:
-        yield tell
-    finally:
-        print("\r\x1b[K", end="", file=sys.stderr, flush=True)

@@ -8,7 +8,6 @@ make no way any more fails with the name of the joint. The face is a screen: it 
 import math
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
 from contextlib import aclosing, asynccontextmanager
-from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -34,7 +33,7 @@ from engage_hri.services.control.mujoco import along
 from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, refuse, told
-from engage_hri.services.control.mujoco.film import Film, Frame
+from engage_hri.services.control.mujoco.film import Frame, filmed
 from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.pulse import TICK, Pulse
 from engage_hri.services.control.mujoco.settings import MujocoSettings
@@ -95,20 +94,13 @@ class MujocoBody(SimulatedBody):
         """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
         async with super().connected():
             film = film_of(self.bench.model, self._settings)
-            if film is not None:
-                self.pulse.on_step = partial(self._film, film)
-                self.pulse.wake()
             try:
-                yield
+                async with filmed(film, self.frame):
+                    yield
             finally:
-                self.pulse.on_step = lambda at: None
                 self.pulse.stop()
                 if film is not None:
                     finish(film, self._settings)
-
-    def _film(self, film: Film, at: Seconds) -> None:
-        if film.is_due(at):
-            film.take(self.frame())
 
     def frame(self) -> Frame:
         """The body as a film shows it now."""

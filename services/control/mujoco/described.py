@@ -4,7 +4,7 @@ import math
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from contextlib import aclosing, asynccontextmanager
 from copy import copy
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 import msgspec
@@ -21,7 +21,7 @@ from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, refuse, told
-from engage_hri.services.control.mujoco.film import Film, Frame
+from engage_hri.services.control.mujoco.film import Frame, filmed
 from engage_hri.services.control.mujoco.filming import film_of, finish, framed
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb
@@ -65,21 +65,14 @@ class DescribedBody(ComposedBody):
     async def connected(self) -> AsyncIterator[None]:
         """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
         async with super().connected():
-            film, pulse = film_of(self.stage.physics.model, self._settings), self.stage.pulse
-            if film is not None:
-                pulse.on_step = partial(self._film, film)
-                pulse.wake()
+            film = film_of(self.stage.physics.model, self._settings)
             try:
-                yield
+                async with filmed(film, self.frame):
+                    yield
             finally:
-                pulse.on_step = lambda at: None
-                pulse.stop()
+                self.stage.pulse.stop()
                 if film is not None:
                     finish(film, self._settings)
-
-    def _film(self, film: Film, at: Seconds) -> None:
-        if film.is_due(at):
-            film.take(self.frame())
 
     def frame(self) -> Frame:
         """The robot as a film shows it now."""

@@ -3,10 +3,11 @@
 Drawing a picture takes some tenths of a second without a GPU, so nothing is drawn while the body moves.
 """
 
+import asyncio
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from contextlib import asynccontextmanager, suppress
 from itertools import pairwise
 from math import ceil
 from pathlib import Path
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 RATE = 12.0
 """Pictures a second."""
+SEEN = 0.01
+"""Share of its way by which a part of the face is moved at least where a new picture shows it: half a millimetre."""
 FORMATS = (".mp4", ".webp", ".gif", ".png")
 
 
@@ -42,16 +45,12 @@ class Frame(Struct, frozen=True, kw_only=True):
 
 
 class Film:
-    """Frames of one model as they come, a picture every so often at most. `write` draws them."""
+    """Frames of one model as they come. `write` draws them. interval: from one picture to the next, seconds."""
 
     def __init__(self, model: mujoco.MjModel, rate: float = RATE) -> None:
         self._model = model
-        self._interval = 1.0 / rate
+        self.interval = 1.0 / rate
         self.frames: list[Frame] = []
-
-    def is_due(self, at: Seconds) -> bool:
-        """True if it is time for another frame."""
-        return not self.frames or at >= self.frames[-1].at + self._interval - 1e-9
 
     def take(self, frame: Frame) -> None:
         self.frames.append(frame)
@@ -70,11 +69,11 @@ class Film:
             frames = self.frames if path.suffix != ".png" else _chosen(self.frames, 12)
             pictures = self._pictures(camera, frames, view)
             if path.suffix == ".mp4":
-                _write_mp4(path, frames, pictures, self._interval)
+                _write_mp4(path, frames, pictures, self.interval)
             elif path.suffix == ".png":
                 _write_sheet(path, frames, list(pictures))
             else:
-                _write_animation(path, frames, list(pictures), self._interval)
+                _write_animation(path, frames, list(pictures), self.interval)
         finally:
             camera.close()
 
@@ -90,8 +89,45 @@ class Film:
         return camera.picture(data, frame.drawn, view)
 
     def _pictures(self, camera: Camera, frames: Sequence[Frame], view: View) -> Iterator[Picture]:
-        for frame in frames:
-            yield _captioned(self.picture(camera, frame, view), frame, frames[0].at)
+        return (self.picture(camera, frame, view) for frame in frames)
+
+
+@asynccontextmanager
+async def filmed(film: Film | None, frame: Callable[[], Frame]) -> AsyncIterator[None]:
+    """Film what happens meanwhile: a picture at its time, if it shows anything new.
+
+    The clock of the film is its own. Motors stand while a voice, lips or lids move, and the physics with them.
+    film: None: nothing is filmed. frame: what there is to be seen now.
+    """
+    if film is None:
+        yield
+        return
+    filming = asyncio.create_task(_film(film, frame), name="film")
+    try:
+        yield
+    finally:
+        filming.cancel()
+        await asyncio.gather(filming, return_exceptions=True)
+
+
+async def _film(film: Film, frame: Callable[[], Frame]) -> None:
+    loop = asyncio.get_running_loop()
+    began, number = loop.time(), 0
+    while True:
+        new = frame()
+        if not film.frames or _differ(film.frames[-1], new):
+            film.take(new)
+        number = max(number, int((loop.time() - began) / film.interval)) + 1
+        await asyncio.sleep(began + number * film.interval - loop.time())
+
+
+def _differ(one: Frame, other: Frame) -> bool:
+    """True if two frames do not look the same."""
+    if one.caption != other.caption or one.drawn != other.drawn:
+        return True
+    if any(abs(angle - other.pose[joint]) > SEEN for joint, angle in one.pose.items()):
+        return True
+    return not (np.array_equal(one.qpos, other.qpos) and np.array_equal(one.mocap, other.mocap))
 
 
 def check(path: Path) -> None:
@@ -132,14 +168,14 @@ def show_face(model: mujoco.MjModel, pose: Mapping[str, float]) -> None:
             geom.quat[:] = face.turned(name, stroke)
 
 
-def _captioned(picture: Picture, frame: Frame, since: Seconds) -> Picture:
-    """Add the time and what is said."""
+def _captioned(picture: Picture, frame: Frame, time: Seconds) -> Picture:
+    """Add what is said, and the time since the film began."""
     from PIL import Image, ImageDraw, ImageFont
 
     image = Image.fromarray(picture)
     draw = ImageDraw.Draw(image)
     font = ImageFont.load_default(18)
-    _text(draw, (12, 8), f"{frame.at - since:5.2f} s", font)
+    _text(draw, (12, 8), f"{time:5.2f} s", font)
     if frame.caption:
         width = draw.textlength(frame.caption, font=font)
         _text(draw, ((picture.shape[1] - width) / 2, picture.shape[0] - 34), frame.caption, font)
@@ -157,13 +193,19 @@ def _chosen(frames: Sequence[Frame], count: int) -> list[Frame]:
     return [frames[round(number * (len(frames) - 1) / (count - 1))] for number in range(count)]
 
 
+def _timed(frames: Sequence[Frame], pictures: Sequence[Picture]) -> Iterator[Picture]:
+    """Caption each picture with the time of its frame."""
+    for frame, picture in zip(frames, pictures, strict=True):
+        yield _captioned(picture, frame, frame.at - frames[0].at)
+
+
 def _write_sheet(path: Path, frames: Sequence[Frame], pictures: Sequence[Picture]) -> None:
     from PIL import Image
 
     columns = min(4, len(pictures))
     height, width, _ = pictures[0].shape
     sheet = Image.new("RGB", (columns * width // 2, ceil(len(pictures) / columns) * height // 2))
-    for number, picture in enumerate(pictures):
+    for number, picture in enumerate(_timed(frames, pictures)):
         small = Image.fromarray(picture).resize((width // 2, height // 2))
         sheet.paste(small, (number % columns * width // 2, number // columns * height // 2))
     sheet.save(path)
@@ -172,7 +214,7 @@ def _write_sheet(path: Path, frames: Sequence[Frame], pictures: Sequence[Picture
 def _write_animation(path: Path, frames: Sequence[Frame], pictures: Sequence[Picture], last: Seconds) -> None:
     from PIL import Image
 
-    images = [Image.fromarray(picture) for picture in pictures]
+    images = [Image.fromarray(picture) for picture in _timed(frames, pictures)]
     spans = [round(1000 * (later.at - frame.at)) for frame, later in pairwise(frames)]
     durations = [*spans, round(1000 * last)]
     images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)
@@ -191,11 +233,11 @@ def _write_mp4(path: Path, frames: Sequence[Frame], pictures: Iterator[Picture],
                 stdin=subprocess.PIPE,
             )  # fmt: skip
         until = frames[number + 1].at if number + 1 < len(frames) else frame.at + interval
-        times = round((until - frames[0].at) / interval) - shown
-        shown += max(0, times)
         assert program.stdin is not None
-        with suppress(BrokenPipeError):  # what it has ended with is told below
-            program.stdin.write(picture.tobytes() * max(0, times))
+        while shown < round((until - frames[0].at) / interval):  # a body that stands is shown on, with the time
+            with suppress(BrokenPipeError):  # what it has ended with is told below
+                program.stdin.write(_captioned(picture, frame, shown * interval).tobytes())
+            shown += 1
     if program is not None:
         program.communicate()
         if program.returncode:

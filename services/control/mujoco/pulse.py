@@ -26,7 +26,7 @@ class Pulse:
         self._is_awake = False
         self._next: asyncio.TimerHandle | None = None
         self.on_step: Callable[[Seconds], None] = lambda at: None
-        """Called after each step, for a film."""
+        """Called after each step, for those who look at the physics."""
 
     def now(self) -> Seconds:
         """Loop time."""

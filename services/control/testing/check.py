@@ -7,6 +7,7 @@ import asyncio
 import os
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from inspect import getdoc
@@ -29,22 +30,21 @@ from engage_hri.services.control.testing.laws import Finding, named
 from engage_hri.services.control.testing.motions import unused
 from engage_hri.services.control.testing.playing import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
+from engage_hri.services.control.testing.render import Printed
 from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
 from engage_hri.services.control.testing.suite import PLUGIN, Suite, unchecked
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
 
 Make = Callable[[], Body]
-Progress = Callable[[str, int, int], None]
-"""Called with the law that is tried, and the numbers of trials done and in all."""
 _judged: list[type[BodyContract]] = []
 """The class that the file of the running check takes."""
 
 
-def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: Progress | None = None) -> BodyReport:
+def check(make: Make, stated: Stated, *, driver: str, law: str = "", printed: Printed | None = None) -> BodyReport:
     """Check a body against the contract.
 
     make: makes it, in a running event loop. driver: its name, for the report. law: only laws whose names have these
-    words; empty: all. progress: see `Progress`.
+    words; empty: all. printed: is told of each law as it is judged.
 
     Ctrl-C ends it with what was judged so far; while it is only looked at, with KeyboardInterrupt.
 
@@ -55,7 +55,7 @@ def check(make: Make, stated: Stated, *, driver: str, law: str = "", progress: P
     report = _reported(seen, stated, driver)
     if not seen.is_there:
         return replace(report, seconds=time.monotonic() - since)
-    collected = _Collected(law.lower().replace("`", ""), progress)
+    collected = _Collected(law.lower().replace("`", ""), report, printed)
     suite = _suite(make, stated, seen)
     with _judging(suite) as arguments:
         code = pytest.main(arguments, plugins=[collected])
@@ -165,25 +165,32 @@ class _Tried:
         self.findings: dict[Finding, None] = {}
         self.reasons: dict[str, None] = {}
 
+    def law(self, name: str) -> CheckedLaw:
+        """Judge the law by them. name: of the law, in words."""
+        return CheckedLaw(
+            law=name, topic=self.topic, says=self.says, usually=self.usually, trials=self.trials,
+            verdict=verdict(self.findings, self.passed), findings=tuple(self.findings), reasons=tuple(self.reasons),
+            seconds=self.seconds,
+        )  # fmt: skip
+
 
 class _Collected:
     """A plugin of pytest that keeps what each law found."""
 
-    def __init__(self, words: str, progress: Progress | None) -> None:
-        self._words = words
-        self._progress = progress
+    def __init__(self, words: str, report: BodyReport, printed: Printed | None) -> None:
+        self._words, self._report, self._printed = words, report, printed
         self._tried: dict[str, _Tried] = {}
-        self._done = self._count = 0
-        self._asked: dict[str, None] = {}
-        """Names of all laws that were asked for, in their order."""
+        self._asked: Counter[str] = Counter()
+        """Trials of all laws that were asked for, in their order."""
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Keep the laws that were asked for, by topic and in the order in which they are written."""
         kept = [item for item in items if self._words in _words(item)]
         order = {topic: number for number, topic in enumerate(TOPICS)}
         items[:] = sorted(kept, key=lambda item: order[_topic(item)])
-        self._count = len(items)
-        self._asked = dict.fromkeys(map(_words, items))
+        self._asked = Counter(map(_words, items))
+        if items and self._printed is not None:
+            self._printed.begin(self._report)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(
@@ -204,21 +211,13 @@ class _Collected:
             tried.passed += report.passed
         if call.when == "teardown":
             tried.trials += 1
-            self._done += 1
-            if self._progress is not None:
-                self._progress(_words(item), self._done, self._count)
+            if self._printed is not None and tried.trials == self._asked[_words(item)]:
+                self._printed.judge(tried.law(_words(item)), [cause.what for cause in self._report.causes])
         return report
 
     def laws(self) -> Iterator[CheckedLaw]:
         """List the laws with what was found."""
-        for name, tried in self._tried.items():
-            if not tried.trials:
-                continue
-            yield CheckedLaw(
-                law=name, topic=tried.topic, says=tried.says, usually=tried.usually, trials=tried.trials,
-                verdict=verdict(tried.findings, tried.passed), findings=tuple(tried.findings),
-                reasons=tuple(tried.reasons), seconds=tried.seconds,
-            )  # fmt: skip
+        return (tried.law(name) for name, tried in self._tried.items() if tried.trials)
 
     def not_tried(self) -> Iterator[str]:
         """Names of the laws that were asked for, and that none of their trials has come to an end of."""

@@ -1,9 +1,9 @@
-"""The report for people. Pure: a report in, text out, as wide as the terminal."""
+"""The report for people, as wide as the terminal. Pure but for the console that it prints on."""
 
 import math
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator
 
-from rich.console import Group, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -21,18 +21,53 @@ NEVER = ("goes on", "for ever", "never comes", "nothing", "stays true", "does no
 """Words of findings that a body with a clock of its own has in virtual time."""
 
 
-def rendered(report: BodyReport) -> RenderableType:
-    """Draw the report: what the body is, law by law what was found, and what came of it."""
-    parts: list[RenderableType] = [_head(report), Text(), _body(report), Text()]
-    if report.capabilities.joints:
-        parts += [_joints(report), Text()]
-    if report.causes:
-        parts += [*(_cause(each) for each in report.causes), Text()]
-    above = {cause.what for cause in report.causes}
-    for topic in dict.fromkeys(each.topic for each in report.laws):
-        laws = [each for each in report.laws if each.topic == topic]
-        parts += [Text(topic, style="bold"), *_laws(laws, above), Text()]
-    return Group(*parts, *_end(report))
+class Printed:
+    """The report on a console: each law as it is judged, for a check may take minutes.
+
+    A law that shows nothing but what may be behind others as well is told at the end, when that is known.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._topic: str | None = None
+        self._told: set[str] = set()
+        """Names of the laws that were told of."""
+
+    def begin(self, report: BodyReport) -> None:
+        """Tell what the body is."""
+        self._topic = ""
+        self._console.print(_head(report), Text(), _body(report), sep="\n")
+
+    def judge(self, law: CheckedLaw, known: Container[str] = ()) -> None:
+        """Tell of a law. known: causes that are told of elsewhere."""
+        if law.verdict == "broken" and all(finding.cause for finding in law.findings):
+            return
+        self._tell(law, known)
+
+    def _tell(self, law: CheckedLaw, known: Container[str]) -> None:
+        if law.topic != self._topic:
+            self._topic = law.topic
+            self._console.print(Text(), Text(law.topic, style="bold"), sep="\n")
+        self._told.add(law.law)
+        self._console.print(*_law(law, known), sep="\n")
+
+    def end(self, report: BodyReport) -> None:
+        """Tell what is left to be told: joints, what is behind several laws, and what came of all."""
+        if self._topic is None:
+            self.begin(report)
+        causes = {cause.what for cause in report.causes}
+        for law in report.of("broken"):
+            if law.law not in self._told:
+                self._tell(law, causes)
+        parts: list[RenderableType] = [Text()]
+        if unjudged := report.of("not judged"):
+            names = "; ".join(law.law for law in unjudged)
+            parts += [Text(f"not judged: {names}", style="dim"), Text()]
+        if report.capabilities.joints:
+            parts += [_joints(report), Text()]
+        if report.causes:
+            parts += [*(_cause(each) for each in report.causes), Text()]
+        self._console.print(Group(*parts, *_end(report)))
 
 
 # -- what the body is ---------------------------------------------------------------------------------------------
@@ -92,25 +127,16 @@ def _cause(cause: Cause) -> Text:
     return text
 
 
-def _laws(laws: Sequence[CheckedLaw], above: Container[str]) -> Iterator[RenderableType]:
-    table: Table | None = None
-    unjudged = "; ".join(law.law for law in laws if law.verdict == "not judged")
-    for law in (each for each in laws if each.verdict != "not judged"):
-        if table is None:
-            table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
-            table.add_column(width=6)
-            table.add_column(overflow="fold")
-        mark, style = MARKS[law.verdict]
-        why = f": {'; '.join(law.reasons)}" if law.verdict == "does not apply" else ""
-        table.add_row(Text(mark, style=style), Text(law.law + why, style="dim" if why else ""))
-        if law.verdict == "broken":
-            yield table
-            yield Padding(Group(*_broken(law, above)), (0, 0, 1, 8))
-            table = None
-    if table is not None:
-        yield table
-    if unjudged:
-        yield Padding(Text(f"not judged: {unjudged}", style="dim"), (0, 0, 0, 8))
+def _law(law: CheckedLaw, above: Container[str]) -> Iterator[RenderableType]:
+    mark, style = MARKS[law.verdict]
+    why = f": {'; '.join(law.reasons)}" if law.verdict == "does not apply" else ""
+    row = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+    row.add_column(width=6)
+    row.add_column(overflow="fold")
+    row.add_row(Text(mark, style=style), Text(law.law + why, style="dim" if why else ""))
+    yield row
+    if law.verdict == "broken":
+        yield Padding(Group(*_broken(law, above)), (0, 0, 1, 8))
 
 
 def _broken(law: CheckedLaw, above: Container[str]) -> Iterator[Text]:

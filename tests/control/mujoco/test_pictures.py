@@ -16,8 +16,9 @@ from engage_hri.schemas.faults import InputRefused, RunFailed
 from engage_hri.services.control.bases.composed import composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.mujoco.body import MujocoBody
-from engage_hri.services.control.mujoco.film import Film, check, show_face
+from engage_hri.services.control.mujoco.film import Film, check, filmed, show_face
 from engage_hri.services.control.mujoco.pictures import Beam, Camera, Cone, Picture
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.testing import WORLD, Stage, performed
@@ -115,6 +116,24 @@ async def test_a_film_as_mp4_is_as_long_as_what_it_shows(body: MujocoBody, camer
 
     assert frames == 7
     assert seconds == pytest.approx(7 / 4, abs=0.05)
+
+
+async def test_lips_are_filmed_while_the_motors_stand(body: MujocoBody):
+    film = Film(body.bench.model, rate=20.0)
+    await asyncio.sleep(2.0)  # the physics has settled
+    async with filmed(film, body.frame):
+        await asyncio.sleep(1.0)
+        assert len(film.frames) == 1  # nothing moves
+
+        now = asyncio.get_running_loop().time()
+        body.move_lips([MouthShape(at=now + 0.1 * step, opening=0.8 * (step % 2)) for step in range(11)])
+        await asyncio.sleep(1.2)
+
+    speaking = film.frames[1:]
+    assert len(speaking) >= 18
+    assert all(frame.qpos.tolist() == film.frames[0].qpos.tolist() for frame in speaking)
+    assert max(frame.pose["jaw"] for frame in speaking) > 0.2
+    assert speaking[-1].pose["jaw"] == pytest.approx(0.0, abs=0.01)
 
 
 async def test_a_film_that_ffmpeg_cannot_write_is_told(body: MujocoBody, camera: Camera, tmp_path: Path):
