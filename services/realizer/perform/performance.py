@@ -65,7 +65,7 @@ class BlockPerformance:
         self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
         spelling = Spelling(plan.block, live.elsewhere)
         self._net = NetStream(shared.bus, live.id, spelling, live.request.follows)
-        self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
+        self.report = Reporter(shared.bus, live.id, spelling)
         self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
@@ -211,7 +211,7 @@ class BlockPerformance:
     async def _end_behaviors(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
-        await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort, bus=self.bus)
+        await all_ended(self._runs, self._tasks, self.body, ending, self.bus)
         if self._outcome.status == "done":
             self.decisions.net.let_go()
         else:
