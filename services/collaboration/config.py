@@ -15,16 +15,12 @@ class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     mode: Literal["scripted", "task"] = "scripted"
     placement: Seconds = 15.0
     """Time that the person has to place a piece before the robot asks again."""
-    attempts: int = 3
-    """Number of times that the robot asks for one placement before it goes on without."""
 
     FIXED: ClassVar[Mapping[str, Any]] = {
-        "steady": 0.5, "patience": 2.0, "settle": 0.75, "pause": 0.4, "thinking": 1.0, "arrival": 4.0,
+        "attempts": 3, "steady": 0.5, "patience": 2.0, "settle": 0.75, "pause": 0.4, "thinking": 1.0, "arrival": 4.0,
         "farewell": 15.0, "piece_reliability": 0.95, "landmark_reliability": 0.85,
     }  # fmt: skip
     """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         not_negative(self, ("placement",), "collaboration.")
-        if self.attempts < 1:
-            raise ValueError(f"collaboration.attempts must be at least 1, not {self.attempts}")

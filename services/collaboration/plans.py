@@ -16,6 +16,8 @@ from engage_hri.services.collaboration.fragments import MANIPULATION, PieceMenti
 from engage_hri.services.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import TangramTable
 
+ATTEMPTS = 3
+"""Number of times that the robot asks for one placement before it goes on without. Ours."""
 ARRIVAL: Seconds = 4.0
 """Time from when a person is seen until the robot greets them, so that they can sit down. Ours."""
 FAREWELL: Seconds = 15.0
@@ -135,7 +137,7 @@ class Manager:
         """
         request_id, fix = id, False
         pieces = yield from self.observe()
-        for attempt in range(1, self.config.attempts + 1):
+        for attempt in range(1, ATTEMPTS + 1):
             yield from self._meet()
             yield Perform(self._request(request_id, instruction, fix=fix))
             placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)

@@ -26,9 +26,11 @@ from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.references import disambiguated
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.config import LEASE, RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
+from engage_hri.services.realizer.perform.ends_of_runs import ABORT
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance, SharedContext
 from engage_hri.services.realizer.perform.presence import Presence
@@ -46,6 +48,9 @@ from engage_hri.services.requests.silence import unfinished
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
+PULSE: Seconds = 1.0
+"""Time between two renewals of the requests to the body and to recognition: two may be lost within a
+`LEASE`. Ours."""
 Result = TypeVar("Result")
 
 
@@ -53,7 +58,7 @@ class _Realizer:
     def __init__(self, bus: Bus, config: RealizerConfig) -> None:
         self.bus = bus
         self.config = config
-        self.requests = Requester(bus, Patience(pulse=config.pulse, lease=config.lease, cancel=config.abort))
+        self.requests = Requester(bus, Patience(pulse=PULSE, lease=LEASE, cancel=ABORT))
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, Live] = {}
         self.performances: dict[str, BlockPerformance] = {}
@@ -229,7 +234,7 @@ class _Realizer:
             self._send_home(live, replaced)
             if self.homing:
                 # Among them are parts sent home by a block that was itself replaced before it began.
-                self.homing -= await unfinished(self.homing, self.config.abort, self.bus)
+                self.homing -= await unfinished(self.homing, ABORT, self.bus)
         await self.planning.planned(live.block, self.live.values())
         try:
             live.unsettle()

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.ranges import not_negative, positive
+from engage_hri.schemas.ranges import positive
 from engage_hri.schemas.units import Degrees, Probability, Seconds
 
 GazeResolution = Literal["object", "table"]
@@ -58,8 +58,6 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Longest speech that is still a backchannel."""
     least_confidence: Probability = 0.4
     """Least confidence of an observation: a beginning below is ignored, a thing below counts as covered. Ours."""
-    words_patience: Seconds = 10.0
-    """Time after the end of an event for which it is told again, should its words become known or be corrected."""
     sensing: Sensing = Sensing()
     """Settings for raw perception."""
     window: Seconds = 30.0
@@ -73,8 +71,9 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     FIXED: ClassVar[Mapping[str, Any]] = {
         "accept": ("speak", "nod", "shake", "point"), "turn_patience": 12.0, "direct_by_look": 0.6,
-        "after_robot_directed": 2.0, "words_margin": 0.5, "look_break": 0.15, "longest_speech": 60.0,
-        "longest_gesture": 10.0, "longest_manipulation": 120.0, "enough_events": 5, "hysteresis": 0.05,
+        "after_robot_directed": 2.0, "words_margin": 0.5, "words_patience": 10.0, "look_break": 0.15,
+        "longest_speech": 60.0, "longest_gesture": 10.0, "longest_manipulation": 120.0, "enough_events": 5,
+        "hysteresis": 0.05,
     }  # fmt: skip
     """Former keys, and the value of the constant that has taken the place of each."""
 
@@ -83,6 +82,5 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
             "directed_gaze_limit", "mutual_facial_gaze_limit", "adjacency_pair_limit", "third_turn_limit",
             "manipulation_limit", "backchannel_limit", "window", "reference_mtbce",
         ))  # fmt: skip
-        not_negative(self, ("words_patience",))
         if not 0 <= self.disengaged_below + HYSTERESIS <= self.engaged_from - HYSTERESIS <= 1:
             raise ValueError(f"engaged_from must be at least {2 * HYSTERESIS:g} above disengaged_below")

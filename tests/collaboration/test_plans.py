@@ -256,7 +256,7 @@ def test_the_task_makes_the_figure_by_itself() -> None:
 def test_the_task_gives_a_piece_up_after_its_attempts_and_says_so() -> None:
     player = Player(idle=1000)
 
-    performed = player.play(task(manager(attempts=2)))
+    performed = player.play(task(manager()))
 
     assert spoken(performed[-2]) == "Look, we almost made an anchor."
     assert {it.id.partition("-again")[0] for it in performed if "again" in it.id} == {"move-1", "move-2"}

@@ -129,7 +129,6 @@ def test_ids_count_by_kind_and_carry_the_session():
     ("setting", "value", "reason"),
     [
         ("directed_gaze_limit", 0.0, "directed_gaze_limit must be positive"),
-        ("words_patience", -0.1, "words_patience must not be negative"),
         ("engaged_from", 0.2, "engaged_from must be at least 0.1 above disengaged_below"),
     ],
 )

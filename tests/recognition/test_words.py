@@ -113,11 +113,11 @@ def test_a_correction_is_told_again_and_a_repetition_is_not() -> None:
 
 
 def test_words_that_come_too_late_are_not_told_any_more() -> None:
-    talk = Talk(words_patience=3.0)
+    talk = Talk()
     talk.asks(1.0, 2.0)
     talk.turn_ends()
     talk.speaks(2.5, 3.5)
-    talk.hears("yes", 2.5, 3.5, 6.6)
+    talk.hears("yes", 2.5, 3.5, 13.6)
 
     assert not any(retold for *_, retold in talk.told())
 

@@ -49,7 +49,7 @@ class Decisions:
         self.began = began
         self.facts = Facts(began)
         self.foresight = Foresight(plan, self.facts)
-        self.grants = Grants(self.facts, self.foresight, config, is_free)
+        self.grants = Grants(self.facts, self.foresight, is_free)
         self.lateness_watch = LatenessWatch(config, sight or Sight("realizer"))
         self._unwatched: set[str] = set()
         """Behaviors about which there is news, so that another report of theirs is to be expected than before."""

@@ -108,7 +108,7 @@ class BlockPerformance(Neighbor):
         self.futures = SyncPointFutures()
         spelling = Spelling(plan.block, live.elsewhere)
         self._net = NetStream(shared.bus, live.id, spelling, live.request.follows)
-        self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
+        self.report = Reporter(shared.bus, live.id, spelling)
         self.spoken = Spoken(plan.block.behaviors)
         self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
         self.decisions = Decisions(
@@ -363,7 +363,7 @@ class BlockPerformance(Neighbor):
     async def _end_behaviors(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
-        await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort, bus=self.bus)
+        await all_ended(self._runs, self._tasks, self.body, ending, self.bus)
         if self._outcome.status == "done":
             self.decisions.net.let_go()
         else:

@@ -11,6 +11,7 @@ from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Estimates
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
@@ -28,6 +29,9 @@ from engage_hri.services.realizer.together.knowledge import Asker, knowledge, ma
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.runtime.unhurried import unhurried
+
+ESTIMATE: Seconds = 2.0
+"""Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
 
 
 class Planning:
@@ -152,7 +156,7 @@ class Planning:
         if not question.items:
             return ()
         try:
-            answer = await self._bus.query(keys.ESTIMATE, question, timeout=self._config.estimate)
+            answer = await self._bus.query(keys.ESTIMATE, question, timeout=ESTIMATE)
         except NoReply as error:
             unable = error.fault.following("no body performs it", block.id)
             raise BlockRefused(unable, "CANNOT_CREATE_BEHAVIOR") from error

@@ -31,6 +31,9 @@ from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
 from engage_hri.services.reports.reports import GoesOn
 
+WORDS_PATIENCE: Seconds = 10.0
+"""Time after the end of an event for which it is told again, should its words become known or be corrected. Decision
+0065."""
 ACCEPT: tuple[Action, ...] = ("speak", "nod", "shake", "point")
 """Actions that answer an adjacency pair of the robot, unless its request names others. Thesis 2.2.3."""
 SETTLING: Seconds = 0.35
@@ -62,7 +65,7 @@ class Session:
         self.blocks = Blocks()
         self.scene = SessionScene(robot, config.gaze_resolution)
         self._config = config
-        self._writer = EventWriter(clock, name, words_patience=config.words_patience)
+        self._writer = EventWriter(clock, name, words_patience=WORDS_PATIENCE)
         self._people = People(self.scene, config, self._writer, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
