@@ -253,7 +253,7 @@ def case(chance: random.Random, *, is_elastic: bool) -> Case:
 class Story:
     """Facts that come at random to a forecast and to the model."""
 
-    def __init__(self, chance: random.Random, *, is_elastic: bool, is_partial: bool) -> None:
+    def __init__(self, chance: random.Random, *, is_elastic: bool) -> None:
         self.chance = chance
         self.case = case(chance, is_elastic=is_elastic)
         self.factor: dict[str, float] = {name: chance.choice((1.0, 1.0, 1.5)) for name in self.case.stations}
@@ -264,18 +264,13 @@ class Story:
         self.forecast = Forecast(self.case.plan, BEGAN, lambda id: self.factor.get(id, 1.0), points)
         self.left = {name: list(each) for name, each in self.case.stations.items()}
         self.now = BEGAN
-        for each in range(self.model.size):
-            if not is_partial or chance.random() < 0.3:
-                self.forecast.require(each)
 
     def tell(self, *, is_overdue: bool = True) -> None:
         """One fact more. is_overdue: that something has not come is one, too."""
         chance, forecast, model = self.chance, self.forecast, self.model
         self.now += chance.choice((0.0, 0.25, 0.25, 1.0))
         transition = chance.randrange(1, model.size)
-        match chance.choice(
-            ("pass", "pass", "pass", "arrive", "fix", "overdue", "prolong", "learn", "foresee", "require")
-        ):
+        match chance.choice(("pass", "pass", "pass", "arrive", "fix", "overdue", "prolong", "learn", "foresee")):
             case "pass" if coming := [name for name, each in self.left.items() if each]:
                 name = chance.choice(coming)
                 here = self.left[name].pop(0)
@@ -307,8 +302,6 @@ class Story:
                 other = chance.choice(self.case.foreign)
                 model.foreseen[other] = BEGAN + chance.choice((-1.0, 0.5, 2.0, 4.0))
                 forecast.foresee(other, model.foreseen[other])
-            case "require":
-                forecast.require(transition)
 
     def fix(self, transition: int, at: float) -> None:
         if transition not in self.model.facts:

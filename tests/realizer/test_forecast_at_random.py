@@ -29,15 +29,11 @@ def subsets(bounds: list[Arc]) -> Iterable[tuple[Arc, ...]]:
     return chain.from_iterable(combinations(bounds, size) for size in range(len(bounds), -1, -1))
 
 
-def known(forecast: Forecast, times: list[float]) -> list[float]:
-    return [each for each, is_kept in zip(times, forecast.is_kept, strict=False) if is_kept]
-
-
 @settings(max_examples=150, deadline=None)
-@given(st.integers(0, 10**6), st.booleans())
-def test_what_is_expected_is_the_earliest_that_keeps_all_or_as_much_as_can_be(seed: int, is_partial: bool) -> None:
+@given(st.integers(0, 10**6))
+def test_what_is_expected_is_the_earliest_that_keeps_all_or_as_much_as_can_be(seed: int) -> None:
     """Nothing can give way here but upper bounds."""
-    story = Story(random.Random(seed), is_elastic=False, is_partial=is_partial)
+    story = Story(random.Random(seed), is_elastic=False)
     before = [BEGAN] * story.model.size
     for _ in range(14):
         changed = story.forecast.update()
@@ -45,22 +41,21 @@ def test_what_is_expected_is_the_earliest_that_keeps_all_or_as_much_as_can_be(se
         assert changed == {each for each, at in enumerate(now) if abs(at - before[each]) > 1e-8}
         before = list(now)
         arcs = story.model.arcs()
-        told = known(story.forecast, now)
         expected = story.model.times(arcs)
         if expected is not None:
-            assert told == pytest.approx(known(story.forecast, expected), abs=CLOSE)
+            assert now == pytest.approx(expected, abs=CLOSE)
             assert not any(story.forecast.is_hurried(each) for each in story.factor)
-        elif not is_partial and len(bounds := [each for each in arcs if each.is_bound]) < 8:
+        elif len(bounds := [each for each in arcs if each.is_bound]) < 8:
             rigid = [each for each in arcs if not each.is_bound]
             kept = (story.model.times((*rigid, *some)) for some in subsets(bounds))
-            assert any(each == pytest.approx(told, abs=CLOSE) for each in kept if each is not None)
+            assert any(each == pytest.approx(now, abs=CLOSE) for each in kept if each is not None)
         story.tell()
 
 
 @settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**6))
 def test_phases_give_way_within_their_limits_where_all_can_be_kept_by_that(seed: int) -> None:
-    story = Story(random.Random(seed), is_elastic=True, is_partial=False)
+    story = Story(random.Random(seed), is_elastic=True)
     for _ in range(14):
         story.forecast.update()
         model, arcs, times = story.model, story.model.arcs(), story.forecast.times
@@ -90,7 +85,7 @@ def test_phases_give_way_within_their_limits_where_all_can_be_kept_by_that(seed:
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6))
 def test_a_forecast_from_scratch_takes_all_facts_at_once(seed: int) -> None:
-    story = Story(random.Random(seed), is_elastic=False, is_partial=True)
+    story = Story(random.Random(seed), is_elastic=False)
     for _ in range(12):
         story.tell(is_overdue=False)
     model = story.model
@@ -115,7 +110,7 @@ def test_who_gives_up_in_the_end_still_keeps_all_lower_bounds(seed: int) -> None
     """As if nothing could be made way for: no upper bound holds then, and all phases last as long as is natural."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(forecast, "REPAIRS", 0)
-        story = Story(random.Random(seed), is_elastic=True, is_partial=False)
+        story = Story(random.Random(seed), is_elastic=True)
         for _ in range(8):
             story.forecast.update()
             came = story.model.facts  # What has come is a reason to be late as well, and gives no way.
@@ -174,8 +169,6 @@ def test_what_was_told_last_of_a_net_of_one_phase() -> None:
 
     def times(*facts: tuple[int, float], factor: float = 1.0) -> tuple[Mapping[int, float], Forecast]:
         forecast = Forecast(plan, BEGAN, lambda id: factor, {})
-        for each in range(5):
-            forecast.require(each)
         for each, at in facts:
             forecast.passed("a", each, at)
         forecast.update()
@@ -206,8 +199,6 @@ def test_a_phase_that_may_last_for_ever_lasts_as_long_as_it_must_and_no_longer()
     bounds = (Bound("phase", 2, 1, -1.0, None, "a"), Bound("delay", 1, 0, -1.0))
     one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(4)), places, bounds), {}, [])
     told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
-    for each in range(4):
-        told.require(each)
 
     told.update()
     assert [at - BEGAN for at in told.times[:4]] == pytest.approx([0.0, 1.0, 3.0, 2.0])
@@ -225,12 +216,9 @@ def test_what_cannot_be_kept_costs_no_other_bound() -> None:
     bounds = (Bound("delay", 1, 0, -0.5), Bound("phase", 3, 2, -1.0, 0.0, "b"))
     one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(5)), places, bounds), {}, [])
     told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
-    for each in range(5):
-        told.require(each)
 
     told.update()
     assert [at - BEGAN for at in told.times[:5]] == pytest.approx([0.0, 1.0, 2.0, 3.0, 0.0])
-    assert told.bounded == {2, 3}
 
 
 def test_an_instant_that_comes_as_expected_frees_what_was_given_up_for_it() -> None:
@@ -240,8 +228,6 @@ def test_an_instant_that_comes_as_expected_frees_what_was_given_up_for_it() -> N
         PetriNet(tuple(Transition(str(n), ()) for n in range(4)), places, (Bound("delay", 2, 1, -0.5),)), {}, []
     )
     told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
-    for each in range(4):
-        told.require(each)
 
     assert told.update() == {2}
     assert told.times[1:3] == pytest.approx([BEGAN, BEGAN + 2.0])
@@ -273,8 +259,6 @@ def test_who_is_left_of_an_instant_waits_there_no_longer_than_another_that_has_p
     bounds = (Bound("phase", 2, 1, -1.0, stretch, "b"),)
     one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(3)), places, bounds), {}, [])
     told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
-    for each in range(3):
-        told.require(each)
     if passed is not None:
         told.passed("a", 1, BEGAN + passed)
 
@@ -289,8 +273,6 @@ def test_who_is_left_waits_no_longer_also_where_that_it_waits_could_not_be_kept_
     bounds = (Bound("delay", 1, 0, -0.5), Bound("phase", 2, 1, -1.0, 1.0, "b"))
     one = Case(PetriNet(tuple(Transition(str(n), ()) for n in range(3)), places, bounds), {}, [])
     told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
-    for each in range(3):
-        told.require(each)
 
     told.update()
     assert [at - BEGAN for at in told.times[:3]] == pytest.approx([0.0, 0.0, 3.0])
@@ -313,8 +295,6 @@ def test_a_delay_that_is_no_longer_than_planned_after_all_frees_what_gave_way_fo
         {}, [],
     )  # fmt: skip
     told = Forecast(one.plan, BEGAN, lambda id: 1.0, {})
-    for each in range(4):
-        told.require(each)
     told.overdue(2, BEGAN + 1.5)
 
     told.update()

@@ -91,8 +91,10 @@ class Grants(Observer):
     def moved(self, transition: int) -> None:
         """Decide again about an instant that is expected at another time than before."""
         if transition < len(self._plan.members):
-            self._dirty.add(transition)
-            self.touched.update(member.behavior for member in self._plan.members[transition])
+            if self._net.is_open(transition):  # else it is decided when it opens
+                self._dirty.add(transition)
+            begun = self._facts.begun
+            self.touched.update(each.behavior for each in self._plan.members[transition] if each.behavior in begun)
 
     @property
     def deadline(self) -> Seconds | None:

@@ -75,8 +75,6 @@ class Expectations(Observer):
         self.forecast = None
         if is_predictive(plan) or self.followed:
             self.forecast = forecast = Forecast(plan, self._facts.began, self.experience.factor, self.foreseen)
-            for transition in self._transitions_followed():
-                forecast.require(transition)
             bounded = forecast.bounded
             self._minded = frozen(member.behavior for transition in bounded for member in plan.members[transition])
 
@@ -90,7 +88,6 @@ class Expectations(Observer):
         """Expect the points of a behavior that begins from now on."""
         if (forecast := self.forecast) is not None and (chain := self.plan.chains.get(behavior)) is not None:
             self._news.append((forecast.overdue, self.plan.at[chain.points[0]], at))
-            self._news += [(forecast.require, self.plan.at[point]) for point in chain.points]
 
     def on_arrived(self, point: Point, at: Seconds) -> None:
         if (forecast := self.forecast) is not None:
@@ -101,10 +98,6 @@ class Expectations(Observer):
             self._news.append((forecast.passed, point.behavior, self.plan.at[point], at))
         if not self.is_surprised and point.behavior in self.plan.chains:
             self.is_surprised = abs(at - self._expected.get(point, at)) > SURPRISE
-
-    def on_opened(self, transition: int) -> None:
-        if (forecast := self.forecast) is not None:
-            self._news.append((forecast.require, transition))
 
     def on_fired(self, transition: int, at: Seconds) -> None:
         if (forecast := self.forecast) is not None:
@@ -190,10 +183,7 @@ class Expectations(Observer):
     def follow(self, points: Iterable[Point]) -> bool:
         """Expect these points from now on, for other blocks (see `ahead`). False: look ahead again for that."""
         self.followed.update(points)
-        if (forecast := self.forecast) is None:
-            return not self.followed
-        self._news += [(forecast.require, transition) for transition in self._transitions_followed()]
-        return True
+        return self.forecast is not None or not self.followed
 
     @property
     def ahead(self) -> Mapping[Point, Seconds]:
@@ -203,9 +193,6 @@ class Expectations(Observer):
         times, reached = self.forecast.times, self._facts.reached
         coming = {point: self.plan.transition(point) for point in self.followed if point not in reached}
         return {point: times[transition] for point, transition in coming.items() if transition is not None}
-
-    def _transitions_followed(self) -> list[int]:
-        return [each for each in map(self.plan.transition, self.followed) if each is not None]
 
     # -- behaviors under way -------------------------------------------------------------------------------------
 

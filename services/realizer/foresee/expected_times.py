@@ -89,7 +89,7 @@ class Foresight(Expectations):
 
     def expected(self, now: Seconds) -> dict[Point, Seconds]:
         """Expected times of all points of the block that are still to come, in seconds from the block's start."""
-        times = self._each(self.from_scratch(now), now)
+        times = self._each(self._as_of(now), now)
         coming = {each for chain in self.plan.chains.values() for each in chain.points} - self._facts.reached.keys()
         self._expected |= {point: max(now, times[point]) for point in coming}
         self.is_surprised = False
@@ -97,12 +97,12 @@ class Foresight(Expectations):
 
     def times(self, now: Seconds) -> dict[Point, Seconds]:
         """Time of each point of the plan and of the end of the block, measured or expected, by the loop's clock."""
-        forecast, last = self.from_scratch(now), len(self.plan.members) - 1
+        forecast, last = self._as_of(now), len(self.plan.members) - 1
         return {**self._each(forecast, now), BLOCK_START: self._facts.began, BLOCK_END: forecast.times[last]}
 
     def outlook(self, now: Seconds) -> Outlook:
         """All that was measured, and that is expected from it."""
-        return Outlook({**self._each(self.from_scratch(now), now), ORIGIN: self._facts.began})
+        return Outlook({**self._each(self._as_of(now), now), ORIGIN: self._facts.began})
 
     def _each(self, forecast: Forecast, now: Seconds) -> dict[Point, Seconds]:
         """Expected time of each point: that of its instant, unless its behavior cannot wait so long."""
@@ -124,20 +124,16 @@ class Foresight(Expectations):
                     arrivals[point] = max(now, since + least, min(since + most, instants[point]))
         return arrivals
 
-    def from_scratch(self, now: Seconds | None = None) -> Forecast:
-        """A forecast of all instants; for those that the kept forecast has, it says the same.
-
-        now: what has not come is expected no earlier.
-        """
+    def _as_of(self, now: Seconds) -> Forecast:
+        """A forecast in which nothing that has not come is expected before `now`."""
         facts = self._facts
-        known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
-        heard = self.utterances.since
-        forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged, heard)
-        if now is not None:
-            for each in (*self._stood(now), *((here, now) for here in range(len(self.plan.members)))):
-                forecast.overdue(*each)
-            forecast.update()
-        return forecast
+        if (forecast := self.forecast) is not None:
+            self.catch_up()
+        else:
+            known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
+            heard = self.utterances.since
+            forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged, heard)
+        return forecast.as_of(now, self._stood(now))
 
 
 def differ_noticeably(one: Pace, other: Pace) -> bool:

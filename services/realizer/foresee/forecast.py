@@ -1,25 +1,75 @@
-"""Forecast of the instants of a running block: a new fact costs what it changes, not the whole net.
+"""Forecast of the instants of a running block: when each will be, by all that was measured so far.
 
-Longest paths from what was measured, through phases at the pace measured so far and through bounds. What stretches
-(a phase within the body's shortest and longest time) gives way where a bound could not be kept otherwise.
+A stroke that is to meet a word cannot wait for it. Its arm has to set out before the word is there, so somebody has
+to say when the word will be. The plan said so once; since then the voice was slow, and the arm was held. So the
+schedule of the plan is computed again, with what was measured in the place of what was planned.
+
+The nodes are the transitions of the net, and one more for each place and time at which a behavior has been
+measured. An arc says that one node comes no earlier than so many seconds after another: a phase, a delay, an order.
+An upper bound is an arc back: `late` comes no later than 2 s after `early`, so `early` comes no earlier than 2 s
+before `late`. A node that was measured is a fact, and does not move. Then:
+
+1. *Longest paths.* Each node is as early as its arcs allow. Passes forward over arcs and back over bounds take
+   turns until nothing moves (`_relax`). Nothing is kept from the time before, so nothing can be out of date: up to
+   a thousand transitions such a pass takes no longer than to find out what has changed.
+2. *Making way.* A bound may ask for what is past, or a circle of arcs for more time than there is. Then phases
+   along the way take less, or bear more, as far as the body can (`_make_way`): first what the plan has bent, and
+   what can be slower before what has to hurry. Where that is not enough, a bound is given up for this time. Each
+   such step shortens an arc or takes one away, and after `REPAIRS` steps all bounds go. So it ends.
+
+An instant that is overdue is expected no earlier than now. This is the body's news by silence, and not a fact.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
+from itertools import compress
 from math import inf
+from operator import ne
+
+from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.foresee.longest_paths import FINEST, Arc, Circle, LongestPaths
 from engage_hri.services.realizer.net.petri_net import order
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import EPSILON, Point
 
+FINEST: Seconds = 1e-8
+"""Seconds; smaller changes are rounding."""
+FORGETTING = 8
+"""Number of instants after which what is past is taken out of the sweeps."""
 REPAIRS = 200
 """Most bounds that are made way for in one `update`; those that cannot be kept then are given up for this time."""
 
 
-class Forecast(LongestPaths):
-    """Expected times of the transitions: those that were measured, that are required, or that those depend on.
+class Arc(Struct, gc=False):
+    """Lower bound: `target` comes no earlier than some seconds after `source`.
+
+    least: what these may give way to. behavior: set if it is a phase. is_bound: may be given up if nothing else gives
+    way. is_on: False once it has no effect any more. natural, shortest: of a phase, what it asks for and `least`, as
+    estimated. stopped: seconds by which it is longer than planned, since its clock was stopped.
+    """
+
+    source: int
+    target: int
+    least: Seconds
+    behavior: str = ""
+    is_bound: bool = False
+    is_on: bool = True
+    natural: Seconds = 0.0
+    shortest: Seconds = 0.0
+    stopped: Seconds = 0.0
+
+
+class Circle(Exception):
+    """A cycle of arcs that takes more than no time: no times satisfy all of them."""
+
+    def __init__(self, arcs: Sequence[int]) -> None:
+        self.arcs = tuple(arcs)
+
+
+class Forecast:
+    """Expected times of the transitions, and of what was measured. times: as of the last `update`.
 
     factor: how many times longer than estimated a behavior takes, by its id. foreseen: expected times of points of
     other blocks.
@@ -29,11 +79,35 @@ class Forecast(LongestPaths):
         self, plan: Plan, began: Seconds, factor: Callable[[str], float], foreseen: Mapping[Point, Seconds]
     ) -> None:
         net, planned = plan.net, plan.schedule
-        size = len(net.transitions)
-        super().__init__(size, began)
-        self._there: list[Seconds] = [began] * size
-        """Time at which the latest of those behaviors came that are at the instant."""
+        size = self._size = len(net.transitions)
         self._factor = factor
+        self._arcs: list[Arc] = []
+        self._asked: list[Seconds] = []
+        """Seconds of each arc, as long as nothing gives way."""
+        self._seconds: list[Seconds] = []
+        """Of each arc, once phases have given way."""
+        self._ends: list[tuple[int, int]] = []
+        """Source and target of each arc, for sweeps; one that moves nothing ends in `_nowhere`."""
+        self._forward: list[int] = []
+        self._back: list[int] = []
+        """Arcs in the order in which one sweep over them is enough."""
+        self._on_facts: set[int] = set()
+        """Bounds on what is past already, by what is not."""
+        self._there: list[Seconds] = [began] * size
+        """Time at which the latest of those behaviors came that are at the instant; it is no earlier."""
+        self._floor: list[Seconds] = [began] * size
+        """Time of each node that is a fact, else the least that it may have."""
+        self._is_fact = [False] * size
+        self._out: list[list[int]] = [[] for _ in range(size)]
+        self._in: list[list[int]] = [[] for _ in range(size)]
+        self._nowhere = self._new_node(inf)
+        self.times = list(self._floor)
+        self._given_way: set[int] = set()
+        self._is_new = True
+        self._past = 0
+        """Number of instants that are facts."""
+        self._node_of: dict[str, int] = {}
+        """For each behavior under way, the node for the time at which it passed its latest point."""
         self._phase_to: dict[tuple[str, int], int] = {}
         self._phase_from: dict[tuple[str, int], int] = {}
         self._after: dict[tuple[str, int], tuple[int, ...]] = {}
@@ -41,18 +115,13 @@ class Forecast(LongestPaths):
         self._moved: dict[tuple[int, int], list[int]] = {}
         """Those of them that count from the behavior's own time, by the transitions at their ends."""
         self._of_behavior: dict[str, list[int]] = {}
-        self._stopped: dict[int, Seconds] = {}
-        """Seconds by which arcs are longer than planned; see `prolong`."""
-        self._given_way: set[int] = set()
-        self._broken: set[int] = set()
         self._unkept: set[int] = set()
         """Bounds that the plan does not keep."""
         self._as_others: set[int] = set()
         """Bounds that keep who is left of an instant no later than the others have passed it."""
         self._bent: set[int] = set()
         """Phases that the plan makes shorter, and the bounds of those that it makes longer, than is natural."""
-        for rank, transition in enumerate(order(net) or range(size)):
-            self._rank[transition] = rank
+        self._rank = {transition: rank for rank, transition in enumerate(order(net) or range(size))}
         for place in net.places:
             # Other places from the block's start say nothing: no instant is earlier than that.
             if place.kind != "idle" and (place.source or place.lag > 0.0 or place.after):
@@ -84,16 +153,16 @@ class Forecast(LongestPaths):
             if behavior and planned[bound.source] - planned[bound.target] > EPSILON - bound.lag + bound.stopped:
                 self._bent.add(arc)
         self._elsewhere: dict[int, int] = {}
-        """For each instant with points of other blocks, the arc that keeps it no earlier than those blocks expect."""
+        """For each instant with points of other blocks, the node for the time at which those blocks expect it."""
         self._awaited: dict[int, list[str]] = {}
         """For each instant, the behaviors of other blocks that have yet to pass it."""
         for point in plan.foreign:
             self._awaited.setdefault(transition := plan.at[point], []).append(point.behavior)
             if transition not in self._elsewhere:
-                node = self._new_node()
-                self.times[node] = began
-                self._elsewhere[transition] = self._add(node, transition, 0.0, 0.0, "")
+                node = self._elsewhere[transition] = self._new_node(began)
+                self._add(node, transition, 0.0, 0.0, "")
         self._drop_idle_bounds()
+        self._sort()
         self.fix(0, began)
         for point, at in foreseen.items():
             if point in plan.at:
@@ -107,12 +176,41 @@ class Forecast(LongestPaths):
         if behavior:
             self._of_behavior.setdefault(behavior, []).append(number)
             factor = self._factor(behavior)
-        arc = Arc(source, target, asked * factor, least * factor, behavior, is_bound, natural=asked, shortest=least)
-        arc.seconds = arc.asked
+        arc = Arc(source, target, least * factor, behavior, is_bound, natural=asked, shortest=least)
         self._arcs.append(arc)
+        self._asked.append(asked * factor)
+        self._seconds.append(asked * factor)
+        self._ends.append((source, target))
         self._out[source].append(number)
         self._in[target].append(number)
         return number
+
+    def _new_node(self, at: Seconds) -> int:
+        """Add a node that is a fact, without arcs; returns its number."""
+        self._out.append([])
+        self._in.append([])
+        self._floor.append(at)
+        self._is_fact.append(True)
+        return len(self._floor) - 1
+
+    def _sort(self) -> None:
+        """Put the arcs into the order of sweeps. What counts from a fact later on may stay where it is."""
+        rank, ends = self._rank, self._ends
+        numbers = sorted(
+            (each for each, arc in enumerate(self._arcs) if arc.is_on), key=lambda each: rank.get(ends[each][0], -1)
+        )
+        self._forward = [each for each in numbers if rank[ends[each][1]] > rank.get(ends[each][0], -1)]
+        self._back = [each for each in reversed(numbers) if rank[ends[each][1]] <= rank.get(ends[each][0], -1)]
+
+    def _forget(self) -> None:
+        """Take the arcs out of the sweeps that move nothing any more: what is past costs nothing."""
+        self._forward = [each for each in self._forward if self._ends[each][1] != self._nowhere]
+        self._back = [each for each in self._back if self._ends[each][1] != self._nowhere]
+
+    def _switch_off(self, number: int) -> None:
+        arc = self._arcs[number]
+        arc.is_on, self._ends[number] = False, (arc.source, self._nowhere)
+        self._on_facts.discard(number)
 
     def _drop_idle_bounds(self) -> None:
         """Switch off upper bounds of phases that nothing but the phase itself can make end late."""
@@ -132,21 +230,22 @@ class Forecast(LongestPaths):
 
     def fix(self, transition: int, at: Seconds) -> None:
         """Set the instant: all of it has happened, at `at`."""
-        expected, was_kept = self.times[transition], self.is_kept[transition]
-        self._is_fact[transition] = self.is_kept[transition] = True
-        for number in self._in[transition]:
-            if self._arcs[number].is_bound and not self._arcs[number].behavior:
-                self.require(self._arcs[number].source)
-        if was_kept and abs(at - expected) <= FINEST:
-            self._uncause(transition)
-            self._see_reasons_again(transition)
+        self._floor[transition], self._is_new = at, True
+        if self._is_fact[transition]:
             return
-        self._set(transition, at, -1)
-        if at < expected:
-            for effect in list(self._effects[transition]):
-                self._invalidate(effect)
-            for number in self._in[transition]:
-                self._touch(self._arcs[number].source)
+        self._is_fact[transition] = True
+        for number in self._in[transition]:
+            self._end_on_fact(number)
+        self._on_facts.difference_update(self._out[transition])  # a fact that is late moves no other
+        self._past += 1
+        if self._past % FORGETTING == 0:
+            self._forget()
+
+    def _end_on_fact(self, number: int) -> None:
+        arc = self._arcs[number]
+        self._ends[number] = (arc.source, self._nowhere)
+        if arc.is_on and arc.is_bound and not self._is_fact[arc.source]:
+            self._on_facts.add(number)
 
     def passed(self, behavior: str, transition: int, at: Seconds) -> None:
         """Note that the behavior has passed its point there; the others of the instant perhaps not yet."""
@@ -157,7 +256,7 @@ class Forecast(LongestPaths):
                 self.foresee(transition, self._there[transition])  # All have come: it is no more what was expected.
         for each in self._after.pop((behavior, transition), ()):
             self._moved.setdefault((transition, self._arcs[each].target), []).append(each)
-            self._start_from(self._new_node(), each, at)
+            self._start_from(self._new_node(at), each)
         number = self._phase_from.get((behavior, transition))
         self._stay_with(behavior, transition, at)
         if (node := self._node_of.get(behavior)) is not None:
@@ -168,7 +267,10 @@ class Forecast(LongestPaths):
             self._in[node].clear()
         if number is None:
             return
-        self._start_from(node := self._whereabouts(behavior), number, at)
+        if node is None:
+            node = self._node_of[behavior] = self._new_node(at)
+        self._floor[node] = at
+        self._start_from(node, number)
         for other in self._of_behavior[behavior]:
             if self._arcs[other].target == transition:
                 self._end_at(node, other)
@@ -178,29 +280,21 @@ class Forecast(LongestPaths):
 
         Where one of another block has passed it, the plan says how much later the others come.
         """
-        bounds = [self._arcs[each] for each in self._in[transition] if self._arcs[each].is_on or each in self._broken]
+        bounds = [self._arcs[each] for each in self._in[transition] if self._arcs[each].is_on]
         is_kept = self._is_fact[transition] or not self._as_others.isdisjoint(self._out[transition])
         if not (is_kept or is_foreign(behavior)) and any(arc.is_bound and arc.behavior != behavior for arc in bounds):
-            node = self._new_node()
-            self.times[node] = at
-            self._as_others.add(self._add(transition, node, 0.0, 0.0, "", is_bound=True))
-            self.require(transition)
-            self._touch(transition)
+            number = self._add(transition, self._new_node(at), 0.0, 0.0, "", is_bound=True)
+            self._as_others.add(number)
+            self._end_on_fact(number)
 
-    def _start_from(self, node: int, number: int, at: Seconds) -> None:
-        """Let an arc count from `at`, the time of a node of its own."""
+    def _start_from(self, node: int, number: int) -> None:
+        """Let an arc count from the time of a node of its own."""
         arc = self._arcs[number]
-        is_cause = self._cause[arc.target] == number
-        as_expected = is_cause and abs(at + arc.seconds - self.times[arc.target]) <= FINEST
-        if is_cause:
-            self._effects[arc.source].discard(arc.target)
-            self._effects[node].add(arc.target)
         self._out[arc.source].remove(number)
-        arc.source, self.times[node] = node, at
+        arc.source = node
+        self._ends[number] = (node, self._ends[number][1])
         self._out[node] = [number]
-        if not as_expected:
-            self._loosen(number)
-            self._touch(node)
+        self._on_facts.discard(number)
 
     def _end_at(self, node: int, number: int) -> None:
         """Let an upper bound count from the time of a node: the phase has begun, its beginning waits for nothing.
@@ -208,60 +302,38 @@ class Forecast(LongestPaths):
         What cannot be slower from there on does not wait: who is to meet it at its end has to hurry.
         """
         arc = self._arcs[number]
-        if not arc.is_bound or not (arc.is_on or number in self._broken):
+        if not arc.is_bound or not arc.is_on:
             self._switch_off(number)
             return
-        self._in[before := arc.target].remove(number)
+        self._in[arc.target].remove(number)
         self._in[node].append(number)
         arc.target = node
-        if self._cause[before] == number:
-            self._invalidate(before)
-        self.require(arc.source)
-        self._touch(arc.source)
-
-    def _see_reasons_again(self, node: int) -> None:
-        """Let `update` see anew what has to give way, if anything does: a fact that moves nothing may free it."""
-        if self._given_way or self._broken:
-            self._touch(node)
-
-    def _whereabouts(self, behavior: str) -> int:
-        """The node for the time at which the behavior passed its latest point; it belongs to no instant."""
-        if (node := self._node_of.get(behavior)) is None:
-            node = self._node_of[behavior] = self._new_node()
-        return node
+        self._end_on_fact(number)
 
     def come(self, behavior: str, transition: int, at: Seconds) -> None:
         """Note that the behavior is at its point there, or past it."""
-        self._there[transition] = max(self._there[transition], at)
-        self._see_reasons_again(transition)
+        there = self._there[transition] = max(self._there[transition], at)
+        self._is_new = True
         number = self._phase_to.get((behavior, transition))
-        if number is None or not self._arcs[number].is_on:
-            self._raise_base(transition, at)
-            return
-        self._base[transition] = self._there[transition]
-        if self._cause[transition] == number and abs(at - self.times[transition]) <= FINEST:
-            self._uncause(transition)
-        self._switch_off(number)
-        if self._is_fact[transition]:
-            return
-        if self._cause[transition] < 0 and self.times[transition] > self._base[transition] + FINEST:
-            self._invalidate(transition)
-        elif self._base[transition] > self.times[transition]:
-            self._set(transition, self._base[transition], -1)
+        is_first = number is not None and self._arcs[number].is_on
+        if number is not None and is_first:
+            self._switch_off(number)
+        if not self._is_fact[transition]:  # Who was overdue has come.
+            self._floor[transition] = there if is_first else max(there, self._floor[transition])
 
     def overdue(self, transition: int, at: Seconds) -> None:
         """Expect the instant no earlier than `at`: it has not come yet."""
-        if not self._is_fact[transition]:
-            self._raise_base(transition, at)
+        if not self._is_fact[transition] and at > self._floor[transition]:
+            self._floor[transition], self._is_new = at, True
 
     def foresee(self, transition: int, at: Seconds) -> None:
         """Expect the points of other blocks at this instant at `at`."""
-        number = self._elsewhere[transition]
-        node = self._arcs[number].source
-        before, self.times[node] = self.times[node], at
-        if at < before:
-            self._loosen(number)
-        self._touch(node)
+        self._floor[self._elsewhere[transition]], self._is_new = at, True
+
+    def shift(self, behavior: str, at: Seconds) -> None:
+        """Let what comes after the latest point of a behavior count as if it had passed that at `at`."""
+        if (node := self._node_of.get(behavior)) is not None:
+            self._floor[node], self._is_new = at, True
 
     def prolong(self, source: int, target: int, seconds: Seconds) -> None:
         """Let the delay from one instant to another take so much longer than planned: its clock was stopped."""
@@ -269,14 +341,10 @@ class Forecast(LongestPaths):
         bounds = [n for n in self._out[target] if self._arcs[n].target == source and self._arcs[n].is_bound]
         for number in (*delays, *self._moved.get((source, target), ()), *bounds):
             arc = self._arcs[number]
-            longer = -seconds if arc.is_bound else seconds
-            more = longer - self._stopped.get(number, 0.0)
-            if not arc.behavior and more:
-                self._stopped[number] = longer
-                arc.asked, arc.least = arc.asked + more, arc.least + more
-                if arc.is_on:
-                    self._set_seconds(number, arc.asked)
-                self._see_reasons_again(source)
+            if not arc.behavior:
+                longer = -seconds if arc.is_bound else seconds
+                more, arc.stopped = longer - arc.stopped, longer
+                self._ask(number, self._asked[number] + more, arc.least + more)
 
     def relearn(self, behaviors: Iterable[str]) -> None:
         """Take over the changed factors of these behaviors."""
@@ -284,17 +352,19 @@ class Forecast(LongestPaths):
             factor = self._factor(behavior)
             for number in self._of_behavior.get(behavior, ()):
                 arc = self._arcs[number]
-                arc.asked, arc.least = arc.natural * factor, arc.shortest * factor
-                if arc.is_on and number not in self._given_way:
-                    self._set_seconds(number, arc.asked)
-                self._see_reasons_again(arc.source)
+                self._ask(number, arc.natural * factor, arc.shortest * factor)
+
+    def _ask(self, number: int, asked: Seconds, least: Seconds) -> None:
+        self._asked[number], self._arcs[number].least, self._is_new = asked, least, True
+        if number not in self._given_way:
+            self._seconds[number] = asked
 
     # -- questions -----------------------------------------------------------------------------------------------
 
     def phase(self, behavior: str, target: int) -> Seconds:
         """Expected seconds of the behavior's phase that ends at `target`."""
         number = self._phase_to.get((behavior, target))
-        return 0.0 if number is None else self._arcs[number].seconds
+        return 0.0 if number is None else self._seconds[number]
 
     def longest(self, behavior: str, target: int) -> Seconds:
         """Most seconds that the phase may take that ends at `target`; inf where the body can wait."""
@@ -313,88 +383,131 @@ class Forecast(LongestPaths):
         bounds = [arc for arc in self._arcs if arc.is_on and arc.is_bound]
         return {arc.source for arc in bounds} | {arc.target for arc in bounds}
 
+    def as_of(self, now: Seconds, overdue: Iterable[tuple[int, Seconds]]) -> "Forecast":
+        """Another forecast of the same facts, in which nothing that has not come is expected before `now`.
+
+        overdue: instants that are expected no earlier than even later. What was said by `overdue` so far is left out.
+        """
+        other = copy(self)
+        here = zip(self._is_fact, self._floor, self._there, strict=False)
+        least = [floor if is_fact else max(there, now) for is_fact, floor, there in here]
+        other._floor = [*least, *self._floor[self._size :]]
+        for transition, at in overdue:
+            if not self._is_fact[transition]:
+                other._floor[transition] = max(at, other._floor[transition])
+        other._is_new = True
+        other.update()
+        return other
+
     def update(self) -> set[int]:
-        """Draw the conclusions of all facts since the last time; returns the transitions that have moved."""
-        if not self._todo and not self._old:
+        """Draw the conclusions of all facts; returns the transitions that have moved since the last time."""
+        if not self._is_new:
             return set()
-        if self._given_way or self._broken:
-            for number in sorted(self._given_way | self._broken):
-                self._restore(number)
-            self._given_way.clear()
-            self._broken.clear()
+        self._is_new = False
+        before = self.times
+        self._seconds = self._asked[:]
+        self._given_way = set()
         for _ in range(REPAIRS):
             try:
-                excess = self._relax()
-            except Circle as cycle:
-                self._make_way(cycle.arcs, sum(self._arcs[each].seconds for each in cycle.arcs))
+                excess, missed_by, reasons = self._relax()
+            except Circle as circle:
+                self._make_way(circle.arcs, sum(self._seconds[each] for each in circle.arcs))
                 continue
             if excess is None:
                 break
-            arc = self._arcs[excess]
-            missed_by = self.times[arc.source] + arc.seconds - self.times[arc.target]
-            self._make_way([*self._reasons(arc.source), excess], missed_by)
+            self._make_way([*reasons, excess], missed_by)
         else:
-            self._give_up()
-        changed = {each for each, old in self._old.items() if abs(self.times[each] - old) > FINEST}
-        self._old.clear()
-        return changed
+            for number, arc in enumerate(self._arcs):
+                if arc.is_bound and not self._is_fact[arc.source]:
+                    self._give_up(number)
+            self._relax()
+        others = compress(range(self._size), map(ne, self.times, before))
+        return {each for each in others if abs(self.times[each] - before[each]) > FINEST}
 
-    def _switch_off(self, number: int) -> None:
-        self._given_way.discard(number)
-        self._broken.discard(number)
-        super()._switch_off(number)
+    # -- longest paths -------------------------------------------------------------------------------------------
+
+    def _relax(self) -> tuple[int | None, Seconds, list[int]]:
+        """Set the times. Returns a bound on a fact that cannot be kept, by how much, and the arcs that ask for that.
+
+        Raises Circle.
+        """
+        seconds, ends = self._seconds, self._ends
+        times = self.times = self._floor[:]
+        causes: dict[int, int] = {}
+        sweeps = 0
+        while True:
+            moved = -1
+            for number in self._back if sweeps % 2 else self._forward:
+                source, target = ends[number]
+                at = times[source] + seconds[number]
+                if at > times[target] + FINEST:
+                    times[target], causes[target], moved = at, number, target
+            sweeps += 1
+            if moved < 0 and sweeps > 1:
+                break  # One sweep in this order finds all that follows from arcs of one kind.
+            if moved >= 0 and sweeps > 2 and (circle := self._chain(causes, moved)[1]):
+                raise Circle(circle)
+        broken = [
+            number
+            for number in self._on_facts
+            if times[(arc := self._arcs[number]).source] + seconds[number] > times[arc.target] + EPSILON
+        ]
+        if not broken:
+            return None, 0.0, []
+        number = max(broken, key=lambda each: (self._rank[self._arcs[each].source], each))
+        arc = self._arcs[number]
+        missed_by = times[arc.source] + seconds[number] - times[arc.target]
+        return number, missed_by, self._chain(causes, arc.source)[0]
+
+    def _chain(self, causes: Mapping[int, int], node: int) -> tuple[list[int], list[int]]:
+        """The arcs that make a node as late as it is, from the last on; and those of a circle among them, if any."""
+        path: list[int] = []
+        seen: dict[int, int] = {}
+        while (number := causes.get(node)) is not None:
+            if node in seen:
+                return path, path[seen[node] :]
+            seen[node] = len(path)
+            path.append(number)
+            node = self._arcs[number].source
+        return path, []
 
     # -- making way ----------------------------------------------------------------------------------------------
 
     def _make_way(self, numbers: Sequence[int], excess: Seconds) -> None:
-        """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, break a bound.
+        """Let the phases along the way take less, or bear more, by `excess` in all; if they cannot, give up a bound.
 
         As the plan does: what it does not keep is not hurried for; what it makes slower or faster gives way first.
         """
         if (unkept := next((each for each in numbers if each in self._unkept), None)) is not None:
-            self._break(unkept)
+            self._give_up(unkept)
             return
-        room = {each: self._arcs[each].seconds - self._arcs[each].least for each in numbers}
-        elastic = [each for each in numbers if room[each] > FINEST and self._arcs[each].behavior]
+        arcs, seconds = self._arcs, self._seconds
+        room = {each: seconds[each] - arcs[each].least for each in numbers}
+        elastic = [each for each in numbers if room[each] > FINEST and arcs[each].behavior]
         if (as_others := next((each for each in numbers if each in self._as_others), None)) is not None:
-            elastic = [each for each in elastic if self._arcs[each].is_bound or each in self._bent]
+            elastic = [each for each in elastic if arcs[each].is_bound or each in self._bent]
         boundless = [each for each in elastic if room[each] == inf]
         if boundless:
-            elastic = [min(boundless, key=lambda each: (each not in self._bent, self._rank[self._arcs[each].target]))]
+            elastic = [
+                min(boundless, key=lambda each: (each not in self._bent, self._rank.get(arcs[each].target, -1)))
+            ]
             room[elastic[0]] = excess
         enough = bool(elastic) and sum(room[each] for each in elastic) >= excess - EPSILON
         # What can be slower gives way before what has to hurry.
         for is_bound, is_bent in ((True, True), (True, False), (False, True), (False, False)):
-            giving = [
-                each for each in elastic if self._arcs[each].is_bound == is_bound and (each in self._bent) == is_bent
-            ]
+            giving = [each for each in elastic if arcs[each].is_bound == is_bound and (each in self._bent) == is_bent]
             total = sum(room[each] for each in giving)
             share = min(1.0, excess / total) if total > 0.0 and excess > 0.0 else 0.0
             excess -= share * total
             for each in giving if share else ():
                 self._given_way.add(each)
-                self._set_seconds(each, self._arcs[each].seconds - share * room[each])
+                seconds[each] -= share * room[each]
         if not enough and as_others is not None:
             self._given_way.add(as_others)
-            self._set_seconds(as_others, self._arcs[as_others].seconds - excess)
+            seconds[as_others] -= excess
         elif not enough:
-            bounds = [each for each in numbers if self._arcs[each].is_bound]
-            self._break(next((each for each in bounds if self._arcs[each].behavior), bounds[-1]))
+            bounds = [each for each in numbers if arcs[each].is_bound]
+            self._give_up(next((each for each in bounds if arcs[each].behavior), bounds[-1]))
 
-    def _break(self, number: int) -> None:
-        self._broken.add(number)
-        self._arcs[number].is_on = False
-        self._loosen(number)
-
-    def _restore(self, number: int) -> None:
-        arc = self._arcs[number]
-        if number in self._broken:
-            arc.is_on = True
-            self._touch(arc.source)
-        self._set_seconds(number, arc.asked)
-
-    def _give_up(self) -> None:
-        for number, arc in enumerate(self._arcs):
-            if arc.is_on and arc.is_bound and not self._is_fact[arc.source]:
-                self._break(number)
-        self._relax()
+    def _give_up(self, number: int) -> None:
+        self._seconds[number] = -inf

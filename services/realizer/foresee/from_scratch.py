@@ -1,4 +1,4 @@
-"""Forecasts of a plan from scratch: of every instant, with all that was measured; and whether a plan needs one."""
+"""Forecast of a plan of which none is kept, with all that was measured; and whether a plan needs one that is kept."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -19,7 +19,7 @@ def full_forecast(
     prolonged: Iterable[tuple[int, int, Seconds]] = (),
     heard: Mapping[str, Seconds] = {},
 ) -> Forecast:
-    """Forecast of every instant, from scratch. instants: those that are over. prolonged, heard: see `prolong` and
+    """Forecast of a block that keeps none. instants: those that are over. prolonged, heard: see `prolong` and
     `shift` of `Forecast`."""
     forecast = Forecast(plan, began, factor, foreseen)
     for source, target, seconds in prolonged:
@@ -34,8 +34,6 @@ def full_forecast(
         forecast.shift(behavior, at)
     for transition, at in instants.items():
         forecast.fix(transition, at)
-    for transition in range(len(plan.members)):
-        forecast.require(transition)
     forecast.update()
     return forecast
 
