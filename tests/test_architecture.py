@@ -59,7 +59,7 @@ LAYERS = {
     " > config journal keyring",
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating figure serving voice"
     " > contract > config motion",
-    "services/commandline": "robot > look > study talk > app bodies embedding > shell",
+    "services/commandline": "look robot > study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > hearing > studied > faulting > feeds people > chunking event_stream"
     " inputs results steering",
     "services/generation": "service > fragment_runner > performance > body_link choosing_again"

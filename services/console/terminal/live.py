@@ -10,7 +10,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import nets, view, wording
-from engage_hri.services.console.terminal import log
+from engage_hri.services.console.terminal import log, tally
 from engage_hri.services.console.terminal.render import render
 
 REDRAW: Seconds = 0.1
@@ -93,6 +93,23 @@ class Log:
 
     def __exit__(self, *raised: object) -> None:
         return None
+
+
+class Tallying:
+    """A sink that keeps the tally."""
+
+    def __init__(self, began: Seconds) -> None:
+        self.tally = tally.empty(began)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.tally = tally.feed(self.tally, message, at)
+
+
+def scene_view(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
+    """Choose the sink that shows the scene: a live view on a terminal, log lines anywhere else."""
+    return (
+        LiveView(console, robot, began) if live else Log(console, robot, began, log.Telling(points=False, head=False))
+    )
 
 
 def _print(console: Console, line: str) -> None:
