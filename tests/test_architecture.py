@@ -47,6 +47,9 @@ SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording", "repor
 """Packages of `services` that are no service, and that services may import."""
 PURE_SHARED = {"recording", "reports", "text"}
 """Those of them whose files are pure, as those of a service are."""
+KNOW_TANGRAM = ("services/tangram/", "services/collaboration/", "services/simulation/", "services/control/mujoco/")
+"""Folders that play the task of the thesis, and the physics whose room has its table. The core knows no tangram:
+docs/decisions/0145."""
 LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > collaboration console control doctor generation realizer recognition"
@@ -56,7 +59,7 @@ LAYERS = {
     " > config journal keyring",
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating figure serving voice"
     " > contract > config motion",
-    "services/commandline": "robot > look > study talk > app bodies embedding > shell",
+    "services/commandline": "look robot > study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > hearing > studied > faulting > feeds people > chunking event_stream"
     " inputs results steering",
     "services/generation": "service > fragment_runner > performance > body_link choosing_again"
@@ -162,6 +165,8 @@ def _import(place: PurePosixPath, module: str) -> Iterator[str]:
     elsewhere = first == "services" and second not in ("", package) and (ROOT / "services" / second).is_dir()
     if package and package not in COMPOSERS | SHARED and elsewhere and second not in SHARED:
         yield "services do not import one another"
+    if package and module.startswith("services.tangram") and not str(place).startswith(KNOW_TANGRAM):
+        yield "the core knows no tangram"
     yield from _layering(place, module)
     if package in ON_A_ROBOT and module.startswith("services.simulation"):
         yield "simulation has no business on a robot"
@@ -390,6 +395,9 @@ def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
         ("services/realizer/service.py", "from services.generation.config import X", "one another"),
         ("services/realizer/service.py", "from services import generation", "one another"),
         ("services/collaboration/task.py", "import services.simulation.table", "one another"),
+        ("services/realizer/plan/x.py", "from services.tangram.table import TangramTable", "no tangram"),
+        ("services/console/web/x.py", "from services import tangram", "no tangram"),
+        ("services/control/torso/x.py", "import services.tangram.table", "no tangram"),
         ("services/control/service.py", "from services.simulation import table", "no business on a robot"),
         ("services/control/service.py", "import zenoh", "imports zenoh"),
         ("services/commandline/app.py", "from zenoh import Config", "imports zenoh"),
@@ -443,7 +451,7 @@ def test_a_broken_rule_is_caught(path: str, text: str, reason: str) -> None:
             "services/realizer/plan/x.py",
             "import numpy\nfrom engage_hri.services.realizer.config import RealizerConfig",
         ),
-        ("services/realizer/plan/x.py", "from engage_hri.services.tangram.table import TangramTable"),
+        ("services/simulation/x.py", "from engage_hri.services.tangram.table import TangramTable"),
         ("services/realizer/perform/performance.py", "import asyncio"),
         ("services/bus/zenoh/hub.py", "import time\nimport zenoh"),
         ("services/commandline/look/demo.py", "from engage_hri.services.simulation import service\nimport asyncio"),

@@ -4,10 +4,10 @@ The id of a fragment, and of the block of its connection events, is its step; it
 no such step.
 """
 
+from engage_hri.schemas.footprints import Side
 from engage_hri.services.collaboration.plans import Manager, Turn
 from engage_hri.services.collaboration.relations import Relation
 from engage_hri.services.collaboration.task import Instruction
-from engage_hri.services.tangram.table import Side
 
 AS_IN_STEP_19 = Relation("purple-triangle", "top right", "trapezoid")
 """Place where the human puts the piece, against step 18; the robot says "good" in step 20 all the same."""

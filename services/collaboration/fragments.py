@@ -19,9 +19,10 @@ from engage_hri.schemas.behaviors import (
     Speech,
     SpeechOption,
 )
+from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.services.collaboration.relations import Relation
-from engage_hri.services.tangram.table import Side, TangramTable
+from engage_hri.services.tangram.table import TangramTable
 
 MANIPULATION: tuple[Action, ...] = ("act", "speak", "nod", "shake")
 """Actions that answer a request to move a piece."""

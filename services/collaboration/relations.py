@@ -9,8 +9,8 @@ from itertools import permutations
 
 from msgspec import Struct
 
+from engage_hri.schemas.footprints import Side, edges, touches
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.table import Side, edges, touches
 
 
 class Relation(Struct, frozen=True):

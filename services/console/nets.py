@@ -1,6 +1,6 @@
 """Nets of live blocks with their tokens, as values: made of `NetPlanned`, `NetMarked` and `NetWaiting` alone.
 
-`feed(nets, message, at, now)` gives the next nets; `services/console/terminal/net_drawing.py` draws one, `told` says
+`feed(nets, message, at, now)` gives the next nets; `services/commandline/talk/net_drawing.py` draws one, `told` says
 what a message changed.
 """
 

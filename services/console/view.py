@@ -4,8 +4,6 @@
 the bus.
 """
 
-from collections.abc import Iterable
-
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -16,7 +14,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
 from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
@@ -31,11 +29,8 @@ UTTERANCES_KEPT = 160
 EVENTS_KEPT = 100
 NOTES_KEPT = 3
 WARNINGS_KEPT = 64
-ENDED_BLOCKS_KEPT = 2
 LOST_KEPT = 3
 """Number of people that are shown as gone: those who left last."""
-LOST = "lost"
-"""Status of a block whose realizer has gone from the bus in the middle of it."""
 SAME_SPEECH: Seconds = 1.0
 """Greatest distance of the beginnings of a speech and of its words."""
 OWN_BLOCKS = ("maintenance-", "response-")
@@ -73,30 +68,6 @@ class UtteranceInView(Struct, frozen=True, kw_only=True):
     open: bool = True
 
 
-class PointInView(Struct, frozen=True, kw_only=True):
-    """A sync point of a block; both times count from the block's start."""
-
-    behavior: str
-    sync: str
-    planned: Seconds | None = None
-    realised: Seconds | None = None
-
-    @property
-    def slip(self) -> Seconds | None:
-        """Time by which the point came later than planned."""
-        return None if self.planned is None or self.realised is None else self.realised - self.planned
-
-
-class BlockInView(Struct, frozen=True, kw_only=True):
-    """Block with its sync points, by behavior and name."""
-
-    id: str
-    began: Seconds
-    points: Shelf[tuple[str, str], PointInView] = Shelf()
-    status: str = ""
-    """Status at its end; empty while it runs."""
-
-
 class EventInView(Struct, frozen=True, kw_only=True):
     """A connection event in its last known state."""
 
@@ -124,7 +95,6 @@ class Scene(Struct, frozen=True, kw_only=True):
     now: Seconds
     actors: Shelf[str, Actor] = Shelf()
     said: tuple[UtteranceInView, ...] = ()
-    blocks: tuple[BlockInView, ...] = ()
     events: tuple[EventInView, ...] = ()
     owner: Claim | None = None
     waiting: tuple[Claim, ...] = ()
@@ -140,8 +110,6 @@ class Scene(Struct, frozen=True, kw_only=True):
     """Warnings of behaviors of the last blocks: each again for another behavior is no news."""
     faults_by: str = ""
     """Participant that switched them; empty: the configuration."""
-    realizer: str = ""
-    """Life of the realizer; empty: unknown."""
 
     @property
     def condition(self) -> StudyCondition | None:
@@ -150,12 +118,6 @@ class Scene(Struct, frozen=True, kw_only=True):
 
     def actor(self, id: str) -> Actor:
         return self.actors.get(id) or Actor(id=id)
-
-    @property
-    def block(self) -> BlockInView | None:
-        """Block to show: the newest that runs, else the last that ended."""
-        running = [block for block in self.blocks if not block.status]
-        return running[-1] if running else (self.blocks[-1] if self.blocks else None)
 
 
 def empty(robot: str, at: Seconds) -> Scene:
@@ -173,25 +135,13 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return _speak(scene, message, at)
         case Utterance(text=text) if text:
             return _understand(scene, message, at)
-        case BlockProgress(block=str() as block) if not block.startswith(OWN_BLOCKS):
-            return _block(scene, message, at)
-        case SyncPointProgress(block=block) if not block.startswith(OWN_BLOCKS):
-            point = PointInView(
-                behavior=message.behavior, sync=message.sync, planned=message.predicted, realised=message.time
-            )
-            return _points(scene, block, (point,))
-        case PredictionFeedback(block=block) if not block.startswith(OWN_BLOCKS):
-            points = tuple(PointInView(behavior=p.behavior, sync=p.sync, planned=p.time) for p in message.points)
-            return _points(scene, block, points)
+        case BlockProgress(block=block, progress="start"):
+            return replace(scene, warned=tuple(each for each in scene.warned if each[0] != block))
         case PeerGone(participant="generation") if scene.owner is not None:
             return replace(scene, owner=None, waiting=(), left=(scene.owner, scene.waiting))
         case PeerAlive(participant="generation", run=run) if scene.left is not None:
             owner, waiting = scene.left if run == life else (None, ())
             return replace(scene, owner=owner, waiting=waiting, left=None)
-        case PeerAlive(participant="realizer", run=run):
-            return replace(_changed(scene, LOST, "") if run == scene.realizer else scene, realizer=run)
-        case PeerGone(participant="realizer"):
-            return _changed(scene, "", LOST)
         case ConnectionEvent():
             return _event(scene, message, at)
         case HeadOwner(owner=owner, waiting=waiting):
@@ -291,47 +241,6 @@ def _understand(scene: Scene, utterance: Utterance, at: Seconds) -> Scene:
             said[index] = replace(known, id=utterance.id, text=utterance.text)
             return replace(scene, said=tuple(said))
     return replace(scene, said=(*scene.said, new)[-UTTERANCES_KEPT:])
-
-
-def _block(scene: Scene, message: BlockProgress, at: Seconds) -> Scene:
-    assert message.block is not None
-    if message.progress == "start":
-        others = tuple(block for block in scene.blocks if block.id != message.block)
-        scene = replace(scene, warned=tuple(each for each in scene.warned if each[0] != message.block))
-        return replace(scene, blocks=(*others, BlockInView(id=message.block, began=at)))
-    blocks = [replace(block, status=message.status) if block.id == message.block else block for block in scene.blocks]
-    return replace(scene, blocks=_without_old(blocks))
-
-
-def _changed(scene: Scene, status: str, other: str) -> Scene:
-    """Give all blocks of a status another one."""
-    blocks = [replace(block, status=other) if block.status == status else block for block in scene.blocks]
-    return replace(scene, blocks=_without_old(blocks))
-
-
-def _without_old(blocks: Iterable[BlockInView]) -> tuple[BlockInView, ...]:
-    """The blocks without those that ended before the last ones."""
-    kept = tuple(blocks)
-    forgotten = {block.id for block in [block for block in kept if block.status][:-ENDED_BLOCKS_KEPT]}
-    return tuple(block for block in kept if block.id not in forgotten)
-
-
-def _points(scene: Scene, id: str, news: tuple[PointInView, ...]) -> Scene:
-    blocks = tuple(_merged(block, news) if block.id == id else block for block in scene.blocks)
-    return replace(scene, blocks=blocks)
-
-
-def _merged(block: BlockInView, news: tuple[PointInView, ...]) -> BlockInView:
-    """Add points to a block. A realised point keeps its time, and the newest plan before it."""
-    changed = []
-    for new in news:
-        name = (new.behavior, new.sync)
-        if (old := block.points.get(name)) is None:
-            changed.append((name, new))
-        elif old.realised is None:
-            planned = old.planned if new.planned is None else new.planned
-            changed.append((name, replace(new, planned=planned)))
-    return replace(block, points=block.points.put_all(changed))
 
 
 def _event(scene: Scene, event: ConnectionEvent, at: Seconds) -> Scene:

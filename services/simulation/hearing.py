@@ -12,9 +12,10 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults
 from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.footprints import SIDES
 from engage_hri.schemas.messages import Message
 from engage_hri.services.simulation.human import Lay
-from engage_hri.services.tangram.table import SIDES, TangramTable
+from engage_hri.services.tangram.table import TangramTable
 
 REQUEST = re.compile(
     r"(?:move|fix|put) (?P<piece>.+?) so that it is touching the (?P<side>[a-z ]+?) of (?P<landmark>.+)"

@@ -17,10 +17,10 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.behaviors import Action, EventKind
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.tangram.table import Side
 
 FACE = "@robot"
 """Placeholder for the robot's face, because the script does not know its id."""

@@ -7,6 +7,7 @@ into messages of perception.
 from collections.abc import Callable, Iterator
 
 from engage_hri.schemas.body import RobotSeen
+from engage_hri.schemas.footprints import PiecePose, overlap, poses_touching
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
@@ -30,7 +31,6 @@ from engage_hri.services.simulation.human import (
 from engage_hri.services.simulation.seen_arms import SeenArms
 from engage_hri.services.simulation.speaking import SpokenWords
 from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram.table import PiecePose, overlap, poses_touching
 
 Stamper = Callable[[Seconds], Stamp]
 

@@ -13,6 +13,7 @@ from msgspec import Struct
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.footprints import SIDES, poses_touching
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
@@ -34,7 +35,7 @@ from engage_hri.services.simulation.human import (
 )
 from engage_hri.services.simulation.listening import COMES, GOES, moves
 from engage_hri.services.simulation.speaking import speech
-from engage_hri.services.tangram.table import SIDES, TangramTable, poses_touching
+from engage_hri.services.tangram.table import TangramTable
 
 NOD: Seconds = 0.5
 WORD: Seconds = 0.5

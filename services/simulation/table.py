@@ -10,9 +10,10 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas.footprints import PiecePose
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.table import PiecePose, TangramTable
+from engage_hri.services.tangram.table import TangramTable
 
 HAND_SPEED: float = 0.45
 """Mean speed of a hand over a movement, in m/s. Unhurried reaching at a table is about 0.4..0.8 m/s."""

@@ -24,7 +24,7 @@ def test_the_text_shows_the_schedule(engage: Engage, block: Path) -> None:
 def test_the_text_ends_with_a_drawing_of_the_net_before_it_begins(engage: Engage, block: Path) -> None:
     title, _, start, look, words, *_, legend = engage("plan", block).out.partition("\n\nblock ")[2].splitlines()
 
-    assert title == "hello: 0 of 7 instants have fired, 1 ●"
+    assert title == "hello: 7 instants, 1 ●"
     assert start.split()[:2] == ["bml", "●"]
     assert look.startswith("look")
     assert look.index("*") == words.index("s", 5)  # the instant that both share

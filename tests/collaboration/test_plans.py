@@ -6,6 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Reference, Speech
+from engage_hri.schemas.footprints import poses_touching
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration import appendix_b
@@ -22,7 +23,7 @@ from engage_hri.services.collaboration.plans import (
     script,
     task,
 )
-from engage_hri.services.tangram.table import poses_touching, tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 TABLE = tangram_table()
 UNIVERSE = {piece.id for piece in TABLE.pieces}

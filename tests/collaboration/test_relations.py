@@ -7,11 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from engage_hri.schemas.footprints import PiecePose, poses_touching
 from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.placement import has_been_placed
 from engage_hri.services.collaboration.relations import Relation, relation, relations
 from engage_hri.services.collaboration.task import Goal, Instruction, check
-from engage_hri.services.tangram.table import PiecePose, poses_touching, tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 TABLE = tangram_table()
 GOAL = {entity.id: entity for entity in TABLE.figure()}

@@ -1,4 +1,4 @@
-"""Nets of live blocks as text: drawings and lines are values, the same for the same messages."""
+"""Nets as text: lines about those of live blocks, and the drawing of a plan's."""
 
 import asyncio
 from io import StringIO
@@ -11,10 +11,10 @@ from rich.console import Console
 
 from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.commandline.talk.net_drawing import drawing, legend
 from engage_hri.services.console import nets
 from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
-from engage_hri.services.console.terminal.live import LiveNets, NetLog
-from engage_hri.services.console.terminal.net_drawing import drawing, legend, picture
+from engage_hri.services.console.terminal.live import NetLog
 from engage_hri.services.console.web.net_layout import laid_out
 from tests.random_cases import share_of
 
@@ -64,22 +64,13 @@ FIGURE_4_8 = NetPlanned(
 )  # fmt: skip
 
 
-def figure(marked: tuple[int, ...], *fired: tuple[int, float]) -> NetInView:
-    net = in_view(FIGURE_4_8)
-    assert net is not None
-    news = NetMarked(
-        block="b", taken=(19,), put=marked, fired=tuple(Fired(transition=one, time=at) for one, at in fired)
-    )
-    return feed({"b": net}, news, 0.0, 0.0)["b"]
-
-
-def test_figure_4_8_before_it_begins() -> None:
+def test_figure_4_8_is_drawn() -> None:
     net = in_view(FIGURE_4_8)
     assert net is not None
     assert (
-        "\n".join(drawing(net))
+        "\n".join(drawing(net, 80, 40))
         == """\
-block b: 0 of 13 instants have fired, 1 ●
+block b: 13 instants, 1 ●
 planned    0.00 0.00 0.50 1.00 1.25 1.75 2.00 2.25 2.25 2.75 2.75 3.25 3.25
 bml      ● s─────────────────────────────○─────────────────────────────e
 gaze-1      ┄○┄┄sr[○─*───────────────────○───────────────────]x─○─e┄○┄┄
@@ -88,26 +79,7 @@ speech-1    ┄┄┄┄┄┄┄┄┄○┄┄┄┄┄┄┄┄┄s───�
 series                                                  ├┄○┄┄┤
 series                                             ├┄┄┄┄○┄┄┄┄┤"""
     )
-    assert legend((net,)) == "●=token s=start r=ready [=stroke_start *=stroke ]=stroke_end x=relax e=end"
-
-
-def test_figure_4_8_while_pointing_and_speech_go_on_together() -> None:
-    """The token of each behavior is in the phase where it is; what has fired stands below what was planned."""
-    net = figure((3, 6, 8, 9), (0, 0.0), (1, 0.01), (2, 0.52), (3, 1.04), (4, 1.3))
-
-    assert (
-        "\n".join(drawing(net, now=1.34))
-        == """\
-block b: 1.3 s, 5 of 13 instants have fired, 4 ●
-planned    0.00 0.00 0.50 1.00 1.25 1.75 2.00 2.25 2.25 2.75 2.75 3.25 3.25
-fired      0.00 0.01 0.52 1.04 1.30
-bml      ○ s─────────────────────────────●─────────────────────────────e
-gaze-1      ┄○┄┄sr[○━*───────────────────●───────────────────]x─○─e┄○┄┄
-point-1     ┄┄┄┄○┄┄┄┄s━○━━r━○━━[─●──*─○──]─○──x────○────e┄┄┄┄┄┄○┄┄┄┄┄┄┄
-speech-1    ┄┄┄┄┄┄┄┄┄○┄┄┄┄┄┄┄┄┄s─────────●─────────e┄┄┄┄┄┄┄┄┄○┄┄┄┄┄┄┄┄┄
-series                                                  ├┄○┄┄┤
-series                                             ├┄┄┄┄○┄┄┄┄┤"""
-    )
+    assert legend(net) == "●=token s=start r=ready [=stroke_start *=stroke ]=stroke_end x=relax e=end"
 
 
 def test_who_waits_for_its_start_is_told_with_what_it_waits_for() -> None:
@@ -140,9 +112,9 @@ def test_a_delay_has_its_seconds_and_its_token() -> None:
     assert net is not None
 
     assert (
-        "\n".join(drawing(net, 40))
+        "\n".join(drawing(net, 40, 40))
         == """\
-block d: 0 of 4 instants have fired, 1 ●
+block d: 4 instants, 1 ●
 planned     0.00  0.50  2.50  3.00
 bml         s                 e
 a            ┄┄○┄┄s
@@ -153,18 +125,18 @@ order             ├┄┄○┄┄┤"""
 
 
 def test_a_narrow_or_low_terminal_gets_less_and_is_told_how_much() -> None:
-    net = figure((3, 6, 8, 9), (0, 0.0), (1, 0.01), (2, 0.52), (3, 1.04), (4, 1.3))
+    net = in_view(FIGURE_4_8)
+    assert net is not None
 
     assert (
-        "\n".join(drawing(net, 40, 7, now=1.34))
+        "\n".join(drawing(net, 40, 6))
         == """\
-block b: 1.3 s, 5 of 13 instants have f…
-planned   …·  0.50  1.25  2.00  2.25  …
-fired     …·  0.52  1.30              …
-bml      ○…─────────────●─────────────…
-gaze-1    …s○━*───────────●───────────…
-point-1   …┄○┄s○━r○━[●─*○─]○─x──○──e○┄…
-… 3 more lines, with 1 ●"""
+block b: 13 instants, 1 ●
+planned    0.00  0.50  1.25  2.00  ·  …
+bml      ● s────────────○─────────────…
+gaze-1      ○┄s○─*─────────○──────────…
+point-1     ┄┄○┄┄s○─r○─[○─*○─]○─x──○──…
+… 3 more lines"""
     )
 
 
@@ -206,13 +178,12 @@ def test_whatever_is_told_is_drawn_within_the_terminal(
         for block, net in seen.items():
             list(told(before.get(block), net))
     for net in seen.values():
-        lines = drawing(net, width, height, 1.0)
+        if net.waits_for:
+            continue
+        lines = drawing(net, width, height)
         assert all(cell_len(line) <= width for line in lines)
         assert all(line.isprintable() for line in lines)
-        assert len(lines) <= max(height, 5)
-    if width > 20:
-        text = picture(tuple(seen.values()), width, height, 1.0)
-        assert all(cell_len(line) <= width for line in text.plain.split("\n"))
+        assert len(lines) <= max(height, 4)
 
 
 def test_a_net_that_leads_nowhere_is_not_taken() -> None:
@@ -272,13 +243,13 @@ def test_letters_stand_for_points_as_a_block_spells_them_and_for_every_stroke() 
     )  # fmt: skip
     net = in_view(message)
     assert net is not None
-    rows = {line.split()[0]: "".join(line.split()[1:]) for line in drawing(net)[2:]}
+    rows = {line.split()[0]: "".join(line.split()[1:]) for line in drawing(net, 80, 40)[2:]}
     assert rows["n"].replace("┊", "") == "s[**]"
     assert (rows["smile"].strip("┊"), rows["s"].strip("┊")) == ("p", "m")
-    assert legend((net,)) == "●=token s=start p=attackPeak [=strokeStart *=stroke ]=strokeEnd e=end m=mark"
+    assert legend(net) == "●=token s=start p=attackPeak [=strokeStart *=stroke ]=strokeEnd e=end m=mark"
 
 
-def test_a_block_that_waits_for_its_turn_is_told_and_drawn_with_those_that_it_waits_for() -> None:
+def test_a_block_that_waits_for_its_turn_is_told_with_those_that_it_waits_for() -> None:
     running = feed({}, FIGURE_4_8, 0.0, 0.0)
     waiting = feed(running, NetWaiting(block="c", since=AT, waits_for=("b", "a")), 0.0, 0.0)
     fewer = feed(waiting, NetWaiting(block="c", since=AT, waits_for=("b",)), 0.0, 1.0)
@@ -291,12 +262,7 @@ def test_a_block_that_waits_for_its_turn_is_told_and_drawn_with_those_that_it_wa
     assert list(told(fewer["c"], again["c"])) == []
     assert list(told(again["c"], begun["c"])) == list(told(None, begun["c"]))
     assert list(told(again["c"], over["c"])) == ["c: over"]
-    assert drawing(again["c"], 80, 20, 2.5) == ["block c: 2.5 s, waits for b"]
     assert "c" not in nets.without_old(over, 5.0)
-    lines = picture(tuple(again.values()), 80, 40, 2.5, ["everything"]).plain.split("\n")
-    assert lines[:2] == ["held: everything", "block c: 2.5 s, waits for b"]
-    assert any(line.startswith("block b: 2.5 s, 0 of 13 instants") for line in lines)
-    assert picture((), 80, 24, 0.0, ["b: g"]).plain == "held: b: g\nno block runs"
 
 
 def test_a_net_goes_a_moment_after_its_end_and_when_nobody_speaks_of_it() -> None:
@@ -310,56 +276,11 @@ def test_a_net_goes_a_moment_after_its_end_and_when_nobody_speaks_of_it() -> Non
     assert feed({}, NetMarked(block="b", put=(1,)), 0.0, 0.0) == {}
 
 
-def test_blocks_of_the_robot_itself_are_drawn_last() -> None:
-    seen = [
-        in_view(NetPlanned(block=block, at=AT, transitions=FIGURE_4_8.transitions, places=FIGURE_4_8.places))
-        for block in ("old", "new", "response-1")
-    ]
-
-    titles = [
-        line.split(":")[0]
-        for line in picture(tuple(filter(None, seen)), 80, 60, 0.0).plain.split("\n")
-        if line.startswith("block")
-    ]
-
-    assert titles == ["block new", "block old", "block response-1"]
-    assert picture((), 80, 24, 0.0).plain == "no block runs"
-
-
 def started(*fired: int) -> NetMarked:
     return NetMarked(block="b", fired=tuple(Fired(transition=one, time=0.5) for one in fired))
 
 
-async def test_a_terminal_is_drawn_anew_as_tokens_move_and_cleared_in_the_end() -> None:
-    screen = StringIO()
-    console = Console(file=screen, force_terminal=True, width=80, height=24, color_system=None)
-
-    def drawn() -> str:
-        text = screen.getvalue()
-        screen.seek(0)
-        screen.truncate()
-        return text
-
-    with LiveNets(console) as view:
-        assert "no block runs" in drawn()
-        view(FIGURE_4_8, 0.0)
-        view(started(0), 0.0)
-        assert drawn() == ""  # many messages make one picture
-        await asyncio.sleep(0.15)
-        assert "1 of 13 instants have fired, 1 ●" in drawn()
-        view(started(1), 0.0)
-        await asyncio.sleep(0.6)
-        assert "2 of 13 instants have fired, 1 ●" in drawn()
-        view(NetMarked(block="b", is_over=True), 0.0)
-        await asyncio.sleep(0.6)
-        assert "block b: over" in drawn()
-        await asyncio.sleep(2.0)
-        assert "no block runs" in drawn()
-        await asyncio.sleep(5.0)
-        assert drawn() == ""
-
-
-async def test_without_a_terminal_each_change_is_a_line() -> None:
+async def test_each_change_of_a_live_net_is_a_line() -> None:
     out = StringIO()
     log = NetLog(Console(file=out, width=80), asyncio.get_running_loop().time())
 

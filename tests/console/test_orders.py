@@ -13,6 +13,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.footprints import edges, overlap, touches
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.tool import Say
 from engage_hri.schemas.world import Entity, World
@@ -31,7 +32,7 @@ from engage_hri.services.console.web.orders import (
     written,
 )
 from engage_hri.services.console.web.script import Script, backchannel, told
-from engage_hri.services.tangram.table import edges, overlap, tangram_table, touches
+from engage_hri.services.tangram.table import tangram_table
 
 
 @pytest.mark.parametrize(

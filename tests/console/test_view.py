@@ -13,13 +13,9 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.feedback import (
     BlockProgress,
-    PlannedPoint,
-    PredictionFeedback,
-    SyncPointProgress,
     WarningFeedback,
 )
 from engage_hri.schemas.holds import Held, Hold
-from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.console import view
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.log import Telling, line
@@ -76,34 +72,6 @@ def test_who_is_lost_does_nothing(scene: view.Scene) -> None:
     assert scene.actor("human").doing == ()
 
 
-def test_points_keep_plan_and_realisation(scene: view.Scene) -> None:
-    assert scene.block is not None
-    start, end = scene.block.points
-    assert (start.planned, start.realised) == (0.5, 0.6)
-    assert start.slip == pytest.approx(0.1)
-    assert (end.planned, end.realised, end.slip) == (2.0, None, None)
-
-
-def test_a_later_plan_does_not_unsay_what_was_realised(scene: view.Scene) -> None:
-    plan = PredictionFeedback(
-        block="b",
-        points=(PlannedPoint(behavior="s", sync="start", time=9.0), PlannedPoint(behavior="s", sync="end", time=2.5)),
-    )
-    scene = view.feed(scene, plan, 12.0)
-
-    assert scene.block is not None
-    assert [(p.planned, p.realised) for p in scene.block.points] == [(0.5, 0.6), (2.5, None)]
-
-
-def test_the_arbiters_own_blocks_are_not_shown(scene: view.Scene) -> None:
-    after = view.feed(scene, BlockProgress(block="maintenance-3", progress="start", at=at(12.5)), 12.5)
-    after = view.feed(
-        after, SyncPointProgress(block="maintenance-3", behavior="g", sync="start", at=at(12.5), time=0.0), 12.5
-    )
-
-    assert after == msgspec.structs.replace(scene, now=12.5)
-
-
 def test_a_warning_in_the_same_words_for_another_behavior_of_a_block_is_no_news(scene: view.Scene) -> None:
     def warning(behavior: str, block: str = "b") -> WarningFeedback:
         text = "'human' has gone"
@@ -121,29 +89,6 @@ def test_a_warning_in_the_same_words_for_another_behavior_of_a_block_is_no_news(
     assert [note.text.split()[1] for note in picture._notes] == [f"{place}:" for place in places]
 
 
-def test_only_the_last_ended_blocks_are_kept(scene: view.Scene) -> None:
-    for number in range(5):
-        scene = view.feed(scene, BlockProgress(block=f"n{number}", progress="start", at=at(13.0)), 13.0)
-        scene = view.feed(scene, BlockProgress(block=f"n{number}", progress="end", at=at(14.0), status="done"), 14.0)
-
-    assert [block.id for block in scene.blocks] == ["b", "n3", "n4"]
-    assert scene.block is not None
-    assert scene.block.id == "b"
-
-
-def test_blocks_of_a_realizer_that_died_are_lost_and_do_not_pile_up(scene: view.Scene) -> None:
-    for number in range(50):
-        scene = view.feed(scene, PeerAlive(participant="realizer", run=f"{number}"), 13.0)
-        scene = view.feed(scene, BlockProgress(block=f"n{number}", progress="start", at=at(13.0)), 13.0)
-        scene = view.feed(scene, PeerGone(participant="realizer"), 14.0)
-
-    assert [(block.id, block.status) for block in scene.blocks] == [("n48", "lost"), ("n49", "lost")]
-
-    scene = view.feed(scene, PeerAlive(participant="realizer", run="49"), 15.0)  # only its link was cut
-    assert scene.block is not None
-    assert (scene.block.id, scene.block.status) == ("n49", "")
-
-
 def test_a_completed_event_keeps_its_decision(scene: view.Scene) -> None:
     scene = fed(view.feed, scene, [event("e1", "completed", 13.0, started=at(11.0), duration=1.1)])
 
@@ -155,7 +100,7 @@ def test_the_view_says_who_speaks_who_looks_where_and_who_owns_the_head(scene: v
 
     for expected in (
         "robot: a rectangle", "looks at rectangle", "looks at the robot", "fragment: rectangle", "one every 4.20 s",
-        "s: start", "0.60", "+0.10", "directed gaze", "robot→human", "succeeded 0.90 s",
+        "directed gaze", "robot→human", "succeeded 0.90 s",
     ):  # fmt: skip
         assert expected in text
 
@@ -187,8 +132,7 @@ def test_events_fill_the_height_there_is(width: int, height: int) -> None:
     assert "1:38.0" in shown[-1]
     assert width < 60 or "p98" in shown[-1]
     assert width < 60 or "succeeded" in shown[-1]
-    frames = 0 if width < 72 or height < 20 else 3
-    assert len(shown) >= height // 2 - frames, "half of the picture at least"
+    assert len(shown) >= height // 2, "half of the picture at least"
 
 
 def test_a_small_view_has_who_does_what_the_words_and_the_newest_event(scene: view.Scene) -> None:
@@ -238,30 +182,12 @@ def test_the_newest_warning_is_the_one_a_small_view_has(scene: view.Scene) -> No
     assert "older" not in text
 
 
-def test_who_is_early_is_noticed_like_who_is_late() -> None:
-    scene = view.feed(view.empty("robot", 0.0), BlockProgress(block="b", progress="start", at=at(0.0)), 0.0)
-    for behavior, time in (("early", 0.2), ("late", 0.8), ("right", 0.55)):
-        reached = SyncPointProgress(block="b", behavior=behavior, sync="start", at=at(1.0), time=time, predicted=0.5)
-        scene = view.feed(scene, reached, 1.0)
-    console = Console(width=120, file=StringIO(), force_terminal=True, color_system="standard")
-    console.print(render(scene, 120, 40))
-    yellow = "\x1b[33m"
-
-    rows = [line for line in console.file.getvalue().splitlines() if ": start" in line]  # type: ignore[attr-defined]
-    assert [("early" in row or "late" in row) == (yellow in row) for row in rows] == [True] * 3
-    assert [name for row in rows for name in ("early", "right", "late") if f" {name}:" in row] == [
-        "early",
-        "right",
-        "late",
-    ]
-
-
 def test_the_view_has_no_word_that_a_visitor_must_look_up(scene: view.Scene) -> None:
     assert not [word for word in ("MTBCE", "slip", "sync point") if word in drawn(scene)]
 
 
 def test_an_empty_scene_can_be_drawn() -> None:
-    assert "does nothing yet" in drawn(view.empty("robot", 0.0))
+    assert drawn(view.empty("robot", 0.0)).startswith("engage 0:00.0")
 
 
 def test_brackets_in_ids_are_not_markup() -> None:
@@ -322,21 +248,6 @@ def instructions(feed: Callable[[Fed, Any, float], Fed], before: Fed, message: o
     finally:
         sys.settrace(tracing)
     return count, after
-
-
-def test_a_sync_point_costs_the_view_no_look_at_all_other_points_of_its_block() -> None:
-    def work(size: int) -> int:
-        points = tuple(PlannedPoint(behavior=f"b{number}", sync="end", time=1.0) for number in range(size))
-        scene = view.feed(view.empty("robot", 0.0), BlockProgress(block="long", progress="start", at=at(0.0)), 0.0)
-        scene = view.feed(scene, PredictionFeedback(block="long", points=points), 0.0)
-        reached = SyncPointProgress(block="long", behavior="b7", sync="end", at=at(0.0), time=1.5)
-        count, scene = instructions(view.feed, scene, reached)
-        assert scene.block is not None
-        assert list(scene.block.points)[7].realised == 1.5
-        assert [point.behavior for point in scene.block.points] == [each.behavior for each in points]
-        return count
-
-    assert work(1000) == work(10)
 
 
 def test_an_action_costs_the_view_no_look_at_all_who_are_here() -> None:

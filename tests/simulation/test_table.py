@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.footprints import PiecePose
 from engage_hri.services.simulation.table import PieceRested, Table
-from engage_hri.services.tangram.table import PiecePose, tangram_table
+from engage_hri.services.tangram.table import tangram_table
 
 
 def table() -> Table:

@@ -4,8 +4,9 @@ from itertools import combinations
 
 import pytest
 
+from engage_hri.schemas.footprints import PiecePose, edges, overlap, poses_touching, touches
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.table import PiecePose, edges, overlap, poses_touching, tangram_table, touches
+from engage_hri.services.tangram.table import tangram_table
 
 TABLE = tangram_table()
 START = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}

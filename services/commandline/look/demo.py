@@ -10,8 +10,6 @@ import typer
 from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.messages import Message
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.look.with_window import can_open, lacking, not_installed, windowed
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Embodied, Shown, Simulated, VirtualTime, Written
@@ -21,8 +19,7 @@ from engage_hri.services.commandline.shell.recording_file import needed
 from engage_hri.services.commandline.study.tangram import DEFAULTS, play_tangram
 from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.terminal import tally
-from engage_hri.services.console.terminal.live import LiveView, Log
-from engage_hri.services.console.terminal.log import Telling
+from engage_hri.services.console.terminal.live import Tallying, scene_view
 
 FOR_YOU = ("collaboration.mode=task",)
 """Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""
@@ -52,16 +49,6 @@ class Options(Written, Simulated, Embodied, Shown):
     def overrides(self) -> tuple[str, ...]:
         """Settings of the options."""
         return (*super().overrides, *(("simulation.human=none",) if self.you else ()))
-
-
-class Tallying:
-    """A sink that keeps the tally."""
-
-    def __init__(self, began: Seconds) -> None:
-        self.tally = tally.empty(began)
-
-    def __call__(self, message: Message, at: Seconds) -> None:
-        self.tally = tally.feed(self.tally, message, at)
 
 
 def main(options: Options) -> int:
@@ -118,8 +105,3 @@ async def demonstrate(
                 playing.cancel()
                 await asyncio.wait([playing])
     return tallying.tally
-
-
-def scene_view(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
-    """Choose the sink that shows the scene: a live view on a terminal, log lines anywhere else."""
-    return LiveView(console, robot, began) if live else Log(console, robot, began, Telling(points=False, head=False))

@@ -1,7 +1,6 @@
 """Command `engage watch`: follow a running system, as text or as JSON lines."""
 
 from collections.abc import Collection
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple, get_args
 
@@ -25,7 +24,7 @@ from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
-from engage_hri.services.console.terminal.live import LiveNets, Log, NetLog
+from engage_hri.services.console.terminal.live import Log, NetLog
 from engage_hri.services.console.terminal.log import Telling
 
 OTHERS = (
@@ -60,7 +59,10 @@ class Options(Connected):
             help="events, statistics, words, feedback, head, holds, faults or condition; may be repeated.",
         ),
     ] = None
-    net: Annotated[bool, typer.Option("--net", help="Petri nets of live blocks, and where their tokens are.")] = False
+    net: Annotated[
+        bool,
+        typer.Option("--net", help="Petri nets of live blocks: a line for each instant and token."),
+    ] = False
     actor: Annotated[str, typer.Option(metavar="ID", help="Only what goes on with this person.")] = ""
     kind: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="Only these connection events; may be repeated.")
@@ -151,18 +153,11 @@ async def _watch_nets(options: Options, config: Config, out: Patient) -> None:
 
     async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("watch"))
-        console = Terminal(file=as_file(out))
-        with ExitStack() as shown:
-            if options.json:
-                show: Sink = _as_json(out)
-            elif console.is_terminal:
-                show = shown.enter_context(LiveNets(console))
-            else:
-                show = NetLog(console, bus.now())
-            async with following(bus, (show,), patterns=(keys.NET, keys.HELD)):
-                bus.declare_alive()
-                async with hinting(bus, config.bus.connect):
-                    await forever()
+        show: Sink = _as_json(out) if options.json else NetLog(Terminal(file=as_file(out)), bus.now())
+        async with following(bus, (show,), patterns=(keys.NET, keys.HELD)):
+            bus.declare_alive()
+            async with hinting(bus, config.bus.connect):
+                await forever()
 
 
 def _as_json(out: Patient) -> Sink:

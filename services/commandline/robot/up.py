@@ -17,7 +17,6 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline.embedding import services as bound
-from engage_hri.services.commandline.look.demo import Tallying, scene_view
 from engage_hri.services.commandline.robot.one_per_robot import claiming
 from engage_hri.services.commandline.robot.run import ready_line
 from engage_hri.services.commandline.shell.config import Config
@@ -29,6 +28,7 @@ from engage_hri.services.commandline.shell.supervisor import Child, supervised
 from engage_hri.services.commandline.study.tangram import DEFAULTS
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal import tally
+from engage_hri.services.console.terminal.live import Tallying, scene_view
 from engage_hri.services.control.bases import drivers
 from engage_hri.services.runtime.service import Service, running
 

@@ -73,14 +73,14 @@ def main(options: Options) -> int:
 
 
 def _as_text(plan: Plan) -> str:
+    from engage_hri.services.commandline.talk.net_drawing import drawing, legend
     from engage_hri.services.console.nets import in_view
-    from engage_hri.services.console.terminal.net_drawing import drawing, legend
     from engage_hri.services.realizer import export
 
     net = in_view(export.as_message(plan))
     assert net is not None
     width = Terminal().width
-    return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend((net,))))
+    return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend(net)))
 
 
 async def rehearsed(block: Block, world: World, config: Config) -> Plan:

@@ -1,7 +1,6 @@
-"""Sinks that show a changing scene, or running nets: redrawn in place on a terminal, or line by line elsewhere."""
+"""Sinks that show what a robot does: a picture of the scene that is drawn anew, and lines of the log."""
 
 import asyncio
-from abc import ABC, abstractmethod
 from typing import Self
 
 from rich.console import Console, RenderableType
@@ -11,31 +10,29 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import nets, view, wording
-from engage_hri.services.console.terminal import log
-from engage_hri.services.console.terminal.net_drawing import picture
+from engage_hri.services.console.terminal import log, tally
 from engage_hri.services.console.terminal.render import render
 
 REDRAW: Seconds = 0.1
 """Least time between two pictures; each is drawn because of a message."""
-CLOCK: Seconds = 0.5
-"""Time between two pictures of nets about which nothing is told."""
 
 
-class _Picture(ABC):
-    """Picture that is kept on the terminal. Rich's own refresh thread stays off."""
+class LiveView:
+    """Sink that keeps a picture of the scene on the terminal. Rich's own refresh thread stays off."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, robot: str, began: Seconds) -> None:
+        self.scene = view.empty(robot, began)
         self._console = console
         self._live = Live(self._picture(), console=console, auto_refresh=False, vertical_overflow="crop")
         self._due: asyncio.TimerHandle | None = None
 
-    @abstractmethod
-    def _picture(self) -> RenderableType:
-        """Draw how things are now."""
-
-    def _draw_soon(self, delay: Seconds = REDRAW) -> None:
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.scene = view.feed(self.scene, message, at)
         if self._due is None:
-            self._due = asyncio.get_running_loop().call_later(delay, self._draw)
+            self._due = asyncio.get_running_loop().call_later(REDRAW, self._draw)
+
+    def _picture(self) -> RenderableType:
+        return render(self.scene, self._console.width, self._console.height)
 
     def _draw(self) -> None:
         self._due = None
@@ -48,48 +45,8 @@ class _Picture(ABC):
     def __exit__(self, *raised: object) -> None:
         if self._due is not None:
             self._due.cancel()
-        self._live.update(self._picture(), refresh=True)
+        self._draw()
         self._live.stop()
-
-
-class LiveView(_Picture):
-    """Sink that keeps a picture of the scene on the terminal."""
-
-    def __init__(self, console: Console, robot: str, began: Seconds) -> None:
-        self.scene = view.empty(robot, began)
-        super().__init__(console)
-
-    def __call__(self, message: Message, at: Seconds) -> None:
-        self.scene = view.feed(self.scene, message, at)
-        self._draw_soon()
-
-    def _picture(self) -> RenderableType:
-        return render(self.scene, self._console.width, self._console.height)
-
-
-class LiveNets(_Picture):
-    """Sink that keeps the nets of all live blocks on the terminal, with their tokens."""
-
-    def __init__(self, console: Console) -> None:
-        self.nets: nets.Nets = {}
-        self._scene = view.empty("", 0.0)
-        super().__init__(console)
-
-    def __call__(self, message: Message, at: Seconds) -> None:
-        self.nets = nets.feed(self.nets, message, at, asyncio.get_running_loop().time())
-        self._scene = view.feed(self._scene, message, at)
-        self._draw_soon()
-
-    def _picture(self) -> RenderableType:
-        now = asyncio.get_running_loop().time()
-        self.nets = nets.without_old(self.nets, now)
-        held = [wording.held(each.hold) for each in self._scene.held]
-        return picture(tuple(self.nets.values()), self._console.width, self._console.height, now, held)
-
-    def _draw(self) -> None:
-        super()._draw()
-        if self.nets:  # One that has ended goes, and clocks run, though nothing is told.
-            self._draw_soon(CLOCK)
 
 
 class NetLog:
@@ -136,6 +93,23 @@ class Log:
 
     def __exit__(self, *raised: object) -> None:
         return None
+
+
+class Tallying:
+    """A sink that keeps the tally."""
+
+    def __init__(self, began: Seconds) -> None:
+        self.tally = tally.empty(began)
+
+    def __call__(self, message: Message, at: Seconds) -> None:
+        self.tally = tally.feed(self.tally, message, at)
+
+
+def scene_view(console: Console, robot: str, began: Seconds, live: bool) -> LiveView | Log:
+    """Choose the sink that shows the scene: a live view on a terminal, log lines anywhere else."""
+    return (
+        LiveView(console, robot, began) if live else Log(console, robot, began, log.Telling(points=False, head=False))
+    )
 
 
 def _print(console: Console, line: str) -> None:

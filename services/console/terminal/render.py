@@ -1,33 +1,23 @@
 """Drawing of a scene with Rich, as large as the terminal. No state: the same scene gives the same picture."""
 
-from collections.abc import Iterable
-from math import inf
-
-from rich import box
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
-from rich.panel import Panel
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.body_faults import words
-from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import wording
-from engage_hri.services.console.view import Actor, EventInView, PointInView, Scene
+from engage_hri.services.console.view import Actor, EventInView, Scene
 
 HEIGHT = 30
 """Lines of the picture if the height of the terminal is unknown."""
-SMALL = (72, 20)
-"""Columns and lines below which there are no frames, and no plan beside the people."""
+NARROW = 72
+"""Columns below which connection events are shown without their cause."""
 WIDE = 100
 """Columns from which a connection event needs no cutting."""
-FRAME = 2
-"""Lines that a frame takes."""
-AHEAD = 4
-"""Least number of planned points that are shown."""
-NOTICED: Seconds = 0.1
-"""Distance of speech and gesture from which people notice it."""
+WORDS = 6
+"""Most lines of words: connection events get the rest."""
 MARKS = {
     "started": ("…", "bold yellow"),
     "succeeded": ("✓", "green"),
@@ -41,53 +31,28 @@ MARKS = {
 
 
 def render(scene: Scene, width: int = 80, height: int | None = None) -> RenderableType:
-    """Draw the whole live view. width, height: of the terminal, in columns and lines; all of it is used."""
+    """Draw the live view. width, height: of the terminal, in columns and lines; all of it is used.
+
+    It shows who is here and what they do, the last words, and the connection events: what a visitor asks first.
+    When each behavior comes, and the nets, are for the window, which has the room.
+    """
     height = height or HEIGHT
-    notes: list[RenderableType] = [
-        Text(printable(f"! {n}"), style="yellow", no_wrap=True, overflow="ellipsis") for n in scene.notes
+    notes = [
+        Text(printable(f"! {note}"), style="yellow", no_wrap=True, overflow="ellipsis")
+        for note in scene.notes[-max(1, height // 8) :]
     ]
-    small = width < SMALL[0] or height < SMALL[1]
-    notes = notes[-1:] if small else notes
-    draw = _small if small else _framed
-    return Group(*draw(scene, width, height - len(notes)), *notes)
-
-
-def _small(scene: Scene, width: int, height: int) -> list[RenderableType]:
+    height -= len(notes)
     people = _people(scene)[: max(1, height // 4)]
     rest = height - 1 - len(people)
-    words = min(3, rest // 3)
-    return [_title(scene), *people, _said(scene, words), _events(scene, width, rest - words)]
-
-
-def _framed(scene: Scene, width: int, height: int) -> list[RenderableType]:
-    """Parts of the large view: people and words on the left, the plan on the right, connection events below."""
-    upper = max(11, height * 2 // 5)
-    people = _people(scene)
-    doing = min(max(5, len(people) + FRAME), upper // 2)
-    left = Group(
-        _panel(_LastLines(Group(*people[: doing - FRAME]), doing - FRAME), _title(scene)),
-        _panel(_said(scene, upper - doing - FRAME), Text("said")),
-    )
-    top = Table.grid(expand=True)
-    top.add_column(ratio=4)
-    top.add_column(ratio=5)
-    top.add_row(left, _plan(scene, upper - FRAME))
-    shown = height - upper - FRAME
-    return [top, _panel(_events(scene, width - 4, shown), _frequency(scene))]
-
-
-def _panel(inner: RenderableType, title: Text) -> Panel:
-    return Panel(inner, title=title, title_align="left", box=box.ROUNDED)
+    words = min(WORDS, rest // 3)
+    return Group(_title(scene), *people, _said(scene, words), _events(scene, width, rest - words), *notes)
 
 
 def _title(scene: Scene) -> Text:
-    text = f"engage {wording.clock(scene.now - scene.began)}"
-    return Text(text, style="bold", no_wrap=True, overflow="ellipsis")
-
-
-def _frequency(scene: Scene) -> Text:
     mtbce = scene.session.mtbce if scene.session else None
-    return Text("connection events" if mtbce is None else f"connection events, one every {wording.seconds(mtbce)}")
+    often = "" if mtbce is None else f"; connection events: one every {wording.seconds(mtbce)}"
+    text = f"engage {wording.clock(scene.now - scene.began)}{often}"
+    return Text(text, style="bold", no_wrap=True, overflow="ellipsis")
 
 
 def _style(scene: Scene, actor: str) -> str:
@@ -160,62 +125,9 @@ class _LastLines:
             yield Segment.line()
 
 
-def _plan(scene: Scene, height: int) -> Panel:
-    """Table of the running block: the planned time of each point, and the one that the body reported."""
-    block = scene.block
-    table = Table(box=None, expand=True, pad_edge=False)
-    table.add_column("seconds", no_wrap=True, overflow="ellipsis", ratio=1)
-    for name in ("plan", "came", "late"):
-        table.add_column(name, justify="right", no_wrap=True, min_width=5)
-    for points in _window(_rows(block.points), height - 1) if block else ():
-        first = points[0]
-        came, late = first.realised is not None, first.slip
-        noticed = late is not None and abs(late) >= NOTICED
-        table.add_row(
-            Text(
-                printable(f"{first.behavior}: {', '.join(point.sync for point in points)}"),
-                style="" if came else "dim",
-            ),
-            wording.number(first.planned),
-            Text(wording.number(first.realised), style="green" if came else "dim"),
-            Text(wording.number(late, sign=True), style="yellow" if noticed else "dim"),
-        )
-    # Foreign ids are shown as Text, so that brackets in them are not read as markup.
-    title = Text(printable(f"{block.id}: {block.status or 'running'}") if block else "the robot does nothing yet")
-    return _panel(_LastLines(table, height), title)
-
-
-def _rows(points: Iterable[PointInView]) -> list[list[PointInView]]:
-    """Group the points of one behavior that are the same instant into rows."""
-    rows: list[list[PointInView]] = []
-    for point in points:
-        last = rows[-1][0] if rows else None
-        if last and (last.behavior, _ms(last.planned), _ms(last.realised)) == (
-            point.behavior, _ms(point.planned), _ms(point.realised),
-        ):  # fmt: skip
-            rows[-1].append(point)
-        else:
-            rows.append([point])
-    return rows
-
-
-def _ms(value: float | None) -> int | None:
-    return None if value is None else round(1000 * value)
-
-
-def _window(rows: list[list[PointInView]], shown: int) -> list[list[PointInView]]:
-    """Choose the newest realised rows and the next planned ones, by time."""
-    came = sorted((row for row in rows if row[0].realised is not None), key=lambda row: row[0].realised or 0.0)
-    to_come = [row for row in rows if row[0].realised is None]
-    to_come.sort(key=lambda row: inf if row[0].planned is None else row[0].planned)
-    ahead = min(len(to_come), max(min(AHEAD, shown // 2), shown - len(came)))
-    behind = shown - ahead
-    return [*(came[-behind:] if behind else ()), *to_come[:ahead]]
-
-
 def _events(scene: Scene, width: int, height: int) -> RenderableType:
     """Table of the newest connection events, the last one at the end. A narrow one has no column for the cause."""
-    narrow, wide = width < SMALL[0] - 2 * FRAME, width >= WIDE - 2 * FRAME
+    narrow, wide = width < NARROW, width >= WIDE
     table = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0))
     for name, least in (("", 1), ("at", 6), ("event", 13), ("who", 11), ("about", 5), ("why", 5), ("outcome", 9)):
         if not (narrow and name == "why"):

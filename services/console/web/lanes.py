@@ -10,13 +10,15 @@ from engage_hri.schemas.nets import NetPlanned
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.view import LOST, OWN_BLOCKS
+from engage_hri.services.console.view import OWN_BLOCKS
 from engage_hri.services.console.web.sections import BehaviorLane, BlockLane, EventShown, SyncShown
 
 KEPT: Seconds = 90.0
 """Time for which what has ended is kept."""
 MOST = 80
 """Blocks and events that are kept at most."""
+LOST = "lost"
+"""Status of a block whose realizer has gone from the bus in the middle of it."""
 Zero = Callable[[Seconds], Seconds]
 """Conversion of an instant to seconds of the picture."""
 

@@ -4,9 +4,9 @@ import math
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.footprints import SIDES, overlap, poses_touching
 from engage_hri.schemas.units import Meters, Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.tangram.table import SIDES, overlap, poses_touching
 
 NEAR: Meters = 0.045
 """Distance from where a piece is dropped to where it touches another, below which it is laid there."""
