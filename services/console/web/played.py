@@ -9,9 +9,9 @@ from engage_hri.services.bus.samples import Sample
 from engage_hri.services.console.heard import Heard
 from engage_hri.services.console.web.frames import Place
 from engage_hri.services.console.web.picture import Picture
-from engage_hri.services.recording.player import Player, Timeline
+from engage_hri.services.recording.player import Playback, Timeline
 from engage_hri.services.recording.reading import Recording, received
-from engage_hri.services.recording.times import Times
+from engage_hri.services.recording.times import RecordingTimes
 
 BEFORE: Seconds = 30.0
 """Time before a place that is played at once when somebody goes there: what the lanes and the words still show."""
@@ -22,8 +22,8 @@ class PlayedPicture:
 
     def __init__(self, recording: Recording, now: Seconds) -> None:
         self._recording = recording
-        self._times = Times(recording)
-        self._player = Player(recording, now)
+        self._times = RecordingTimes(recording)
+        self._player = Playback(recording, now)
         self.visit = 0
         self._begin()
 

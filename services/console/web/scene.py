@@ -23,7 +23,7 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,
         things=tuple(_thing(entity) for entity in entities if entity.kind != "person"),
         people=shown,
-        above=Above(above.RIGHT, above.DOWN, above.Frame(*map(_short, edges))),
+        above=Above(above.RIGHT, above.DOWN, above.PictureEdges(*map(_short, edges))),
     )
 
 
