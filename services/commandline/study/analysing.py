@@ -22,7 +22,7 @@ from engage_hri.services.console.follow import FOLLOWED
 from engage_hri.services.console.heard import Heard
 from engage_hri.services.recognition.again import Again, Lack, events_in
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import LifeSettings, flat, settings_of
@@ -100,7 +100,7 @@ def _told(recording: Recording, times: RecordingTimes) -> Iterator[Told]:
 
 def _session(recording: Recording, told: Sequence[Told], times: RecordingTimes, part: Stretch) -> Session:
     """Take the numbers of a part: of all connection events that began in it, as recognition decided them."""
-    tally, record = Tally(WINDOW), Record(recording.robot)
+    tally, record = EventTally(WINDOW), Record(recording.robot)
     published: WindowStatistics | None = None
     until = part.end if part.end < recording.duration else inf
     within: dict[str, bool] = {}

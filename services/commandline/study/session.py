@@ -19,7 +19,7 @@ from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.recognition.events.session import Session
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation import human_session
 from engage_hri.services.study.records import EventRecord, SessionRecord, SessionRecorder
@@ -91,7 +91,7 @@ async def _play_robot(order: Order, recording: SessionRecorder) -> None:
 
 def _play_people(order: Order, recording: SessionRecorder) -> None:
     config = order.config.recognition
-    session, tally = Session(order.config.robot, config), Tally(config.window)
+    session, tally = Session(order.config.robot, config), EventTally(config.window)
     plan = human_session.draw(random.Random(order.seed))
     observations = human_session.observations(plan)
     effects = [effect for observation, at in observations for effect in session.feed(observation, at)]
