@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Sample
 from engage_hri.services.console.heard import Heard
-from engage_hri.services.console.web.frames import Place
+from engage_hri.services.console.web.frames import PlaybackPlace
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.recording.player import Playback, Timeline
 from engage_hri.services.recording.reading import Recording, received
@@ -32,10 +32,10 @@ class PlayedPicture:
         self.picture = Picture(self._recording.robot, 0.0)
         self._heard = Heard(self._recording.robot, self._recording.clock, self._times.at, self._times.told)
 
-    def place(self, now: Seconds) -> Place:
+    def place(self, now: Seconds) -> PlaybackPlace:
         """Place where it is now."""
         at, player = self._player.at(now), self._player
-        return Place(floor(at * 1000) / 1000, player.end, player.is_paused, player.speed, self.visit)
+        return PlaybackPlace(floor(at * 1000) / 1000, player.end, player.is_paused, player.speed, self.visit)
 
     def advance(self, now: Seconds) -> None:
         """Take what is due."""
