@@ -7,6 +7,7 @@ then hold every tracked file to it.
 import ast
 import re
 import subprocess
+from collections import defaultdict
 from collections.abc import Iterator
 from functools import lru_cache
 from math import inf
@@ -276,6 +277,29 @@ def test_every_file_keeps_the_rules() -> None:
             found += violations(name, data.decode(errors="replace"))
 
     assert not found, "\n".join(found)
+
+
+DEFINED_TWICE = (
+    "Absent Aim Arrived Chain Clock Clocks Commands Course Ended Foresight Gesture Heard HeardWords Hearing "
+    "Hold Holder Impossible Instant Link Listening Made Measured Member Named Off Options Order Parts Past "
+    "Pause Performing Piece Place Played Problem Recording Row Run Session Shown Solution Spoken Stage "
+    "Steering Stroke Stuck Table Term Told Track Unread Utterance Utterances Watch Word Written "
+)
+"""Names of classes that mean several things. Each of them costs its readers a look at the imports: take names off
+this list, and put none on it. `Options` are those of each command."""
+
+
+def test_a_class_name_means_one_thing() -> None:
+    places = defaultdict[str, list[str]](list)
+    for name in tracked():
+        if name.startswith(("schemas/", "services/")) and name.endswith(".py"):
+            for node in ast.parse((ROOT / name).read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    places[node.name].append(name)
+
+    twice = {name: files for name, files in places.items() if len(files) > 1 and name not in DEFINED_TWICE.split()}
+    assert len(places) > 500
+    assert not twice, f"these names mean two things: {twice}"
 
 
 def test_no_module_imports_itself_through_others() -> None:

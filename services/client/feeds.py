@@ -12,7 +12,7 @@ from engage_hri.services.bus.interface import Bus, Reading, Received, Subscripti
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.reports.reports import Told
+from engage_hri.services.reports.reports import TimedReport
 
 M = TypeVar("M")
 
@@ -149,7 +149,7 @@ class ActionFeed(DerivedFeed[ActionEvent]):
     def _passed(self) -> Iterable[ActionEvent]:
         return self._events(self._reports.advance(self._now()))
 
-    def _events(self, told: Iterable[Told]) -> Iterable[ActionEvent]:
+    def _events(self, told: Iterable[TimedReport]) -> Iterable[ActionEvent]:
         return (event for event, _ in events(told, self._bus.clock))
 
     def _instant(self, stamp: Stamp) -> Seconds:

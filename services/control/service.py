@@ -55,7 +55,7 @@ from engage_hri.services.control.serving.questions import Questions
 from engage_hri.services.control.serving.state_publisher import Shown
 from engage_hri.services.control.serving.warnings_told import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.requests.serving_effects import Hold
+from engage_hri.services.requests.serving_effects import HoldRequest
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -375,7 +375,7 @@ class _Control:
 
     # -- dead man -----------------------------------------------------------------------------------------------
 
-    def _hold(self, hold: Hold) -> None:
+    def _hold(self, hold: HoldRequest) -> None:
         """Hold a behavior that nobody renews, or let it go on."""
         if (live := self._live.get(hold.name)) is None:
             return

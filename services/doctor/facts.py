@@ -18,7 +18,7 @@ class Package(Struct, frozen=True, kw_only=True):
     version: str = ""
 
 
-class Door(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class EndpointFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """An endpoint at which the bus should be found, and whether somebody opens there.
 
     problem: why nobody does; empty: somebody does. is_local: only processes of this machine can reach it. is_closed:
@@ -39,7 +39,7 @@ class Certificate(Struct, frozen=True, kw_only=True):
     until: int
 
 
-class Known(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class ParticipantFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A participant on the bus.
 
     part: as it shows itself. seen: it is seen from here. lives: number of processes that have its name. answers:
@@ -59,7 +59,7 @@ class Known(Struct, frozen=True, kw_only=True, omit_defaults=True):
     wall: Seconds = 0.0
 
 
-class Body(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class BodyFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The robot's body. types: the types of behaviors that it performs. problem: why nothing is known of it."""
 
     name: str = ""
@@ -67,7 +67,7 @@ class Body(Struct, frozen=True, kw_only=True, omit_defaults=True):
     problem: str = ""
 
 
-class Sight(Struct, frozen=True, kw_only=True):
+class WorldFacts(Struct, frozen=True, kw_only=True):
     """The world as perception tells it. age: time since then."""
 
     source: str
@@ -76,7 +76,7 @@ class Sight(Struct, frozen=True, kw_only=True):
     age: Seconds
 
 
-class Facts(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class SystemFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Facts, as they were seen from this process.
 
     at: wall clock, in seconds since 1970. version: of Engage. own: this process. found: robots on the bus other than
@@ -92,14 +92,14 @@ class Facts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     services: tuple[str, ...]
     """Services that make up a robot."""
     packages: tuple[Package, ...] = ()
-    doors: tuple[Door, ...] = ()
+    doors: tuple[EndpointFacts, ...] = ()
     bus: bool = True
     problem: Fault | None = None
     """Reason why keys or bus cannot be used."""
     found: tuple[str, ...] = ()
     protocols: tuple[str, ...] = ()
     certificates: tuple[Certificate, ...] = ()
-    known: tuple[Known, ...] = ()
+    known: tuple[ParticipantFacts, ...] = ()
     clocks: tuple[ClockOffset, ...] = ()
-    body: Body | None = None
-    sight: Sight | Literal["unknown"] | None = None
+    body: BodyFacts | None = None
+    sight: WorldFacts | Literal["unknown"] | None = None

@@ -6,7 +6,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import Facts, Known, Package
+from engage_hri.services.doctor.facts import Package, ParticipantFacts, SystemFacts
 from engage_hri.services.doctor.matrix import clock_of, matrix
 from engage_hri.services.runtime.installation import packages_command
 
@@ -23,7 +23,7 @@ PRECISE: Seconds = 0.005
 """Error of a clock from which on delays can be wrong by more than 10 ms."""
 
 
-class Finding(Struct, frozen=True, kw_only=True):
+class Diagnosis(Struct, frozen=True, kw_only=True):
     """A finding.
 
     severity: wrong: something does not work; doubtful: it works, but not as well as it should; note: good to know.
@@ -36,7 +36,7 @@ class Finding(Struct, frozen=True, kw_only=True):
     do: str
 
 
-def findings(facts: Facts) -> tuple[Finding, ...]:
+def findings(facts: SystemFacts) -> tuple[Diagnosis, ...]:
     """All findings, the worst first, else in the order in which one would mend them."""
     order: tuple[Severity, ...] = ("wrong", "doubtful", "note")
     found = [finding for rule in RULES for finding in rule(facts)]
@@ -64,25 +64,25 @@ def _numbers(version: str) -> tuple[int, ...]:
     return tuple(int(each) for each in digits if each)
 
 
-def _packages(facts: Facts) -> Iterator[Finding]:
+def _packages(facts: SystemFacts) -> Iterator[Diagnosis]:
     for package in facts.packages:
         if not satisfies(package):
             what = f"version {package.version} is here" if package.version else "it is not installed"
-            yield Finding(
+            yield Diagnosis(
                 severity="wrong", where=package.name, what=f"{what}; Engage needs {package.name}{package.wanted}",
                 do=packages_command(f"{package.name}{package.wanted}"),
             )  # fmt: skip
 
 
-def _problem(facts: Facts) -> Iterator[Finding]:
+def _problem(facts: SystemFacts) -> Iterator[Diagnosis]:
     if (fault := facts.problem) is not None:
-        yield Finding(
+        yield Diagnosis(
             severity="wrong", where=fault.where or "bus", what=fault.reason,
             do=fault.advice or "see docs/security.md for keys, docs/deploy.md for endpoints",
         )  # fmt: skip
 
 
-def _doors(facts: Facts) -> Iterator[Finding]:
+def _doors(facts: SystemFacts) -> Iterator[Diagnosis]:
     shut = [door for door in facts.doors if door.problem]
     for door in facts.doors:
         if door.problem:
@@ -93,37 +93,37 @@ def _doors(facts: Facts) -> Iterator[Finding]:
                 do = f"{router} --keys ..., or name the router with --connect"
             else:
                 do = f"there {router}; if it runs, look for another address, or for a firewall that shuts the port"
-            yield Finding(
+            yield Diagnosis(
                 severity="doubtful" if len(shut) < len(facts.doors) else "wrong",
                 where=door.endpoint, what=f"nobody opens: {door.problem}", do=do,
             )  # fmt: skip
         elif not door.is_local and not door.is_closed:
-            yield Finding(
+            yield Diagnosis(
                 severity="doubtful", where=door.endpoint,
                 what="open to all: whoever reaches this address can drive the robot",
                 do="make keys, `engage keys init` (docs/security.md), unless the network is yours alone",
             )  # fmt: skip
     if facts.bus and facts.doors and not shut and not facts.known and not facts.found and facts.own.mode == "peer":
-        yield Finding(
+        yield Diagnosis(
             severity="note", where=facts.doors[0].endpoint, what="somebody listens there, and no participant shows",
             do="if no process of Engage has this port, set another one with --connect and --listen",
         )  # fmt: skip
 
 
-def _services(facts: Facts) -> Iterator[Finding]:
+def _services(facts: SystemFacts) -> Iterator[Diagnosis]:
     there = {one.name for one in facts.known}
     if not facts.bus:
         return
     if not there & set(facts.services):
         others = f"; there are: {', '.join(facts.found)}" if facts.found else ""
-        yield Finding(
+        yield Diagnosis(
             severity="wrong", where=facts.robot, what=f"no service of this robot is on the bus{others}",
             do=f"`engage up --robot {facts.robot}` starts one; or name another with --robot, --connect",
         )  # fmt: skip
     else:
         for name in facts.services:
             if name not in there:
-                yield Finding(
+                yield Diagnosis(
                     severity="wrong", where=name,
                     what="nobody sees this service: it has ended, stands still, or is cut off",
                     do=f"look for its process. If there is none, what it printed says why; start `engage run {name}`"
@@ -132,14 +132,14 @@ def _services(facts: Facts) -> Iterator[Finding]:
                 )  # fmt: skip
     for version in facts.protocols:
         if version != facts.protocol:
-            yield Finding(
+            yield Diagnosis(
                 severity="wrong", where=facts.robot,
                 what=f"somebody speaks {version}, which nobody hears who speaks {facts.protocol}",
                 do="bring all machines to one version of Engage",
             )  # fmt: skip
 
 
-def _sight_of_one_another(facts: Facts) -> Iterator[Finding]:
+def _sight_of_one_another(facts: SystemFacts) -> Iterator[Diagnosis]:
     by_name = {one.name: one for one in facts.known}
     hidden: dict[str, list[str]] = {}
     for cell in matrix(facts):
@@ -147,13 +147,13 @@ def _sight_of_one_another(facts: Facts) -> Iterator[Finding]:
             hidden.setdefault(cell.other, []).append(cell.viewer)
     for name, viewers in hidden.items():
         why, do = _why_hidden(facts, by_name[name])
-        yield Finding(
+        yield Diagnosis(
             severity="wrong" if by_name[name].answers else "doubtful", where=name,
             what=f"it is there, but not seen by {_listed(viewers)}{why}", do=do,
         )  # fmt: skip
 
 
-def _why_hidden(facts: Facts, one: Known) -> tuple[str, str]:
+def _why_hidden(facts: SystemFacts, one: ParticipantFacts) -> tuple[str, str]:
     places = {
         place
         for other in facts.known
@@ -185,26 +185,26 @@ def _is_loopback(place: str) -> bool:
     return host in ("localhost", "[::1]") or host.startswith("127.")
 
 
-def _answers(facts: Facts) -> Iterator[Finding]:
+def _answers(facts: SystemFacts) -> Iterator[Diagnosis]:
     for one in facts.known:
         status = one.status
         if one.lives > 1:
-            yield Finding(
+            yield Diagnosis(
                 severity="wrong", where=one.name, what=f"{one.lives} processes have this name",
                 do="stop all but one; robots on one bus need names of their own (--robot)",
             )  # fmt: skip
         if one.seen and one.answers and status is None:
-            yield Finding(
+            yield Diagnosis(
                 severity="wrong", where=one.name, what="it is there, and does not answer",
                 do="it hangs, is stopped, or its link is being cut: look at its log and load, and start it again",
             )  # fmt: skip
         elif status is not None and status.stands is None:
-            yield Finding(
+            yield Diagnosis(
                 severity="doubtful", where=one.name, what="it does not serve yet", do="wait, and look at its log"
             )
 
 
-def _versions(facts: Facts) -> Iterator[Finding]:
+def _versions(facts: SystemFacts) -> Iterator[Diagnosis]:
     answering = [one.status for one in facts.known if one.status is not None]
     for status in answering:
         process = status.process
@@ -213,14 +213,14 @@ def _versions(facts: Facts) -> Iterator[Finding]:
             ("Zenoh", process.zenoh, facts.own.zenoh),
         ):
             if theirs and ours and theirs != ours:
-                yield Finding(
+                yield Diagnosis(
                     severity="doubtful", where=status.participant,
                     what=f"{what} {theirs} on {process.host or 'its machine'}, {ours} here",
                     do="install the same version on all machines",
                 )  # fmt: skip
 
 
-def _losses(facts: Facts) -> Iterator[Finding]:
+def _losses(facts: SystemFacts) -> Iterator[Diagnosis]:
     for one in facts.known:
         if one.status is None:
             continue
@@ -228,12 +228,12 @@ def _losses(facts: Facts) -> Iterator[Finding]:
             number = getattr((one.later or one.status).bus, field)
             grows = number > getattr(one.status.bus, field)
             if number:
-                yield Finding(
+                yield Diagnosis(
                     severity=now if grows else before, where=one.name,
                     what=f"{what}: {number} since it came{', and more just now' if grows else ''}", do=do,
                 )  # fmt: skip
         if (lag := (one.later or one.status).bus.lag) > STOOD:
-            yield Finding(
+            yield Diagnosis(
                 severity="doubtful" if lag > one.status.bus.lag else "note", where=one.name,
                 what=f"messages once waited {lag:.2f} s for this process",
                 do="give it more of a processor; a body or client of your own must not keep the loop for long",
@@ -258,19 +258,19 @@ _COUNTS: tuple[tuple[str, str, str, Severity, Severity], ...] = (
 """Fields of `BusHealth`: what they count, what to do, and how bad that is while it grows and else."""
 
 
-def _paths(facts: Facts) -> Iterator[Finding]:
+def _paths(facts: SystemFacts) -> Iterator[Diagnosis]:
     slow: dict[str, list[str]] = {}
     for cell in matrix(facts):
         if cell.trip is not None and cell.trip > FAR:
             slow.setdefault(cell.other, []).append(f"{cell.viewer} ({1000 * cell.trip:.0f} ms)")
     for name, viewers in slow.items():
-        yield Finding(
+        yield Diagnosis(
             severity="doubtful", where=name, what=f"round trips are long from {_listed(viewers)}",
             do="look at the network (Wi-Fi, load); the realizer belongs near the body",
         )  # fmt: skip
 
 
-def _clocks(facts: Facts) -> Iterator[Finding]:
+def _clocks(facts: SystemFacts) -> Iterator[Diagnosis]:
     statuses = [one.status for one in facts.known if one.status is not None]
     recognition = next((status for status in statuses if status.participant == "recognition"), None)
     for other in statuses:
@@ -279,12 +279,12 @@ def _clocks(facts: Facts) -> Iterator[Finding]:
         clock = clock_of(recognition, other)
         if clock is None:
             if other.participant in recognition.bus.peers:
-                yield Finding(
+                yield Diagnosis(
                     severity="doubtful", where=other.participant, what="recognition has not measured its clock",
                     do="run this again in some seconds; until then delays of connection events have no known error",
                 )  # fmt: skip
         elif clock.error > PRECISE:
-            yield Finding(
+            yield Diagnosis(
                 severity="note", where=other.participant,
                 what=f"recognition knows its clock to {1000 * clock.error:.0f} ms, and its delays no better",
                 do="nothing, if that is precise enough (`delay_error` tells it); else a quicker network",
@@ -295,13 +295,13 @@ def _clocks(facts: Facts) -> Iterator[Finding]:
         if host not in told and abs(one.wall) > WALL:
             told.add(host)
             apart = f"{abs(one.wall):.0f} s {'ahead of' if one.wall > 0 else 'behind'}"
-            yield Finding(
+            yield Diagnosis(
                 severity="doubtful", where=host, what=f"its wall clock is {apart} this machine's",
                 do="set it by NTP: logs are hard to compare, and certificates count by it (delays do not)",
             )  # fmt: skip
 
 
-def certificates(facts: Facts) -> dict[str, int]:
+def certificates(facts: SystemFacts) -> dict[str, int]:
     """Ends of all certificates of holders, by their names: as their processes tell, else as the folder has them."""
     ends = {each.name: each.until for each in facts.certificates}
     for process in (facts.own, *(one.status.process for one in facts.known if one.status is not None)):
@@ -310,33 +310,33 @@ def certificates(facts: Facts) -> dict[str, int]:
     return ends
 
 
-def _certificates(facts: Facts) -> Iterator[Finding]:
+def _certificates(facts: SystemFacts) -> Iterator[Diagnosis]:
     ends = certificates(facts) | {door.endpoint: door.until for door in facts.doors if door.until is not None}
     for where, until in ends.items():
         days = (until - facts.at) / A_DAY
         if days < SOON:
             left = span(until - facts.at)
             what = "the certificate has expired" if days <= 0 else f"the certificate expires in {left}"
-            yield Finding(
+            yield Diagnosis(
                 severity="wrong" if days <= 0 else "doubtful", where=where, what=what,
                 do="`engage keys renew` where the authority is; copy the folder anew, and start its holder again",
             )  # fmt: skip
 
 
-def _abilities(facts: Facts) -> Iterator[Finding]:
+def _abilities(facts: SystemFacts) -> Iterator[Diagnosis]:
     if facts.body is not None:
         if facts.body.problem:
-            yield Finding(
+            yield Diagnosis(
                 severity="wrong", where="control", what=f"nothing is known of the body: {facts.body.problem}",
                 do="look at what control has printed",
             )  # fmt: skip
         elif "speech" not in facts.body.types:
-            yield Finding(
+            yield Diagnosis(
                 severity="doubtful", where=facts.body.name, what="the body has no voice",
                 do="speech fails, unless your body performs it (docs/control.md)",
             )  # fmt: skip
     if facts.bus and facts.sight is None and any(one.name in facts.services for one in facts.known):
-        yield Finding(
+        yield Diagnosis(
             severity="doubtful", where="perception", what="nobody tells what there is to be seen",
             do="start what sees people, or `engage run simulation`: without a world fragments wait, and are refused",
         )  # fmt: skip
@@ -346,7 +346,7 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(names)
 
 
-Rule = Callable[[Facts], Iterator[Finding]]
+Rule = Callable[[SystemFacts], Iterator[Diagnosis]]
 RULES: tuple[Rule, ...] = (
     _packages, _problem, _doors, _services, _sight_of_one_another, _answers, _versions, _certificates, _losses,
     _paths, _clocks, _abilities,

@@ -8,7 +8,7 @@ from msgspec import Struct
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.status import ClockOffset, Status
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.doctor.facts import Facts
+from engage_hri.services.doctor.facts import SystemFacts
 
 HERE = "here"
 """Name of the row of this process."""
@@ -25,12 +25,12 @@ class Cell(Struct, frozen=True, kw_only=True, omit_defaults=True):
     trip: Seconds | None = None
 
 
-def matrix(facts: Facts) -> tuple[Cell, ...]:
+def matrix(facts: SystemFacts) -> tuple[Cell, ...]:
     """Cells of the matrix, row by row: first this process, then all that answer for themselves."""
     return tuple(_cells(facts))
 
 
-def _cells(facts: Facts) -> Iterator[Cell]:
+def _cells(facts: SystemFacts) -> Iterator[Cell]:
     for other in facts.known:
         yield Cell(viewer=HERE, other=other.name, sees="yes" if other.seen else "no", trip=other.trip)
     for viewer in facts.known:

@@ -8,8 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import Door, Facts
-from engage_hri.services.doctor.findings import Finding, Severity, certificates
+from engage_hri.services.doctor.facts import EndpointFacts, SystemFacts
+from engage_hri.services.doctor.findings import Diagnosis, Severity, certificates
 from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
@@ -19,12 +19,12 @@ NARROW = 80
 """Columns below which anything may be broken into lines."""
 
 
-def as_json(facts: Facts, found: Sequence[Finding]) -> str:
+def as_json(facts: SystemFacts, found: Sequence[Diagnosis]) -> str:
     """Write all as one JSON object: `findings`, `matrix` and `facts`."""
     return msgspec.json.encode({"findings": found, "matrix": matrix(facts), "facts": facts}).decode()
 
 
-def report(facts: Facts, found: Sequence[Finding], width: int = 80) -> RenderableType:
+def report(facts: SystemFacts, found: Sequence[Diagnosis], width: int = 80) -> RenderableType:
     """Draw the report, as wide as the terminal."""
     parts: list[RenderableType] = [_head(facts)]
     if facts.known:
@@ -33,7 +33,7 @@ def report(facts: Facts, found: Sequence[Finding], width: int = 80) -> Renderabl
     return Group(*parts)
 
 
-def _head(facts: Facts) -> Text:
+def _head(facts: SystemFacts) -> Text:
     own = facts.own
     return Text(
         f"robot {facts.robot!r}, from {own.host or 'here'}: Engage {facts.version}, {facts.protocol}, "
@@ -53,7 +53,7 @@ def _add(table: Table, *cells: str | Text) -> None:
     table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells))
 
 
-def _who_sees_whom(facts: Facts, width: int) -> RenderableType:
+def _who_sees_whom(facts: SystemFacts, width: int) -> RenderableType:
     """Draw the matrix: a row for each who sees, a column for each who is seen, with the round trips in ms."""
     every = [one.name for one in facts.known]
     rows: dict[str, list[Cell]] = {}
@@ -93,7 +93,7 @@ def _cell(cell: Cell, with_trips: bool) -> Text:
     return Text(f"{1000 * cell.trip:.1f}")
 
 
-def _participants(facts: Facts, width: int) -> RenderableType:
+def _participants(facts: SystemFacts, width: int) -> RenderableType:
     is_wide = width >= WIDE
     more = ("Python", "dropped") if is_wide else ()
     table = _table("participant", "machine", "clock", "up", "gaps", "lost", "Engage", *more)
@@ -122,7 +122,7 @@ def _time(seconds: Seconds) -> str:
     return f"{seconds / 3600:.0f} h" if seconds < 2 * A_DAY else f"{seconds / A_DAY:.0f} d"
 
 
-def _around(facts: Facts) -> Table:
+def _around(facts: SystemFacts) -> Table:
     """Draw what is there beside the participants."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
     table.add_column(style="dim", no_wrap=True)
@@ -132,7 +132,7 @@ def _around(facts: Facts) -> Table:
     return table
 
 
-def _things(facts: Facts) -> Iterator[tuple[str, str]]:
+def _things(facts: SystemFacts) -> Iterator[tuple[str, str]]:
     for door in facts.doors:
         yield "endpoint", f"{door.endpoint}: {door.problem or _open(door, facts)}"
     if facts.own.mode:
@@ -152,17 +152,17 @@ def _things(facts: Facts) -> Iterator[tuple[str, str]]:
         yield "other robots", ", ".join(facts.found)
 
 
-def _open(door: Door, facts: Facts) -> str:
+def _open(door: EndpointFacts, facts: SystemFacts) -> str:
     until = "" if door.until is None else f", certificate for {_left(door.until, facts)}"
     return f"somebody listens{', encrypted' if door.is_closed else ''}{until}"
 
 
-def _left(until: int, facts: Facts) -> str:
+def _left(until: int, facts: SystemFacts) -> str:
     left = until - facts.at
     return span(left) if left > 0 else "EXPIRED"
 
 
-def _sight(facts: Facts) -> str:
+def _sight(facts: SystemFacts) -> str:
     match facts.sight:
         case None:
             return "nobody tells of a world"
@@ -173,7 +173,7 @@ def _sight(facts: Facts) -> str:
             return f"{who} and {sight.objects} objects, told by {sight.source} {_time(sight.age)} ago"
 
 
-def _findings(found: Sequence[Finding]) -> RenderableType:
+def _findings(found: Sequence[Diagnosis]) -> RenderableType:
     if not found:
         return Text("Nothing is wrong.", style="bold green")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)

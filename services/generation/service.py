@@ -30,7 +30,7 @@ from engage_hri.services.generation.head.arbiter import Arbiter, Shift
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.reports.publisher import Publisher
-from engage_hri.services.reports.reports import GoesOn, Told
+from engage_hri.services.reports.reports import GoesOn, TimedReport
 from engage_hri.services.reports.world_report import WorldReport
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import RequestDesk, Requester
@@ -145,7 +145,7 @@ class _Generation:
                 self._runner.recognition_there(session_of(run))
         self._after(now)
 
-    def _observe(self, told: Iterable[Told]) -> None:
+    def _observe(self, told: Iterable[TimedReport]) -> None:
         """Take what somebody does, or did while nobody told of it."""
         now = self._bus.now()
         for observation, _, _ in told:

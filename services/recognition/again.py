@@ -16,7 +16,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.intake import Input, Intake, Output, Publish, reads
+from engage_hri.services.recognition.intake import Input, Intake, Output, PublishMessage, reads
 from engage_hri.services.recognition.ledger import StepClock
 
 Find = Callable[[str, int], Received | None]
@@ -93,5 +93,5 @@ def events_in(outputs: list[Output]) -> list[ConnectionEvent]:
     return [
         output.message
         for output in outputs
-        if isinstance(output, Publish) and isinstance(output.message, ConnectionEvent)
+        if isinstance(output, PublishMessage) and isinstance(output.message, ConnectionEvent)
     ]

@@ -26,22 +26,22 @@ from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import Forgotten, Mishap
+from engage_hri.services.recognition.events.machine import Mishap, PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
-from engage_hri.services.recognition.perceive.words import HeardWords
+from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, Read
 from engage_hri.services.reports.reporters import OLDEST
-from engage_hri.services.reports.reports import GoesOn, Told
+from engage_hri.services.reports.reports import GoesOn, TimedReport
 
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
 
 
-class Clock(Protocol):
+class MachineClocks(Protocol):
     """Clocks of machines, as one step sees them. name: of the own one."""
 
     @property
@@ -67,20 +67,20 @@ class Input(Struct, frozen=True):
     life: str = ""
 
 
-class Publish(Struct, frozen=True):
+class PublishMessage(Struct, frozen=True):
     """Publish this message under this key."""
 
     key: str
     message: Message
 
 
-class Withdraw(Struct, frozen=True):
+class WithdrawStates(Struct, frozen=True):
     """Withdraw the states under these keys."""
 
     states: tuple[str, ...]
 
 
-class Answer(Struct, frozen=True):
+class AnswerRequest(Struct, frozen=True):
     """Answer a request."""
 
     answer: Accepted | Refused | EventOutcome | TurnOutcome
@@ -94,7 +94,7 @@ class Mistake(Struct, frozen=True):
     request: str = ""
 
 
-Output = Publish | Withdraw | Answer | Mistake
+Output = PublishMessage | WithdrawStates | AnswerRequest | Mistake
 
 
 def reads(message: object) -> TypeGuard[Content]:
@@ -105,7 +105,7 @@ def reads(message: object) -> TypeGuard[Content]:
 class Intake:
     """All of recognition but its requests' lives. session: first part of the ids of its events."""
 
-    def __init__(self, robot: str, config: RecognitionConfig, clock: Clock, session: str) -> None:
+    def __init__(self, robot: str, config: RecognitionConfig, clock: MachineClocks, session: str) -> None:
         self._robot = robot
         self._clock = clock
         self._now: Seconds = -inf
@@ -124,7 +124,7 @@ class Intake:
 
     def begin(self, now: Seconds) -> list[Output]:
         """Statistics of all, so that those who ask before the first event get an answer."""
-        return [Publish(keys.statistics("all"), self._statistics.overall(now))]
+        return [PublishMessage(keys.statistics("all"), self._statistics.overall(now))]
 
     def advance(self, now: Seconds) -> list[Output]:
         """Take all steps that are due by now."""
@@ -155,13 +155,13 @@ class Intake:
         began, at = self._instant(said.began), self._instant(said.at)
         ended = at if said.ended is None else self._instant(said.ended)
         self._note_error(said.actor, said.began, began)
-        words = HeardWords(
+        words = TimedWords(
             actor=said.actor, id=said.id, text=said.text, began=began, ended=ended, final=said.final,
             confidence=said.confidence,
         )  # fmt: skip
         self._feed(words, at)
 
-    def _tell(self, told: Iterable[Told]) -> None:
+    def _tell(self, told: Iterable[TimedReport]) -> None:
         """Feed what reporters say, or what follows from it."""
         for observation, at, is_sure in told:
             if not isinstance(observation, GoesOn):
@@ -194,7 +194,7 @@ class Intake:
         if actor not in self._bad_ids and len(self._bad_ids) < COMPLAINTS:
             self._bad_ids.add(actor)
             fault = Fault(reason=f"{actor!r} can't be in a key", advice=keys.CHUNK, service="recognition")
-            self._outputs.append(Publish(keys.fault("recognition"), fault))
+            self._outputs.append(PublishMessage(keys.fault("recognition"), fault))
         return False
 
     def _when(self, observation: Perceived, arrived: Seconds) -> Seconds:
@@ -203,7 +203,7 @@ class Intake:
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
                 pass
-            case Cancel() | GoesOn() | Worded() | HeardWords():
+            case Cancel() | GoesOn() | Worded() | TimedWords():
                 stamp = None
             case _:
                 stamp = observation.at
@@ -227,32 +227,32 @@ class Intake:
 
     def _note(self, results: Iterable[Result], request: str = "") -> None:
         """Note what is to be published. request: the one that was fed; a bug ends it."""
-        changes: list[ConnectionEvent | Forgotten] = []
+        changes: list[ConnectionEvent | PersonForgotten] = []
         out = self._outputs
         for result in results:
             match result:
                 case ConnectionEvent():
                     result = self._clock_errors.marked(result)
                     changes.append(result)
-                    out.append(Publish(keys.connection_event(result.person(self._robot), result.kind), result))
+                    out.append(PublishMessage(keys.connection_event(result.person(self._robot), result.kind), result))
                 case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
-                    out.append(Publish(keys.RECOGNIZED_ACTION, result))
+                    out.append(PublishMessage(keys.RECOGNIZED_ACTION, result))
                 case Accepted() | Refused() | TurnOutcome():
-                    out.append(Answer(result))
+                    out.append(AnswerRequest(result))
                 case EventOutcome():
-                    out.append(Answer(self._clock_errors.marked_as(result, changes)))
-                case Forgotten(actor=actor):
+                    out.append(AnswerRequest(self._clock_errors.marked_as(result, changes)))
+                case PersonForgotten(actor=actor):
                     changes.append(result)
                     self._reports.forget(actor)
                 case Mishap(actor=actor, error=error):
                     out.append(Mistake(error, f"what {actor or 'somebody'} does", request))
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for message in self._open_events.feed(events, Stamp(self._clock.name, self._now)):
-            out.append(Publish(keys.open_events(message.actor), message))
-        counted = [change for change in changes if isinstance(change, Forgotten) or not change.retold]
+            out.append(PublishMessage(keys.open_events(message.actor), message))
+        counted = [change for change in changes if isinstance(change, PersonForgotten) or not change.retold]
         for statistics in self._statistics.feed(counted, self._recognizer.session.busy, self._now):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
-                out.append(Publish(keys.statistics(statistics.actor or "all"), statistics))
-        if gone := [change.actor for change in changes if isinstance(change, Forgotten)]:
-            out.append(Withdraw(tuple(keys.open_events(actor) for actor in gone)))
-            out.append(Withdraw(tuple(keys.statistics(actor) for actor in gone if actor != "all")))
+                out.append(PublishMessage(keys.statistics(statistics.actor or "all"), statistics))
+        if gone := [change.actor for change in changes if isinstance(change, PersonForgotten)]:
+            out.append(WithdrawStates(tuple(keys.open_events(actor) for actor in gone)))
+            out.append(WithdrawStates(tuple(keys.statistics(actor) for actor in gone if actor != "all")))

@@ -18,17 +18,17 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import InterruptedLooks, Symbolic
-from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mishap
+from engage_hri.services.recognition.events.machine import Effect, Mishap, PersonForgotten
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import SETTLING, Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
-from engage_hri.services.recognition.perceive.words import HeardWords, Words
+from engage_hri.services.recognition.perceive.words import TimedWords, Words
 from engage_hri.services.reports.reports import GoesOn
 
 OLDEST: Seconds = 0.5
 """Greatest age at which a head pose or a voice level that arrives still counts: an older one tells of what has been
 decided. Ours."""
-Perceived = Observation | HeadPose | VoiceActivity | RobotState | HeardWords
+Perceived = Observation | HeadPose | VoiceActivity | RobotState | TimedWords
 Result = Effect | Symbolic
 """The actions among them were derived from raw perception; the session gets them without another call."""
 
@@ -84,11 +84,11 @@ class Recognizer:
                 if (covered := self._attention.covered) != self._covered:
                     self._covered = covered
                     self._wait(covered, at)
-            case ActionBegan(confidence=confidence) | HeardWords(confidence=confidence) if (
+            case ActionBegan(confidence=confidence) | TimedWords(confidence=confidence) if (
                 confidence < self._config.least_confidence
             ):
                 pass
-            case HeardWords():
+            case TimedWords():
                 derived = self._hear(observation, at)
             case GoesOn(began=began) if began.confidence < self._config.least_confidence:
                 pass
@@ -124,7 +124,7 @@ class Recognizer:
             self._wait(meaning if told is report else told, when)
         return derived
 
-    def _hear(self, words: HeardWords, at: Seconds) -> list[Symbolic]:
+    def _hear(self, words: TimedWords, at: Seconds) -> list[Symbolic]:
         """Take words. Returns the speech that they are, if nothing else has told of it."""
         worded = self._words.hear(words, at)
         if worded is None:
@@ -161,7 +161,7 @@ class Recognizer:
 
     def _told(self, results: list[Result]) -> list[Result]:
         for result in results:
-            if isinstance(result, Forgotten):
+            if isinstance(result, PersonForgotten):
                 self._interrupted.forget(result.actor)
                 self._words.forget(result.actor)
         mishaps, self._mishaps = self._mishaps, []

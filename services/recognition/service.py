@@ -12,7 +12,16 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.intake import Answer, Input, Intake, Mistake, Output, Publish, Withdraw, reads
+from engage_hri.services.recognition.intake import (
+    AnswerRequest,
+    Input,
+    Intake,
+    Mistake,
+    Output,
+    PublishMessage,
+    WithdrawStates,
+    reads,
+)
 from engage_hri.services.recognition.ledger import Ledger, StepClock, step_of
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready
@@ -142,15 +151,15 @@ class _Recognition:
     def _carry_out(self, outputs: Iterable[Output]) -> None:
         for output in outputs:
             match output:
-                case Publish(key=key, message=message):
+                case PublishMessage(key=key, message=message):
                     self._bus.publish(key, message)
-                case Withdraw(states=states):
+                case WithdrawStates(states=states):
                     self._bus.withdraw(*states)
-                case Answer(answer=Accepted(id=id, within=within)):
+                case AnswerRequest(answer=Accepted(id=id, within=within)):
                     self.desk.accept(id, within)
-                case Answer(answer=Refused(id=id, fault=fault)):
+                case AnswerRequest(answer=Refused(id=id, fault=fault)):
                     self.desk.refuse(id, fault)
-                case Answer(answer=outcome):
+                case AnswerRequest(answer=outcome):
                     self.desk.end(outcome)
                 case Mistake(error=error, what=what, request=request):
                     fault = self._bus.failed(error, what)

@@ -20,7 +20,7 @@ STEP: Meters = 0.05
 """Steps of the edges, so that these stand still while somebody moves a little."""
 
 
-class Frame(NamedTuple):
+class PictureEdges(NamedTuple):
     """Edges of the picture, in metres to the right and down from the robot."""
 
     left: Meters
@@ -29,7 +29,7 @@ class Frame(NamedTuple):
     bottom: Meters
 
 
-LEAST = Frame(-0.62, -0.27, 0.62, 1.5)
+LEAST = PictureEdges(-0.62, -0.27, 0.62, 1.5)
 """What is in view at least."""
 
 
@@ -45,7 +45,7 @@ def outline(entity: Entity) -> list[tuple[Meters, Meters]]:
     return [(x + cos * u - sin * v, y + sin * u + cos * v) for u, v in entity.footprint]
 
 
-def frame(entities: Iterable[Entity], people: Iterable[Vector]) -> Frame:
+def frame(entities: Iterable[Entity], people: Iterable[Vector]) -> PictureEdges:
     """Frame with everybody and everything: a second person sits beside the table, another world may be wider.
 
     people: places of those who are there. entities: hands and people among them do not count.
@@ -59,7 +59,7 @@ def frame(entities: Iterable[Entity], people: Iterable[Vector]) -> Frame:
         for side, front in ((-1, 0), (1, 0), (0, 1))
     ]
     steps = [(_up(-right), _up(right), _up(down)) for right, down in places]
-    return Frame(
+    return PictureEdges(
         left=min([LEAST.left, *(-left for left, _, _ in steps)]),
         top=LEAST.top,
         right=max([LEAST.right, *(right for _, right, _ in steps)]),
@@ -67,10 +67,10 @@ def frame(entities: Iterable[Entity], people: Iterable[Vector]) -> Frame:
     )
 
 
-def together(frames: Iterable[Frame]) -> Frame:
+def together(frames: Iterable[PictureEdges]) -> PictureEdges:
     """Frame that has all of these in it."""
     found = [LEAST, *frames]
-    return Frame(
+    return PictureEdges(
         min(each.left for each in found), min(each.top for each in found),
         max(each.right for each in found), max(each.bottom for each in found),
     )  # fmt: skip

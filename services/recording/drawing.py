@@ -18,8 +18,8 @@ from matplotlib.patches import Circle, Polygon
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity
-from engage_hri.services.recording.above import Frame, frame, outline, seen, together
-from engage_hri.services.recording.scenes import Scene
+from engage_hri.services.recording.above import PictureEdges, frame, outline, seen, together
+from engage_hri.services.recording.scenes import SceneSnapshot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +31,7 @@ REACH = 0.9
 COLUMNS = 4
 
 
-def sheet(scenes: Sequence[Scene], format: str = "png") -> bytes:
+def sheet(scenes: Sequence[SceneSnapshot], format: str = "png") -> bytes:
     """Draw scenes beside one another, with the times and what is said."""
     rows = math.ceil(len(scenes) / COLUMNS)
     figure, in_view = Figure(figsize=(3.6 * COLUMNS, 4.4 * rows), layout="constrained"), _frame(scenes)
@@ -46,7 +46,7 @@ def sheet(scenes: Sequence[Scene], format: str = "png") -> bytes:
     return file.getvalue()
 
 
-def pictures(scenes: Sequence[Scene]) -> list["NDArray[np.uint8]"]:
+def pictures(scenes: Sequence[SceneSnapshot]) -> list["NDArray[np.uint8]"]:
     """Draw each scene as an array of 560 x 400 x 3 (height, width, colors), 0..255."""
     figure = Figure(figsize=(4.0, 5.6), dpi=100)
     canvas, in_view = FigureCanvasAgg(figure), _frame(scenes)
@@ -60,14 +60,14 @@ def pictures(scenes: Sequence[Scene]) -> list["NDArray[np.uint8]"]:
     return drawn
 
 
-def _frame(scenes: Sequence[Scene]) -> Frame:
+def _frame(scenes: Sequence[SceneSnapshot]) -> PictureEdges:
     """Frame of all of these scenes, so that it stands still from one to the next."""
     return together(
         frame(scene.world.entities, [each.position for each in scene.world.people]) for scene in scenes if scene.world
     )
 
 
-def draw(axes: Axes, scene: Scene, in_view: Frame) -> None:
+def draw(axes: Axes, scene: SceneSnapshot, in_view: PictureEdges) -> None:
     """Draw a scene from above, as the map of the window has it. in_view: what is in the picture."""
     axes.set_xlim(in_view.left, in_view.right)
     axes.set_ylim(in_view.bottom, in_view.top)
@@ -119,7 +119,7 @@ def _entity(axes: Axes, entity: Entity) -> None:
 _NAMED = ("red", "green", "blue", "yellow", "orange", "purple", "pink", "brown", "black", "white", "gray", "grey")
 
 
-def _pointing(scene: Scene, target: str) -> Ray | None:
+def _pointing(scene: SceneSnapshot, target: str) -> Ray | None:
     """The forearm that points at the target: the one in whose direction it lies best, from the hand on."""
     place = scene.world.entity(target) if scene.world else None
     arms = (scene.body.left_arm, scene.body.right_arm) if scene.body else ()
@@ -134,7 +134,7 @@ def _pointing(scene: Scene, target: str) -> Ray | None:
     return max(hands, key=cosine)
 
 
-def _ray(axes: Axes, scene: Scene, ray: Ray | None, target: str, color: str) -> None:
+def _ray(axes: Axes, scene: SceneSnapshot, ray: Ray | None, target: str, color: str) -> None:
     if ray is None:
         return
     start, end = ray.origin, _place(scene, target)
@@ -148,13 +148,13 @@ def _line(axes: Axes, start: tuple[float, float], end: tuple[float, float], **lo
     axes.plot(*zip(seen(*start), seen(*end), strict=True), zorder=2, **look)
 
 
-def _face(scene: Scene) -> tuple[float, float]:
+def _face(scene: SceneSnapshot) -> tuple[float, float]:
     """Place of the robot's face, where its looks begin."""
     gaze = scene.body.gaze if scene.body is not None else None
     return (0.0, 0.0) if gaze is None else (gaze.origin[0], gaze.origin[1])
 
 
-def _place(scene: Scene, id: str) -> tuple[float, float] | None:
+def _place(scene: SceneSnapshot, id: str) -> tuple[float, float] | None:
     if id == scene.robot:
         return _face(scene)
     found = scene.world.entity(id) if scene.world and id else None
@@ -165,7 +165,7 @@ def _short(text: str) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def write_film(path: Path, scenes: Sequence[Scene], rate: float) -> None:
+def write_film(path: Path, scenes: Sequence[SceneSnapshot], rate: float) -> None:
     """Write a film. path: `.gif`, or `.mp4`, which needs ffmpeg. Raises ImportError: no Pillow, or no ffmpeg."""
     drawn = pictures(scenes)
     if path.suffix == ".mp4":

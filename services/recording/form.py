@@ -18,7 +18,7 @@ JSON, MSGPACK, XML, BYTES = "json", "msgpack", "xml", ""
 _BAD = (msgspec.MsgspecError, InputRefused, UnicodeError, RecursionError, OverflowError, TypeError)
 
 
-class Form(NamedTuple):
+class StoredForm(NamedTuple):
     """A payload as it is kept. encoding: one of those above. is_typed: it comes back through the message's type."""
 
     encoding: str
@@ -26,7 +26,7 @@ class Form(NamedTuple):
     is_typed: bool = False
 
 
-def kept(sample: Sample) -> Form:
+def kept(sample: Sample) -> StoredForm:
     """Choose the form in which a message is kept."""
     payload = sample.payload
     match sample.encoding.partition(";")[0]:
@@ -34,22 +34,22 @@ def kept(sample: Sample) -> Form:
             try:
                 text = msgspec.json.encode(msgspec.msgpack.decode(payload))
             except _BAD:
-                return Form(BYTES, payload)
+                return StoredForm(BYTES, payload)
             for is_typed in (False, True):
                 try:
                     if _packed(text, is_typed=is_typed) == payload:
-                        return Form(JSON, text, is_typed)
+                        return StoredForm(JSON, text, is_typed)
                 except _BAD:
                     pass
-            return Form(MSGPACK, payload)
+            return StoredForm(MSGPACK, payload)
         case "application/json":
-            return Form(JSON if _is_json(payload) else BYTES, payload)
+            return StoredForm(JSON if _is_json(payload) else BYTES, payload)
         case "application/xml" | "text/xml":
-            return Form(XML, payload)
-    return Form(BYTES, payload)
+            return StoredForm(XML, payload)
+    return StoredForm(BYTES, payload)
 
 
-def payload(form: Form, encoding: str) -> bytes:
+def payload(form: StoredForm, encoding: str) -> bytes:
     """Give back the bytes that came. encoding: that of the sample.
 
     What no recorder wrote, and cannot be turned back, is given as it stands: no reader takes it for a message.

@@ -11,7 +11,7 @@ CHUNK, CLOCK, LOST, MORE = "recording/chunk", "recording/clock", "recording/lost
 and all for which no channel is left."""
 
 
-class Mark(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class ChunkMark(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Mark at the beginning of a chunk, under the chunk's checksum: so none is told twice, moved, or of another file.
 
     number: of the chunk in its recording, from 0. of: `wall` of the recording. facts: those of the recording, in
@@ -30,7 +30,7 @@ class Offset(Struct, frozen=True, kw_only=True):
     error: Seconds
 
 
-class Losses(Struct, frozen=True, kw_only=True):
+class MissingMessages(Struct, frozen=True, kw_only=True):
     """Messages that are missing in a recording, up to now.
 
     dropped: streams, and in a flood others, before they were taken. overflowed: by a full queue. lost: by a cut, and
@@ -49,5 +49,5 @@ class Losses(Struct, frozen=True, kw_only=True):
         return self.dropped + self.overflowed + self.lost + self.disk
 
 
-OWN: dict[str, Any] = {CHUNK: Mark, CLOCK: dict[str, Offset], LOST: Losses}
+OWN: dict[str, Any] = {CHUNK: ChunkMark, CLOCK: dict[str, Offset], LOST: MissingMessages}
 """Type of what is JSON under each topic."""

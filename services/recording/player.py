@@ -83,7 +83,7 @@ class Timeline:
         return [self.recording.sample(number) for number in sorted(numbers)]
 
 
-class Player:
+class Playback:
     """A place in a recording that moves. at: its time. speed: 1.0 as it was. is_over: the end is reached."""
 
     def __init__(

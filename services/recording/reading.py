@@ -44,8 +44,8 @@ from engage_hri.schemas.messages import decode
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.bus.samples import Received, Sample
-from engage_hri.services.recording.form import Form, payload
-from engage_hri.services.recording.losses import CHUNK, LOST, MORE, OWN, Losses, Mark
+from engage_hri.services.recording.form import StoredForm, payload
+from engage_hri.services.recording.losses import CHUNK, LOST, MORE, OWN, ChunkMark, MissingMessages
 from engage_hri.services.recording.writing import PROFILE, REPAIRED, Contents
 
 _HEAD = struct.Struct("<BQ")
@@ -105,7 +105,7 @@ class Recording:
         """Whether messages of a channel can be read, by its id."""
         self._left_out: dict[str, tuple[int, int]] = {}
         """Place of the first chunk with such messages, and their number, by what is wrong with them."""
-        self._mark = Mark(number=-1, of="")
+        self._mark = ChunkMark(number=-1, of="")
         """The last one that was read."""
         self._contents = Contents()
         self._chunks: list[tuple[int, int]] = []
@@ -198,7 +198,7 @@ class Recording:
             return msgspec.msgpack.decode(message.data, type=Sample)
         told = channel.metadata
         encoding, clock = told.get("encoding", ""), told.get("clock", "")
-        form = Form(channel.message_encoding, message.data, told.get("typed") == "true")
+        form = StoredForm(channel.message_encoding, message.data, told.get("typed") == "true")
         return Sample(
             key=told.get("key", ""), payload=payload(form, encoding),
             encoding=encoding, source=told.get("sender", ""), at=self.began + self.time(number),
@@ -217,10 +217,10 @@ class Recording:
         return [(self.time(each), msgspec.json.decode(self._message(each).data, type=OWN[topic])) for each in numbers]
 
     @property
-    def losses(self) -> Losses:
+    def losses(self) -> MissingMessages:
         """Messages that are known to be missing."""
         told = self.own(LOST)
-        return told[-1][1] if told else Losses()
+        return told[-1][1] if told else MissingMessages()
 
     def indexes(self, chunk: int) -> list[MessageIndex]:
         """Make the indexes of a chunk anew, one for each of its channels. chunk: its number."""
@@ -403,7 +403,7 @@ class Recording:
         found: list[tuple[int, int, int]] = []
         channels: dict[int, Channel] = {}
         schemas: list[Schema] = []
-        marks: list[Mark] = []
+        marks: list[ChunkMark] = []
         for opcode, place, body in _records(content):
             if opcode == Opcode.CHANNEL:
                 channel = Channel.read(ReadDataStream(BytesIO(body)))
@@ -418,7 +418,7 @@ class Recording:
                     raise ValueError("a time in it is none")
                 known = channels.get(id) or self._channels.get(id) or self._spare.get(id)
                 if known is not None and known.topic == CHUNK:
-                    marks.append(msgspec.json.decode(body[_MESSAGE.size :], type=Mark))
+                    marks.append(msgspec.json.decode(body[_MESSAGE.size :], type=ChunkMark))
                 found.append((log_time, id, place))
         self._follow(marks, at)
         new = [told for id, told in channels.items() if id not in self._channels]
@@ -443,7 +443,7 @@ class Recording:
                 self._of_chunk.append(number)
                 self._places.append(place)
 
-    def _follow(self, marks: list[Mark], at: int) -> None:
+    def _follow(self, marks: list[ChunkMark], at: int) -> None:
         """Check that a chunk is the next one of this recording. Raises ValueError: it is not."""
         last = self._mark
         for mark in marks:

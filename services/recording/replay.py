@@ -14,24 +14,24 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Hub, Received, Sample, Subscription
-from engage_hri.services.recording.player import Player, readable
-from engage_hri.services.recording.times import Times, moved
+from engage_hri.services.recording.player import Playback, readable
+from engage_hri.services.recording.times import RecordingTimes, moved
 
 NAME = "replay"
 """Name of the participant that says what programs without a name said, and watches for a live robot."""
 Open = Callable[[], Awaitable[Hub]]
-Control = Callable[[Player, Seconds], Seconds | None]
+Control = Callable[[Playback, Seconds], Seconds | None]
 """What somebody wants of the player: done to it, or a time to go to that is returned."""
 
 
-class Stage:
+class ReplayBus:
     """The bus on which it plays. unread: messages that nobody can read, and that are left out."""
 
-    def __init__(self, player: Player, open: Open, *, commands: bool = False, owns: bool = True) -> None:
+    def __init__(self, player: Playback, open: Open, *, commands: bool = False, owns: bool = True) -> None:
         """open: opens a hub. owns: the hub is closed with the stage. commands: say those, too."""
         self.unread = 0
         self._player = player
-        self._times = Times(player.timeline.recording)
+        self._times = RecordingTimes(player.timeline.recording)
         self._open = open
         self._owns = owns
         self._commands = commands
@@ -123,7 +123,9 @@ class Stage:
         return bus.stamp(now if at is None else now + (at - player.at(now)) / player.speed)
 
 
-async def replay(stage: Stage, player: Player, controls: "asyncio.Queue[Control]", *, begin: Seconds = 0.0) -> None:
+async def replay(
+    stage: ReplayBus, player: Playback, controls: "asyncio.Queue[Control]", *, begin: Seconds = 0.0
+) -> None:
     """Play to the end. begin: time in the recording to begin at.
 
     To go to another time is a restart of the robot, for all who listen: they get what stands then. Raises
@@ -138,7 +140,9 @@ async def replay(stage: Stage, player: Player, controls: "asyncio.Queue[Control]
             await stage.end()
 
 
-async def _play(stage: Stage, player: Player, controls: "asyncio.Queue[Control]", begin: Seconds) -> Seconds | None:
+async def _play(
+    stage: ReplayBus, player: Playback, controls: "asyncio.Queue[Control]", begin: Seconds
+) -> Seconds | None:
     """Play from a time on, until the end, or until it is to go to another time, which is returned."""
     playing = asyncio.create_task(_say_what_is_due(stage, player, controls, begin), name="playing")
     with stage.bus.subscribe(keys.ANY_ROBOT_ALIVE) as presence:
@@ -156,7 +160,7 @@ async def _play(stage: Stage, player: Player, controls: "asyncio.Queue[Control]"
 
 
 async def _say_what_is_due(
-    stage: Stage, player: Player, controls: "asyncio.Queue[Control]", begin: Seconds
+    stage: ReplayBus, player: Playback, controls: "asyncio.Queue[Control]", begin: Seconds
 ) -> Seconds | None:
     loop = asyncio.get_running_loop()
     await stage.say(player.seek(begin, loop.time()))
@@ -173,7 +177,7 @@ async def _say_what_is_due(
             pass
 
 
-async def _watch(stage: Stage, presence: Subscription) -> None:
+async def _watch(stage: ReplayBus, presence: Subscription) -> None:
     """Raise RunFailed as soon as a live robot comes."""
     async for received in presence:
         match received.message:

@@ -13,7 +13,7 @@ from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.times import messages
 
 
-class Scene(Struct, frozen=True, kw_only=True):
+class SceneSnapshot(Struct, frozen=True, kw_only=True):
     """A scene at a time. doing: targets of what each actor does, by actor and action. events: those that are open."""
 
     at: Seconds
@@ -29,7 +29,7 @@ class Scene(Struct, frozen=True, kw_only=True):
         return self.body.speaking if self.body is not None else ""
 
 
-def scenes(recording: Recording, times: Sequence[Seconds]) -> Iterator[Scene]:
+def scenes(recording: Recording, times: Sequence[Seconds]) -> Iterator[SceneSnapshot]:
     """Make the scenes at these times, which must be in order."""
     told = sorted(messages(recording), key=lambda one: one[1])
     world: World | None = None
@@ -56,7 +56,7 @@ def scenes(recording: Recording, times: Sequence[Seconds]) -> Iterator[Scene]:
                     if state in ENDINGS:
                         del events[id]
             number += 1
-        yield Scene(
+        yield SceneSnapshot(
             at=at, robot=recording.robot, world=world, body=body, doing=dict(doing), events=tuple(events.values())
         )  # fmt: skip
 

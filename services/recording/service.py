@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
 from engage_hri.services.recording.disk import RecordingFile, Tell
 from engage_hri.services.recording.form import JSON, MSGPACK, kept
-from engage_hri.services.recording.losses import CLOCK, LOST, MORE, Losses, Offset
+from engage_hri.services.recording.losses import CLOCK, LOST, MORE, MissingMessages, Offset
 from engage_hri.services.recording.reading import BILLION
 from engage_hri.services.recording.writing import Line
 from engage_hri.services.runtime.absent import Absent
@@ -37,7 +37,7 @@ class Recorder:
     """A recording while it is made. began, wall: the same instant, on the bus' clock and in ns since 1970."""
 
     def __init__(self, bus: Bus, file: RecordingFile, began: Seconds, wall: int) -> None:
-        self.losses = Losses()
+        self.losses = MissingMessages()
         self.is_whole = False
         """True once the file has its end."""
         self.messages = 0
@@ -99,7 +99,7 @@ class Recorder:
             self._offsets = {each.clock: each.offset for each in self._bus.health.clocks}
             self._own(CLOCK, msgspec.json.encode(changed))
         health = self._bus.health
-        losses = Losses(
+        losses = MissingMessages(
             dropped=health.dropped - self._known_before, overflowed=health.overflowed, lost=health.lost,
             disk=self._file.dropped, still=self._still,
         )  # fmt: skip

@@ -18,7 +18,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 COLUMNS = ("participant", "life", "from", "key", "value")
 
 
-class Life(Struct, frozen=True, kw_only=True):
+class LifeSettings(Struct, frozen=True, kw_only=True):
     """Settings of one life of a service. since: time at which the recording has them; 0.0: it ran before.
 
     number: 1 for the first life of this service in the recording. sections: what `told` has as text.
@@ -37,9 +37,9 @@ class Life(Struct, frozen=True, kw_only=True):
         return dict(flat(self.sections))
 
 
-def settings_of(recording: Recording) -> list[Life]:
+def settings_of(recording: Recording) -> list[LifeSettings]:
     """Find the settings of all lives, in the order in which they came."""
-    found: dict[tuple[str, str], Life] = {}
+    found: dict[tuple[str, str], LifeSettings] = {}
     numbers: dict[str, int] = {}
     for number in range(len(recording)):
         key = recording.key(number)
@@ -55,11 +55,11 @@ def settings_of(recording: Recording) -> list[Life]:
     return list(found.values())
 
 
-def _life(told: ServiceSettings, since: Seconds, number: int) -> Life:
+def _life(told: ServiceSettings, since: Seconds, number: int) -> LifeSettings:
     try:
-        return Life(told=told, since=since, number=number, sections=sections(told.settings))
+        return LifeSettings(told=told, since=since, number=number, sections=sections(told.settings))
     except InputRefused as refused:  # of another program, or damaged: the rest of the recording is read
-        return Life(told=told, since=since, number=number, sections={}, unread=refused.fault.reason)
+        return LifeSettings(told=told, since=since, number=number, sections={}, unread=refused.fault.reason)
 
 
 def flat(settings: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:
@@ -72,19 +72,19 @@ def flat(settings: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, st
             yield key, _value(value)
 
 
-def changed(life: Life, others: Mapping[str, str]) -> list[str]:
+def changed(life: LifeSettings, others: Mapping[str, str]) -> list[str]:
     """Settings of a life that are not as in others, each as `key = value`."""
     return [f"{key} = {value or 'none'}" for key, value in life.values.items() if others.get(key) != value]
 
 
-def rows(all_lives: Iterable[Life]) -> Iterator[tuple[str, int, float, str, str]]:
+def rows(all_lives: Iterable[LifeSettings]) -> Iterator[tuple[str, int, float, str, str]]:
     """Participant, number of its life, time from which on, setting and value: all there are."""
     for life in all_lives:
         for key, value in life.values.items():
             yield life.told.participant, life.number, round(life.since, 6), key, value
 
 
-def configuration(all_lives: Sequence[Life], name: str) -> str:
+def configuration(all_lives: Sequence[LifeSettings], name: str) -> str:
     """A file of configuration with the settings of the last life of each service; the others as comments.
 
     name: of the recording.

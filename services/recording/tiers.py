@@ -20,7 +20,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.recording.lanes import Annotation, Tier, apart
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.times import Times, messages
+from engage_hri.services.recording.times import RecordingTimes, messages
 from engage_hri.services.reports.ongoing_actions import ends
 
 NAMES = {
@@ -40,7 +40,7 @@ TOLD_ONCE = (
 
 def tiers(recording: Recording) -> list[Tier]:
     """Make all tiers."""
-    collected = _Collected(recording.robot, Times(recording))
+    collected = _Collected(recording.robot, RecordingTimes(recording))
     for received, at in messages(recording):
         if keys.key_class(received.key) in ("evt", "state", "alive"):
             collected.take(received, at)
@@ -92,7 +92,7 @@ class _Lives:
 class _Collected:
     """Annotations by tier, as they are found."""
 
-    def __init__(self, robot: str, times: Times) -> None:
+    def __init__(self, robot: str, times: RecordingTimes) -> None:
         self._robot = robot
         self._times = times
         self._lives = _Lives()

@@ -14,7 +14,7 @@ from engage_hri.services.recording.losses import CLOCK
 from engage_hri.services.recording.reading import Recording
 
 
-class Times:
+class RecordingTimes:
     """Times in a recording. An instant of a clock that its recorder never knew has none."""
 
     def __init__(self, recording: Recording) -> None:
@@ -47,7 +47,7 @@ class Times:
 
 def messages(recording: Recording) -> Iterator[tuple[Received, Seconds]]:
     """All messages that can be read, with the times that they tell of, or else at which they came."""
-    times = Times(recording)
+    times = RecordingTimes(recording)
     for number in range(len(recording)):
         if not recording.key(number) or (received := recording.received(number)) is None:
             continue

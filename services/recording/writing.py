@@ -39,7 +39,7 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.export import bundle
 from engage_hri.services.recording.form import JSON
-from engage_hri.services.recording.losses import CHUNK, Mark
+from engage_hri.services.recording.losses import CHUNK, ChunkMark
 
 PROFILE = "engage"
 REPAIRED = "engage-repaired"
@@ -154,7 +154,7 @@ class Writer:
         """Add a message to the chunk. Times in nanoseconds since 1970."""
         if not self.waiting:
             facts = {} if self._number else dict(self._facts)
-            mark = msgspec.json.encode(Mark(number=self._number, of=self._facts.get("wall", ""), facts=facts))
+            mark = msgspec.json.encode(ChunkMark(number=self._number, of=self._facts.get("wall", ""), facts=facts))
             self._first = self._last = log_time
             self._add(_MARKS, mark, log_time, log_time, 0)
         self._add(line, data, log_time, publish_time, sequence)

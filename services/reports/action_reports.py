@@ -19,7 +19,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent
 from engage_hri.services.reports.reporters import Reporters
-from engage_hri.services.reports.reports import GoesOn, Told
+from engage_hri.services.reports.reports import GoesOn, TimedReport
 
 FACE_GRACE: Seconds = 2.0
 """Time for which a person may be out of sight, and come back under the same id, before the person has gone. Trackers
@@ -46,13 +46,13 @@ class ActionReports:
         """Time at which `advance` has something to tell."""
         return self._reporters.deadline
 
-    def advance(self, now: Seconds) -> list[Told]:
+    def advance(self, now: Seconds) -> list[TimedReport]:
         """Let time pass."""
         return self._reporters.advance(now)
 
     def take(
         self, message: object, key: str, source: str, life: str, now: Seconds, *, past: bool = False
-    ) -> list[Told]:
+    ) -> list[TimedReport]:
         """Take a message as it was received. Returns what follows, in order; nothing for what tells of no action."""
         told = self.advance(now)
         if isinstance(message, PeerAlive | PeerGone):
@@ -82,7 +82,7 @@ class ActionReports:
         return name, ""
 
 
-def events(told: Iterable[Told], clock: str) -> Iterator[tuple[ActionEvent, Seconds]]:
+def events(told: Iterable[TimedReport], clock: str) -> Iterator[tuple[ActionEvent, Seconds]]:
     """Events for readers that know nothing of reporters, each with its local time. clock: that of local time.
 
     An action that goes on is told as begun. Of a speech that goes on nothing is told: nobody heard its beginning.

@@ -14,7 +14,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.reports.reports import Report, Told
+from engage_hri.services.reports.reports import Report, TimedReport
 
 OLDEST: Seconds = 60.0
 """Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
@@ -34,28 +34,28 @@ Effect = Literal["", "end", "resume"]
 """`end`: all that the reporter said ends. `resume`: it goes on, whatever was assumed meanwhile."""
 
 
-class Row(NamedTuple):
+class StandingRow(NamedTuple):
     """A transition of a reporter's standing. reborn: the reporter is there as another life."""
 
     next: Standing
     effect: Effect = ""
 
 
-TABLE: dict[tuple[Standing, Given], Row] = {
-    ("here", "gone"): Row("away"),
-    ("here", "alive"): Row("here"),
-    ("here", "reborn"): Row("here", "end"),
-    ("away", "gone"): Row("away"),
-    ("away", "alive"): Row("back"),
-    ("away", "reborn"): Row("here", "end"),
-    ("away", "grace_over"): Row("silenced", "end"),
-    ("silenced", "gone"): Row("silenced"),
-    ("silenced", "alive"): Row("back"),
-    ("silenced", "reborn"): Row("here"),
-    ("back", "gone"): Row("away", "resume"),
-    ("back", "alive"): Row("back"),
-    ("back", "reborn"): Row("here", "end"),
-    ("back", "caught_up"): Row("here", "resume"),
+TABLE: dict[tuple[Standing, Given], StandingRow] = {
+    ("here", "gone"): StandingRow("away"),
+    ("here", "alive"): StandingRow("here"),
+    ("here", "reborn"): StandingRow("here", "end"),
+    ("away", "gone"): StandingRow("away"),
+    ("away", "alive"): StandingRow("back"),
+    ("away", "reborn"): StandingRow("here", "end"),
+    ("away", "grace_over"): StandingRow("silenced", "end"),
+    ("silenced", "gone"): StandingRow("silenced"),
+    ("silenced", "alive"): StandingRow("back"),
+    ("silenced", "reborn"): StandingRow("here"),
+    ("back", "gone"): StandingRow("away", "resume"),
+    ("back", "alive"): StandingRow("back"),
+    ("back", "reborn"): StandingRow("here", "end"),
+    ("back", "caught_up"): StandingRow("here", "resume"),
 }
 """Every standing has a row for each input that can come then: the two timers run in one standing each."""
 
@@ -106,7 +106,7 @@ class Reporters:
                 return one.since + CATCH_UP
         return None
 
-    def advance(self, now: Seconds) -> list[Told]:
+    def advance(self, now: Seconds) -> list[TimedReport]:
         told = []
         for one in self._reporters.values():
             due = self._due(one)
@@ -123,7 +123,7 @@ class Reporters:
 
     # -- presence -----------------------------------------------------------------------------------------------
 
-    def feed(self, message: PeerAlive | PeerGone, now: Seconds) -> list[Told]:
+    def feed(self, message: PeerAlive | PeerGone, now: Seconds) -> list[TimedReport]:
         """Take the news that a participant has come or gone."""
         match message:
             case PeerGone(participant=name) if (one := self._reporters.get(name)) is not None:
@@ -147,7 +147,7 @@ class Reporters:
         if not self._reporters[name].is_alive and not self._reporters[name].reports:
             del self._reporters[name]
 
-    def _lives(self, one: _Reporter, run: str, now: Seconds) -> list[Told]:
+    def _lives(self, one: _Reporter, run: str, now: Seconds) -> list[TimedReport]:
         """Note the life of a reporter. If it is another one, all that the last one said has ended."""
         before = one.run
         if run in ("", before):
@@ -163,9 +163,9 @@ class Reporters:
         one.reports.clear()
         return told
 
-    def _step(self, one: _Reporter, given: Given, now: Seconds) -> list[Told]:
+    def _step(self, one: _Reporter, given: Given, now: Seconds) -> list[TimedReport]:
         row = TABLE[one.standing, given]
-        told: list[Told] = []
+        told: list[TimedReport] = []
         if row.effect == "end":
             told = self._end(one, one.since if one.standing == "away" else now)
         elif row.effect == "resume":
@@ -174,36 +174,36 @@ class Reporters:
             one.standing, one.since = row.next, now
         return told
 
-    def _end(self, one: _Reporter, at: Seconds) -> list[Told]:
+    def _end(self, one: _Reporter, at: Seconds) -> list[TimedReport]:
         one.floor = max(one.floor, at)
         told = []
         for actor, report in sorted(one.reports.items()):
             told += self._ends(one, report, at)
             if actor != self._robot and not any(other.seen for other in self._others(actor, one)):
-                told.append(Told(ActorLost(actor=actor, at=Stamp(self._clock, at)), at, is_sure=False))
+                told.append(TimedReport(ActorLost(actor=actor, at=Stamp(self._clock, at)), at, is_sure=False))
         return told
 
-    def _resume(self, one: _Reporter, now: Seconds) -> list[Told]:
+    def _resume(self, one: _Reporter, now: Seconds) -> list[TimedReport]:
         one.floor = now
         told = []
         for actor, report in sorted(one.reports.items()):
             if actor != self._robot and report.seen is not False:
-                told.append(Told(ActorFound(actor=actor, at=Stamp(self._clock, now)), now, is_sure=False))
-            told += [Told(action, now) for action in report.going()]
+                told.append(TimedReport(ActorFound(actor=actor, at=Stamp(self._clock, now)), now, is_sure=False))
+            told += [TimedReport(action, now) for action in report.going()]
         return told
 
     # -- what they say ------------------------------------------------------------------------------------------
 
     def hear(
         self, said: ActionEvent | OngoingActions, reporter: str, life: str, now: Seconds, *, past: bool = False
-    ) -> list[Told]:
+    ) -> list[TimedReport]:
         """Take what a reporter says. Returns what follows for the recognizer, in order.
 
         reporter: empty: unknown; nothing holds then for longer than it is told. life: of its process; empty: unknown.
         past: it is from the history, in which another life than the present one may speak.
         """
         one = self._reporter(reporter, now)
-        told: list[Told] = []
+        told: list[TimedReport] = []
         is_over = life in one.former or (past and one.is_alive and life not in ("", one.run))
         if not is_over:
             told += self._lives(one, life, now)
@@ -216,12 +216,12 @@ class Reporters:
         self._clear(reporter)
         return told
 
-    def _event(self, one: _Reporter, event: ActionEvent) -> list[Told]:
+    def _event(self, one: _Reporter, event: ActionEvent) -> list[TimedReport]:
         at = self._instant(event.at)
         if not isinstance(event, ActorLost):
             self._report(one, event.actor).take(event)
-            return [Told(event, at)]
-        told = [Told(event, at)]
+            return [TimedReport(event, at)]
+        told = [TimedReport(event, at)]
         if (report := one.reports.get(event.actor)) is not None:
             if self._is_seen(event.actor, one):
                 told = self._ends(one, report, at)
@@ -231,7 +231,7 @@ class Reporters:
             told = []
         return told
 
-    def _corrected(self, one: _Reporter, state: OngoingActions, now: Seconds) -> list[Told]:
+    def _corrected(self, one: _Reporter, state: OngoingActions, now: Seconds) -> list[TimedReport]:
         known = one.reports.get(state.actor)
         if known is None and not (state.seen or (state.actions and state.seen is None)):
             return []
@@ -251,20 +251,20 @@ class Reporters:
             one.reports[actor] = Report(self._instant)
         return one.reports[actor]
 
-    def _not_before(self, one: _Reporter, told: Told) -> Told:
+    def _not_before(self, one: _Reporter, told: TimedReport) -> TimedReport:
         """Put off what is from before a time of which the session has been told what was assumed."""
         if isinstance(told.observation, ActionBegan | ActionEnded | ActorFound | ActorLost) and told.at <= one.floor:
             one.floor += LATER
-            return Told(told.observation, one.floor, is_sure=False)
+            return TimedReport(told.observation, one.floor, is_sure=False)
         return told
 
-    def _ends(self, one: _Reporter, report: Report, at: Seconds) -> list[Told]:
+    def _ends(self, one: _Reporter, report: Report, at: Seconds) -> list[TimedReport]:
         """End what a reporter says, but not what another says, too."""
 
         def is_over(action: ActionBegan) -> bool:
             return not any(other.says(action) for other in self._others(action.actor, one))
 
-        return [Told(ended, at, is_sure=False) for ended in report.ends(is_over)]
+        return [TimedReport(ended, at, is_sure=False) for ended in report.ends(is_over)]
 
     def _is_seen(self, actor: str, one: _Reporter) -> bool:
         """Tell whether another reporter, which is there, sees this person."""

@@ -21,7 +21,7 @@ class GoesOn(Struct, frozen=True):
     since: Seconds
 
 
-class Told(NamedTuple):
+class TimedReport(NamedTuple):
     """An observation, and its local time. is_sure: False: that time is the latest possible."""
 
     observation: ActionEvent | GoesOn
@@ -75,7 +75,7 @@ class Report:
         if self._latest is None or not _is_before(event.at, self._latest):
             self._latest = event.at
 
-    def correct(self, state: OngoingActions, now: Seconds) -> list[Told]:
+    def correct(self, state: OngoingActions, now: Seconds) -> list[TimedReport]:
         """Take a state. Returns what it shows to have been missed, in order; mostly nothing.
 
         What has ended meanwhile has ended when something else of its kind began, or else by the state's last change.
@@ -84,15 +84,15 @@ class Report:
         if self._latest is not None and _is_before(state.at, self._latest):
             return []
         self._tells_states, at = True, self._local(state.at)
-        told = [Told(ended, when, is_sure=False) for ended, when in self._ended(state, at)]
+        told = [TimedReport(ended, when, is_sure=False) for ended, when in self._ended(state, at)]
         was_seen, self._ongoing.seen = self.seen, state.seen
         if state.seen and not was_seen:
             self._found = at
-            told.append(Told(ActorFound(actor=state.actor, at=state.at), at, is_sure=False))
+            told.append(TimedReport(ActorFound(actor=state.actor, at=state.at), at, is_sure=False))
         if state.seen is False:
             # Of somebody who is lost nothing new is believed.
             self._ongoing.become(action for action in state.actions if self.says(action))
-            lost = Told(ActorLost(actor=state.actor, at=state.at), at, is_sure=False)
+            lost = TimedReport(ActorLost(actor=state.actor, at=state.at), at, is_sure=False)
             return [*told, lost] if was_seen else told
         missed = [action for action in state.actions if not self._knows(action)]
         self._ongoing.become(state.actions)
@@ -116,11 +116,11 @@ class Report:
         self._before_loss = {one: each for one, each in self._before_loss.items() if is_lost and one in still}
         return sorted(ended, key=lambda one: one[1])
 
-    def _begun(self, action: ActionBegan, now: Seconds) -> Told:
+    def _begun(self, action: ActionBegan, now: Seconds) -> TimedReport:
         """Tell a beginning that was missed, as news only if it is as recent as the history that late readers get."""
         since = self._local(action.at)
         is_news = now - since <= keys.HISTORY_MAX_AGE and (self._found is None or since >= self._found)
-        return Told(action, since) if is_news else Told(GoesOn(action, since), now)
+        return TimedReport(action, since) if is_news else TimedReport(GoesOn(action, since), now)
 
     def going(self) -> list[GoesOn]:
         """List what goes on, for a session that has been told that it had ended."""

@@ -3,10 +3,10 @@
 from engage_hri.schemas import keys
 from engage_hri.schemas.requests import Cancel, Request, kind_of
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.requests.asking_table import State
+from engage_hri.services.requests.asking_table import AskingState
 
 
-class Asked:
+class SentRequest:
     """One request. run: the life of the server that accepted it. sent_at: when it was sent last; None: never."""
 
     def __init__(self, expression: str, request: Request) -> None:
@@ -15,7 +15,7 @@ class Asked:
         self.kind = kind_of(request)
         self.request = request
         self.cancel: Cancel | None = None
-        self.state = State.SENT
+        self.state = AskingState.SENT
         self.run = ""
         self.sent_at: Seconds | None = None
         self.resend_after: Seconds = 0.0
@@ -28,6 +28,6 @@ class Server:
     """
 
     def __init__(self, period: Seconds) -> None:
-        self.kept: dict[str, Asked] = {}
+        self.kept: dict[str, SentRequest] = {}
         self.period = period
         self.soon = period

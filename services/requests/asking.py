@@ -39,20 +39,20 @@ from engage_hri.schemas.requests import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
-from engage_hri.services.requests.asked import Asked, Server
+from engage_hri.services.requests.asked import SentRequest, Server
 from engage_hri.services.requests.asking_effects import (
-    Complain,
+    AskingFault,
     Effect,
-    Publish,
+    PublishCommand,
     Renew,
     TellAccepted,
     TellEnd,
 )
-from engage_hri.services.requests.asking_table import TABLE, Do, Event, State
+from engage_hri.services.requests.asking_table import TABLE, AskingAction, AskingEvent, AskingState
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.records import ANEW, unwieldy
-from engage_hri.services.requests.window import Window
+from engage_hri.services.requests.window import SendWindow
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
 _Said = Answer | None
@@ -67,16 +67,22 @@ ASLEEP: Seconds = FORGOTTEN_AFTER / 2
 that was closed, and the server may soon have forgotten that it has performed the request already."""
 
 # Members that are used with each message: an enum is slow to look one up.
-_SENT, _ENDED, _FINISHED = State.SENT, State.ENDED, Event.FINISHED
-_OVER = (State.GIVEN_UP, State.ENDED)
-_UNDECIDED = (State.SENT, State.HEARD)
+_SENT, _ENDED, _FINISHED = AskingState.SENT, AskingState.ENDED, AskingEvent.FINISHED
+_OVER = (AskingState.GIVEN_UP, AskingState.ENDED)
+_UNDECIDED = (AskingState.SENT, AskingState.HEARD)
 _RESEND, _GRACE, _PATIENCE, _CANCEL, _SWALLOW = _CLOCKS = (
-    Event.RESEND_DUE, Event.GRACE_OVER, Event.PATIENCE_OVER, Event.CANCELLED, Event.SWALLOW_OVER,
+    AskingEvent.RESEND_DUE, AskingEvent.GRACE_OVER, AskingEvent.PATIENCE_OVER, AskingEvent.CANCELLED,
+    AskingEvent.SWALLOW_OVER,
 )  # fmt: skip
-_OWN = (None, Event.RESEND_DUE, Event.SWALLOW_OVER)
+_OWN = (None, AskingEvent.RESEND_DUE, AskingEvent.SWALLOW_OVER)
 """Deadlines of what this side is to do: they wait for nobody."""
-_SENDS_AGAIN = (Event.RESEND_DUE, Event.BACK)
-_ANSWERS = {Heard: Event.HEARD, Accepted: Event.ACCEPTED, Outdated: Event.OUTDATED, Refused: Event.REFUSED}
+_SENDS_AGAIN = (AskingEvent.RESEND_DUE, AskingEvent.BACK)
+_ANSWERS = {
+    Heard: AskingEvent.HEARD,
+    Accepted: AskingEvent.ACCEPTED,
+    Outdated: AskingEvent.OUTDATED,
+    Refused: AskingEvent.REFUSED,
+}
 """The event that an answer of the server is; every other answer is an end."""
 
 
@@ -88,14 +94,14 @@ class Asking:
         self._sight = sight or Sight(requester)
         self._life = life
         self._patience = patience
-        self._asked: dict[str, Asked] = {}
+        self._asked: dict[str, SentRequest] = {}
         self._servers: dict[str, Server] = {}
-        self._windows = defaultdict[str, Window](partial(Window, patience.window))
+        self._windows = defaultdict[str, SendWindow](partial(SendWindow, patience.window))
         self._runs: dict[str, str] = {}
         """Participants that are there: the life of each."""
         self._gone: set[str] = set()
         """Servers that have been there and are not: those of live requests, and all services of a robot."""
-        self._deadlines = Silences[tuple[Event | None, str]](self._sight, is_own=lambda name: name[0] in _OWN)
+        self._deadlines = Silences[tuple[AskingEvent | None, str]](self._sight, is_own=lambda name: name[0] in _OWN)
         """Deadlines of requests, by event and id; of the next `KeepAlive`, by None and server."""
         self._effects: list[Effect] = []
 
@@ -106,9 +112,9 @@ class Asking:
         """Time at which to call `tick`; there may be nothing to do by then."""
         return None if self._deadlines.look == inf else self._deadlines.look
 
-    def state(self, id: str) -> State:
+    def state(self, id: str) -> AskingState:
         asked = self._asked.get(id)
-        return State.ENDED if asked is None else asked.state
+        return AskingState.ENDED if asked is None else asked.state
 
     def request(self, id: str) -> Request | None:
         """The newest content of the request; None if it has ended."""
@@ -118,7 +124,7 @@ class Asking:
     @property
     def ids(self) -> tuple[str, ...]:
         """Ids of the requests that have not ended for the caller."""
-        return tuple(id for id, asked in self._asked.items() if asked.state is not State.GIVEN_UP)
+        return tuple(id for id, asked in self._asked.items() if asked.state is not AskingState.GIVEN_UP)
 
     # -- events ---------------------------------------------------------------------------------------------------
 
@@ -133,7 +139,7 @@ class Asking:
             return [TellEnd(request.id, RequestRefused(bad))]
         if asked is None:
             request = replace(request, requester=self._requester, life=self._life, lease=self._lease(request))
-            asked = self._asked[request.id] = Asked(expression, request)
+            asked = self._asked[request.id] = SentRequest(expression, request)
         elif (fault := _id_taken(asked, request)) is not None:
             return [TellEnd(request.id, RequestRefused(fault))]
         elif asked.cancel is None:
@@ -142,7 +148,7 @@ class Asking:
             asked.request = replace(request, **same, revision=known.revision + 1)
         if within is not None:
             self._deadlines.set((_CANCEL, request.id), now + within)
-        self._step(asked, Event.ASKED, now)
+        self._step(asked, AskingEvent.ASKED, now)
         return self._new_effects()
 
     def _lease(self, request: Request) -> Seconds:
@@ -169,9 +175,9 @@ class Asking:
         asked.cancel = self._cancellation(asked, why)
         if asked.sent_at is None:
             fault = asked.cancel.fault(id).following("cancelled before it was sent", id)
-            self._step(asked, Event.REFUSED, now, Refused(id=id, fault=fault))
+            self._step(asked, AskingEvent.REFUSED, now, Refused(id=id, fault=fault))
         else:
-            self._step(asked, Event.CANCELLED, now)
+            self._step(asked, AskingEvent.CANCELLED, now)
 
     def hear(self, answer: Answer, now: Seconds, server: str) -> list[Effect]:
         """Take an answer; one from another server, or to another requester or life, changes nothing."""
@@ -192,7 +198,7 @@ class Asking:
         if live or (was_there and server in keys.SERVICES):
             self._gone.add(server)
         for asked in live:
-            self._step(asked, Event.GONE, now)
+            self._step(asked, AskingEvent.GONE, now)
         return self._new_effects()
 
     def server_there(self, server: str, run: str, now: Seconds) -> list[Effect]:
@@ -201,7 +207,7 @@ class Asking:
         self._gone.discard(server)
         for asked in self._asked_of(server):
             is_another = bool(asked.run and run and asked.run != run)
-            self._step(asked, Event.REBORN if is_another else Event.BACK, now)
+            self._step(asked, AskingEvent.REBORN if is_another else AskingEvent.BACK, now)
             asked.run = asked.run or run
         return self._new_effects()
 
@@ -211,7 +217,7 @@ class Asking:
             event, name = due
             if event is None:
                 self._renew(name, now)
-            elif event is Event.CANCELLED:
+            elif event is AskingEvent.CANCELLED:
                 self._give_up(name, now)
             elif (asked := self._asked.get(name)) is not None:
                 self._step(asked, event, now)
@@ -219,7 +225,7 @@ class Asking:
 
     # -- one request ----------------------------------------------------------------------------------------------
 
-    def _asked_of(self, server: str) -> list[Asked]:
+    def _asked_of(self, server: str) -> list[SentRequest]:
         return [asked for asked in self._asked.values() if asked.server == server]
 
     def _new_effects(self) -> list[Effect]:
@@ -227,7 +233,7 @@ class Asking:
         effects, self._effects = self._effects, []
         return effects
 
-    def _step(self, asked: Asked, event: Event, now: Seconds, answer: Answer | None = None) -> None:
+    def _step(self, asked: SentRequest, event: AskingEvent, now: Seconds, answer: Answer | None = None) -> None:
         """Let `event` happen to a request: take its row of the table and do what that says."""
         before = asked.state
         if (
@@ -236,7 +242,7 @@ class Asking:
             and asked.sent_at is not None
             and now - asked.sent_at > ASLEEP
         ):
-            event = Event.PATIENCE_OVER
+            event = AskingEvent.PATIENCE_OVER
         asked.state, actions = TABLE[before][event]
         for action in actions:
             _ACTIONS[action](self, asked, now, answer)
@@ -253,14 +259,14 @@ class Asking:
             if asked.state is _ENDED:
                 del self._asked[id]
 
-    def _answered(self, asked: Asked, now: Seconds) -> None:
+    def _answered(self, asked: SentRequest, now: Seconds) -> None:
         """Send the next of those that wait for the server to keep up."""
         following = self._windows[asked.server].leave(asked.request.id)
         if following is not None:
             self._send_and_repeat(self._asked[following], now, None, is_first=True)
             self._await_answer(self._asked[following], now, None)
 
-    def _send_and_repeat(self, asked: Asked, now: Seconds, answer: _Said, *, is_first: bool) -> None:
+    def _send_and_repeat(self, asked: SentRequest, now: Seconds, answer: _Said, *, is_first: bool) -> None:
         after = self._patience.first_resend if is_first else 2 * asked.resend_after
         asked.resend_after = min(after, self._patience.longest_resend)
         if asked.server in self._gone:
@@ -273,78 +279,78 @@ class Asking:
             wait = min(wait, _period(asked.request))
         self._deadlines.set((_RESEND, asked.request.id), now + wait)
 
-    def _send(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _send(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         asked.sent_at = now
         expression = asked.expression if asked.cancel is None else keys.cancel(asked.server)
-        self._effects.append(Publish(expression, asked.cancel or asked.request))
+        self._effects.append(PublishCommand(expression, asked.cancel or asked.request))
 
-    def _withdraw(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _withdraw(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         asked.cancel = asked.cancel or self._cancellation(asked, Fault(reason="given up"))
         self._send_and_repeat(asked, now, answer, is_first=True)
 
-    def _send_no_more(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _send_no_more(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_RESEND, asked.request.id))
 
-    def _keep_soon(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _keep_soon(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, self._patience.first_resend)
 
-    def _keep_now(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _keep_now(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._renew_soon(asked.server, now, 0.0)
 
-    def _wait_grace(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _wait_grace(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_GRACE, asked.request.id), now + self._patience.grace)
         self._send_no_more(asked, now, answer)
         if asked.cancel is None:
             self._deadlines.clear((_PATIENCE, asked.request.id))
 
-    def _stop_grace(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _stop_grace(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_GRACE, asked.request.id))
 
-    def _await_answer(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _await_answer(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         if asked.server in self._runs and not self._windows[asked.server].has_waiting(asked.request.id):
             self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.silence)
 
-    def _await_end(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _await_end(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_PATIENCE, asked.request.id), now + self._patience.cancel)
 
-    def _swallow(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _swallow(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._deadlines.set((_SWALLOW, asked.request.id), now + self._patience.swallow)
 
-    def _tell_accepted(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_accepted(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         assert isinstance(answer, Accepted)
         self._effects.append(TellAccepted(asked.request.id, answer))
 
-    def _tell_outcome(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_outcome(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         assert isinstance(answer, Outcome)
         self._effects.append(TellEnd(asked.request.id, answer))
 
-    def _tell_refused(self, asked: Asked, now: Seconds, answer: _Said, *, error: type[EngageError]) -> None:
+    def _tell_refused(self, asked: SentRequest, now: Seconds, answer: _Said, *, error: type[EngageError]) -> None:
         assert isinstance(answer, Refused)
         self._effects.append(TellEnd(asked.request.id, error(answer.fault)))
 
-    def _tell_gone(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_gone(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         missed = self._sight.misses(asked.server, asked.request.id, now - self._patience.grace, now, ANEW)
         self._fail(asked, OutcomeUnknown(missed))
 
-    def _tell_reborn(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_reborn(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._fail(asked, ServerRestarted(self._sight.restarted(asked.server, asked.request.id, ANEW)))
 
-    def _tell_silent(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_silent(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         what = f"is there, but has not answered for {self._patience.silence:g} s"
         self._fail(asked, OutcomeUnknown(self._fault(asked, what, "silent", now - self._patience.silence, ANEW)))
 
-    def _tell_unstoppable(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _tell_unstoppable(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         what = f"has not ended it within {self._patience.cancel:g} s of its cancellation"
         advice = f"is {asked.server} stuck? It is not asked any more"
         fault = self._fault(asked, what, "late", now - self._patience.cancel, advice)
         self._fail(asked, NeverEnded(fault))
-        self._effects.append(Complain(fault))
+        self._effects.append(AskingFault(fault))
 
-    def _fault(self, asked: Asked, what: str, cause: Cause, since: Seconds, advice: str) -> Fault:
+    def _fault(self, asked: SentRequest, what: str, cause: Cause, since: Seconds, advice: str) -> Fault:
         """what: the server has not done, and for how long."""
         return self._sight.fault(f"{asked.server} {what}", "", cause, asked.server, asked.request.id, since, advice)
 
-    def _fail(self, asked: Asked, error: EngageError) -> None:
+    def _fail(self, asked: SentRequest, error: EngageError) -> None:
         self._effects.append(TellEnd(asked.request.id, error))
 
     def _give_up(self, id: str, now: Seconds) -> None:
@@ -353,7 +359,7 @@ class Asking:
             late = self._sight.fault("it has taken too long", "", "late", asked.server, "", since)
             self._cancel(id, late, now)
 
-    def _cancellation(self, asked: Asked, why: Fault) -> Cancel:
+    def _cancellation(self, asked: SentRequest, why: Fault) -> Cancel:
         return Cancel(
             id=asked.request.id, requester=self._requester, life=self._life, of=asked.kind, reason=why.reason,
             cause=why.cause, whose=why.whose,
@@ -361,7 +367,7 @@ class Asking:
 
     # -- keeping alive --------------------------------------------------------------------------------------------
 
-    def _keep(self, asked: Asked, now: Seconds, answer: _Said) -> None:
+    def _keep(self, asked: SentRequest, now: Seconds, answer: _Said) -> None:
         self._deadlines.clear((_RESEND, asked.request.id))
         self._deadlines.clear((_PATIENCE, asked.request.id))
         server = self._servers.get(asked.server)
@@ -371,7 +377,7 @@ class Asking:
         server.period = max(SHORTEST_PULSE, min(server.period, _period(asked.request)))
         self._renew_soon(asked.server, now, server.period)
 
-    def _let_go(self, asked: Asked, now: Seconds = 0.0, answer: _Said = None) -> None:
+    def _let_go(self, asked: SentRequest, now: Seconds = 0.0, answer: _Said = None) -> None:
         server = self._servers.get(asked.server)
         if server is not None and server.kept.pop(asked.request.id, None) is not None and not server.kept:
             del self._servers[asked.server]
@@ -403,10 +409,10 @@ def _period(request: Request) -> Seconds:
     return min(request.lease, request.unheard or inf) / 3
 
 
-def _id_taken(asked: Asked, request: Request) -> Fault | None:
+def _id_taken(asked: SentRequest, request: Request) -> Fault | None:
     """A fault if `request` must not have the id of `asked`; None if it is an update of that."""
     known, kind = asked.kind, kind_of(request)
-    if asked.state is State.GIVEN_UP:
+    if asked.state is AskingState.GIVEN_UP:
         reason = f"{known} {request.id!r} was given up, and may still be answered"
     elif known != kind:
         reason = f"{request.id!r} is the id of a live {known}"
@@ -415,27 +421,27 @@ def _id_taken(asked: Asked, request: Request) -> Fault | None:
     return Fault(reason=reason, where=request.id, advice=f"give this {kind} another id")
 
 
-_ACTIONS: Mapping[Do, Callable[[Asking, Asked, Seconds, _Said], None]] = {
-    Do.SEND: partial(Asking._send_and_repeat, is_first=True),
-    Do.SEND_AGAIN: partial(Asking._send_and_repeat, is_first=False),
-    Do.SEND_ONCE: Asking._send,
-    Do.WITHDRAW: Asking._withdraw,
-    Do.SEND_NO_MORE: Asking._send_no_more,
-    Do.KEEP: Asking._keep,
-    Do.KEEP_SOON: Asking._keep_soon,
-    Do.KEEP_NOW: Asking._keep_now,
-    Do.LET_GO: Asking._let_go,
-    Do.WAIT_GRACE: Asking._wait_grace,
-    Do.STOP_GRACE: Asking._stop_grace,
-    Do.AWAIT_ANSWER: Asking._await_answer,
-    Do.AWAIT_END: Asking._await_end,
-    Do.SWALLOW: Asking._swallow,
-    Do.TELL_ACCEPTED: Asking._tell_accepted,
-    Do.TELL_OUTCOME: Asking._tell_outcome,
-    Do.TELL_REFUSED: partial(Asking._tell_refused, error=RequestRefused),
-    Do.TELL_FORGOTTEN: partial(Asking._tell_refused, error=OutcomeUnknown),
-    Do.TELL_GONE: Asking._tell_gone,
-    Do.TELL_REBORN: Asking._tell_reborn,
-    Do.TELL_SILENT: Asking._tell_silent,
-    Do.TELL_UNSTOPPABLE: Asking._tell_unstoppable,
+_ACTIONS: Mapping[AskingAction, Callable[[Asking, SentRequest, Seconds, _Said], None]] = {
+    AskingAction.SEND: partial(Asking._send_and_repeat, is_first=True),
+    AskingAction.SEND_AGAIN: partial(Asking._send_and_repeat, is_first=False),
+    AskingAction.SEND_ONCE: Asking._send,
+    AskingAction.WITHDRAW: Asking._withdraw,
+    AskingAction.SEND_NO_MORE: Asking._send_no_more,
+    AskingAction.KEEP: Asking._keep,
+    AskingAction.KEEP_SOON: Asking._keep_soon,
+    AskingAction.KEEP_NOW: Asking._keep_now,
+    AskingAction.LET_GO: Asking._let_go,
+    AskingAction.WAIT_GRACE: Asking._wait_grace,
+    AskingAction.STOP_GRACE: Asking._stop_grace,
+    AskingAction.AWAIT_ANSWER: Asking._await_answer,
+    AskingAction.AWAIT_END: Asking._await_end,
+    AskingAction.SWALLOW: Asking._swallow,
+    AskingAction.TELL_ACCEPTED: Asking._tell_accepted,
+    AskingAction.TELL_OUTCOME: Asking._tell_outcome,
+    AskingAction.TELL_REFUSED: partial(Asking._tell_refused, error=RequestRefused),
+    AskingAction.TELL_FORGOTTEN: partial(Asking._tell_refused, error=OutcomeUnknown),
+    AskingAction.TELL_GONE: Asking._tell_gone,
+    AskingAction.TELL_REBORN: Asking._tell_reborn,
+    AskingAction.TELL_SILENT: Asking._tell_silent,
+    AskingAction.TELL_UNSTOPPABLE: Asking._tell_unstoppable,
 }

@@ -6,7 +6,7 @@ from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.requests import Accepted, Kept, Outcome, Request
 
 
-class Publish(Struct, frozen=True):
+class PublishCommand(Struct, frozen=True):
     """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
 
     expression: str
@@ -34,10 +34,10 @@ class TellEnd(Struct, frozen=True):
     end: Outcome | EngageError
 
 
-class Complain(Struct, frozen=True):
+class AskingFault(Struct, frozen=True):
     """Publish this fault for all to see."""
 
     fault: Fault
 
 
-Effect = Publish | Renew | TellAccepted | TellEnd | Complain
+Effect = PublishCommand | Renew | TellAccepted | TellEnd | AskingFault

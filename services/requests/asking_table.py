@@ -20,10 +20,10 @@ tests plays both tables against each other with losses and deaths.
 from collections.abc import Mapping
 from enum import auto
 
-from engage_hri.services.requests.transitions import Name, rows
+from engage_hri.services.requests.transitions import TableMember, rows
 
 
-class State(Name):
+class AskingState(TableMember):
     """State of one request at its requester."""
 
     SENT = auto()
@@ -43,7 +43,7 @@ class State(Name):
     """Nothing is known of it any more; or it was never sent."""
 
 
-class Event(Name):
+class AskingEvent(TableMember):
     """Event in the life of one request."""
 
     ASKED = auto()
@@ -68,7 +68,7 @@ class Event(Name):
     SWALLOW_OVER = auto()
 
 
-class Do(Name):
+class AskingAction(TableMember):
     """Action that follows from an event."""
 
     SEND = auto()
@@ -109,73 +109,75 @@ class Do(Name):
     """Tell the caller, and publish a fault: the cancellation was in vain."""
 
 
-Row = tuple[State, tuple[Do, ...]]
+Row = tuple[AskingState, tuple[AskingAction, ...]]
 
-S, E = State, Event
+S, E = AskingState, AskingEvent
 
 
-def undecided(state: State, reborn: tuple[State, *tuple[Do, ...]]) -> Mapping[Event, Row]:
+def undecided(state: AskingState, reborn: tuple[AskingState, *tuple[AskingAction, ...]]) -> Mapping[AskingEvent, Row]:
     """Rows of a request that is on its way and not decided. reborn: what another life of the server changes."""
     return rows(state, {
-        E.ASKED: (state, Do.SEND, Do.AWAIT_ANSWER),
-        E.CANCELLED: (S.WITHDRAWING, Do.SEND, Do.AWAIT_END),
-        E.HEARD: (S.HEARD, Do.AWAIT_ANSWER),
-        E.ACCEPTED: (S.ACCEPTED, Do.TELL_ACCEPTED, Do.KEEP),
-        E.OUTDATED: (state, Do.SEND, Do.AWAIT_ANSWER),
-        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
-        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
-        E.GONE: (state, Do.WAIT_GRACE),
-        E.BACK: (state, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER),
+        E.ASKED: (state, AskingAction.SEND, AskingAction.AWAIT_ANSWER),
+        E.CANCELLED: (S.WITHDRAWING, AskingAction.SEND, AskingAction.AWAIT_END),
+        E.HEARD: (S.HEARD, AskingAction.AWAIT_ANSWER),
+        E.ACCEPTED: (S.ACCEPTED, AskingAction.TELL_ACCEPTED, AskingAction.KEEP),
+        E.OUTDATED: (state, AskingAction.SEND, AskingAction.AWAIT_ANSWER),
+        E.REFUSED: (S.ENDED, AskingAction.TELL_REFUSED),
+        E.FINISHED: (S.ENDED, AskingAction.TELL_OUTCOME),
+        E.GONE: (state, AskingAction.WAIT_GRACE),
+        E.BACK: (state, AskingAction.STOP_GRACE, AskingAction.SEND, AskingAction.AWAIT_ANSWER),
         E.REBORN: reborn,
-        E.RESEND_DUE: (state, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_SILENT, Do.WITHDRAW, Do.SWALLOW),
+        E.RESEND_DUE: (state, AskingAction.SEND_AGAIN),
+        E.GRACE_OVER: (S.GIVEN_UP, AskingAction.TELL_GONE, AskingAction.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, AskingAction.TELL_SILENT, AskingAction.WITHDRAW, AskingAction.SWALLOW),
     }, E.SWALLOW_OVER)  # fmt: skip
 
 
-TABLE: Mapping[State, Mapping[Event, Row]] = {
-    S.SENT: undecided(S.SENT, reborn=(S.SENT, Do.STOP_GRACE, Do.SEND, Do.AWAIT_ANSWER)),
-    S.HEARD: undecided(S.HEARD, reborn=(S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW)),
+TABLE: Mapping[AskingState, Mapping[AskingEvent, Row]] = {
+    S.SENT: undecided(S.SENT, reborn=(S.SENT, AskingAction.STOP_GRACE, AskingAction.SEND, AskingAction.AWAIT_ANSWER)),
+    S.HEARD: undecided(
+        S.HEARD, reborn=(S.GIVEN_UP, AskingAction.TELL_REBORN, AskingAction.WITHDRAW, AskingAction.SWALLOW)
+    ),
     S.ACCEPTED: rows(S.ACCEPTED, {
-        E.ASKED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
-        E.CANCELLED: (S.STOPPING, Do.LET_GO, Do.SEND, Do.AWAIT_END),
-        E.OUTDATED: (S.ACCEPTED, Do.SEND_ONCE, Do.KEEP_SOON),
-        E.REFUSED: (S.ENDED, Do.TELL_FORGOTTEN),
-        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
-        E.GONE: (S.ACCEPTED, Do.WAIT_GRACE),
-        E.BACK: (S.ACCEPTED, Do.STOP_GRACE, Do.KEEP_NOW),
-        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
+        E.ASKED: (S.ACCEPTED, AskingAction.SEND_ONCE, AskingAction.KEEP_SOON),
+        E.CANCELLED: (S.STOPPING, AskingAction.LET_GO, AskingAction.SEND, AskingAction.AWAIT_END),
+        E.OUTDATED: (S.ACCEPTED, AskingAction.SEND_ONCE, AskingAction.KEEP_SOON),
+        E.REFUSED: (S.ENDED, AskingAction.TELL_FORGOTTEN),
+        E.FINISHED: (S.ENDED, AskingAction.TELL_OUTCOME),
+        E.GONE: (S.ACCEPTED, AskingAction.WAIT_GRACE),
+        E.BACK: (S.ACCEPTED, AskingAction.STOP_GRACE, AskingAction.KEEP_NOW),
+        E.REBORN: (S.GIVEN_UP, AskingAction.TELL_REBORN, AskingAction.WITHDRAW, AskingAction.SWALLOW),
+        E.GRACE_OVER: (S.GIVEN_UP, AskingAction.TELL_GONE, AskingAction.SWALLOW),
     }, E.HEARD, E.ACCEPTED, E.RESEND_DUE, E.PATIENCE_OVER, E.SWALLOW_OVER),
     S.WITHDRAWING: rows(S.WITHDRAWING, {
-        E.ACCEPTED: (S.STOPPING, Do.TELL_ACCEPTED),
-        E.REFUSED: (S.ENDED, Do.TELL_REFUSED),
-        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
-        E.GONE: (S.WITHDRAWING, Do.WAIT_GRACE),
-        E.BACK: (S.WITHDRAWING, Do.STOP_GRACE, Do.SEND),
-        E.REBORN: (S.WITHDRAWING, Do.STOP_GRACE, Do.SEND),
-        E.RESEND_DUE: (S.WITHDRAWING, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.WITHDRAW, Do.SWALLOW),
+        E.ACCEPTED: (S.STOPPING, AskingAction.TELL_ACCEPTED),
+        E.REFUSED: (S.ENDED, AskingAction.TELL_REFUSED),
+        E.FINISHED: (S.ENDED, AskingAction.TELL_OUTCOME),
+        E.GONE: (S.WITHDRAWING, AskingAction.WAIT_GRACE),
+        E.BACK: (S.WITHDRAWING, AskingAction.STOP_GRACE, AskingAction.SEND),
+        E.REBORN: (S.WITHDRAWING, AskingAction.STOP_GRACE, AskingAction.SEND),
+        E.RESEND_DUE: (S.WITHDRAWING, AskingAction.SEND_AGAIN),
+        E.GRACE_OVER: (S.GIVEN_UP, AskingAction.TELL_GONE, AskingAction.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, AskingAction.TELL_UNSTOPPABLE, AskingAction.WITHDRAW, AskingAction.SWALLOW),
     }, E.ASKED, E.CANCELLED, E.HEARD, E.OUTDATED, E.SWALLOW_OVER),
     S.STOPPING: rows(S.STOPPING, {
-        E.REFUSED: (S.ENDED, Do.TELL_FORGOTTEN),
-        E.FINISHED: (S.ENDED, Do.TELL_OUTCOME),
-        E.GONE: (S.STOPPING, Do.WAIT_GRACE),
-        E.BACK: (S.STOPPING, Do.STOP_GRACE, Do.SEND),
-        E.REBORN: (S.GIVEN_UP, Do.TELL_REBORN, Do.WITHDRAW, Do.SWALLOW),
-        E.RESEND_DUE: (S.STOPPING, Do.SEND_AGAIN),
-        E.GRACE_OVER: (S.GIVEN_UP, Do.TELL_GONE, Do.SWALLOW),
-        E.PATIENCE_OVER: (S.GIVEN_UP, Do.TELL_UNSTOPPABLE, Do.WITHDRAW, Do.SWALLOW),
+        E.REFUSED: (S.ENDED, AskingAction.TELL_FORGOTTEN),
+        E.FINISHED: (S.ENDED, AskingAction.TELL_OUTCOME),
+        E.GONE: (S.STOPPING, AskingAction.WAIT_GRACE),
+        E.BACK: (S.STOPPING, AskingAction.STOP_GRACE, AskingAction.SEND),
+        E.REBORN: (S.GIVEN_UP, AskingAction.TELL_REBORN, AskingAction.WITHDRAW, AskingAction.SWALLOW),
+        E.RESEND_DUE: (S.STOPPING, AskingAction.SEND_AGAIN),
+        E.GRACE_OVER: (S.GIVEN_UP, AskingAction.TELL_GONE, AskingAction.SWALLOW),
+        E.PATIENCE_OVER: (S.GIVEN_UP, AskingAction.TELL_UNSTOPPABLE, AskingAction.WITHDRAW, AskingAction.SWALLOW),
     }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.SWALLOW_OVER),
     S.GIVEN_UP: rows(S.GIVEN_UP, {
         E.REFUSED: (S.ENDED,),
         E.FINISHED: (S.ENDED,),
-        E.GONE: (S.GIVEN_UP, Do.SEND_NO_MORE),
-        E.BACK: (S.GIVEN_UP, Do.WITHDRAW),
+        E.GONE: (S.GIVEN_UP, AskingAction.SEND_NO_MORE),
+        E.BACK: (S.GIVEN_UP, AskingAction.WITHDRAW),
         E.REBORN: (S.ENDED,),
-        E.RESEND_DUE: (S.GIVEN_UP, Do.SEND_AGAIN),
+        E.RESEND_DUE: (S.GIVEN_UP, AskingAction.SEND_AGAIN),
         E.SWALLOW_OVER: (S.ENDED,),
     }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.GRACE_OVER, E.PATIENCE_OVER),
-    S.ENDED: rows(S.ENDED, {}, *Event),
+    S.ENDED: rows(S.ENDED, {}, *AskingEvent),
 }  # fmt: skip

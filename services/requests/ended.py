@@ -12,7 +12,7 @@ EACH = 1024
 """Bytes that a request takes beside its text and that of its answer: names, and its place in tables. Measured."""
 
 
-class Ended:
+class EndedRequests:
     """Requests that have ended, by sender, until nobody has spoken of them for `FORGOTTEN_AFTER`.
 
     Who sends many makes room for them himself: it forgets nobody else's. bytes: what all of them take.

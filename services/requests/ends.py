@@ -46,7 +46,7 @@ from engage_hri.services.bus.samples import sender_of
 from engage_hri.services.requests import asking_effects, serving_effects
 from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_table import State
+from engage_hri.services.requests.asking_table import AskingState
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.pending import Pending
 from engage_hri.services.requests.records import unwieldy
@@ -113,7 +113,7 @@ class Requester:
         fault = why if isinstance(why, Fault) else Fault(reason=why)
         self._carry_out(self._asking.cancel(id, fault, self._bus.now()))
 
-    def state(self, id: str) -> State:
+    def state(self, id: str) -> AskingState:
         """State of request `id`; ENDED if it is not known."""
         return self._asking.state(id)
 
@@ -134,7 +134,7 @@ class Requester:
 
     def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
-            if isinstance(effect, asking_effects.Publish):
+            if isinstance(effect, asking_effects.PublishCommand):
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
@@ -247,7 +247,7 @@ class RequestDesk:
         on_cancel: Callable[[Cancel], None],
         *,
         on_extend: Callable[[Request], None] | None = None,
-        on_hold: Callable[[serving_effects.Hold], None] | None = None,
+        on_hold: Callable[[serving_effects.HoldRequest], None] | None = None,
         term: Seconds | None = None,
     ) -> None:
         self._bus = bus
@@ -354,14 +354,14 @@ class RequestDesk:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
-            if isinstance(effect, serving_effects.Publish):
+            if isinstance(effect, serving_effects.PublishAnswer):
                 self._bus.publish(self._answers, effect.answer, again=effect.again)  # type: ignore[arg-type]
             elif isinstance(effect, serving_effects.Hand):
                 if effect.is_asked:
                     handed = effect.request
                 else:
                     self._call_back(effect.request)
-            elif isinstance(effect, serving_effects.Hold):
+            elif isinstance(effect, serving_effects.HoldRequest):
                 if self._on_hold is not None:
                     with self._bus.containing(f"request {effect.name}, which nobody renews"):
                         self._on_hold(effect)

@@ -8,7 +8,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import decode, encode
 from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Request, kind_meant
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.requests.serving_table import Event, State
+from engage_hri.services.requests.serving_table import ServingEvent, ServingState
 
 ANEW = "if it is to be done again, send it under a new id"
 """Advice about a request of which nobody knows, or remembers, what became of it."""
@@ -38,9 +38,9 @@ class Record:
         self.run = run
         self.key = key_of(request)
         self.kind = kind_meant(request)
-        self.lease = (Event.LEASE_OVER, name)
+        self.lease = (ServingEvent.LEASE_OVER, name)
         """Name of its lease among the deadlines."""
-        self.state = State.UNKNOWN
+        self.state = ServingState.UNKNOWN
         self.is_held = False
         self.renewed_at: Seconds = -inf
         self.ended_at: Seconds = inf
@@ -78,16 +78,16 @@ def key_of(request: Request) -> Key:
     return (request.requester, request.life, request.id)
 
 
-def event_of(record: Record, request: Request) -> Event:
+def event_of(record: Record, request: Request) -> ServingEvent:
     """The event that this command is for the request of `record`."""
     if isinstance(request, Cancel):
-        return Event.CANCEL
+        return ServingEvent.CANCEL
     known = record.request
-    if record.state is State.UNKNOWN or isinstance(known, Cancel) or request == known:
-        return Event.CAME
+    if record.state is ServingState.UNKNOWN or isinstance(known, Cancel) or request == known:
+        return ServingEvent.CAME
     if not request.is_updatable:
-        return Event.CAME if content_of(request) == content_of(known) else Event.DIFFERED
-    return Event.CAME if request.revision < known.revision else Event.CHANGED
+        return ServingEvent.CAME if content_of(request) == content_of(known) else ServingEvent.DIFFERED
+    return ServingEvent.CAME if request.revision < known.revision else ServingEvent.CHANGED
 
 
 def content_of(request: Request) -> Request:

@@ -32,11 +32,11 @@ from engage_hri.schemas.requests import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.requests.ended import Ended
+from engage_hri.services.requests.ended import EndedRequests
 from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.records import ANEW, Key, Record, content_of, event_of, key_of
-from engage_hri.services.requests.serving_effects import Complain, Effect, Hand, Hold, Publish
-from engage_hri.services.requests.serving_table import TABLE, Do, Event, State
+from engage_hri.services.requests.serving_effects import Effect, Hand, HoldRequest, PublishAnswer, ServingFault
+from engage_hri.services.requests.serving_table import TABLE, ServingAction, ServingEvent, ServingState
 
 GRACE: Seconds = 2.0
 """Seconds that a requester may be gone before its requests end: a restart of the router looks like a death."""
@@ -44,10 +44,10 @@ LIFELESS_KEPT: Seconds = 10.0
 """Seconds for which an ended request that names no life is remembered: longer than any wait to send one again."""
 
 # Members that are used with each message: an enum is slow to look one up.
-_ENDED, _UNKNOWN = State.ENDED, State.UNKNOWN
-_STOPPED = (State.CANCELLED, State.ENDED)
-_GRACE_OVER, _UNHEARD, _LEASE_OVER = Event.GRACE_OVER, Event.UNHEARD, Event.LEASE_OVER
-_DECISIONS = {Heard: Event.HEAR, Accepted: Event.ACCEPT, Refused: Event.REFUSE}
+_ENDED, _UNKNOWN = ServingState.ENDED, ServingState.UNKNOWN
+_STOPPED = (ServingState.CANCELLED, ServingState.ENDED)
+_GRACE_OVER, _UNHEARD, _LEASE_OVER = ServingEvent.GRACE_OVER, ServingEvent.UNHEARD, ServingEvent.LEASE_OVER
+_DECISIONS = {Heard: ServingEvent.HEAR, Accepted: ServingEvent.ACCEPT, Refused: ServingEvent.REFUSE}
 """The event that an answer of the service is; every other answer is an end."""
 
 
@@ -76,10 +76,10 @@ class Serving:
         self._named: dict[str, Record] = {}
         self._live: dict[str, Record] = {}
         """Requests that have not ended, by name."""
-        self._ended = Ended()
+        self._ended = EndedRequests()
         self._names = Names()
         self._runs: dict[str, str] = {}
-        self._deadlines = Silences[tuple[Event, str]](self._sight)
+        self._deadlines = Silences[tuple[ServingEvent, str]](self._sight)
         self._effects: list[Effect] = []
 
     # -- questions ------------------------------------------------------------------------------------------------
@@ -140,10 +140,10 @@ class Serving:
         """
         record = self._record(key_of(request), kind_meant(request))
         if record is not None and record.state is not _ENDED:
-            return [Complain(fault, False)]
+            return [ServingFault(fault, False)]
         known = None if record is None else record.answer
         answer = answering(request, known or Refused(id=request.id, fault=fault))
-        return [Publish(answer, again=known is not None)]
+        return [PublishAnswer(answer, again=known is not None)]
 
     def keep_alive(self, message: KeepAlive, sent: Seconds, now: Seconds, sender: str = "") -> list[Effect]:
         """Renew the requests that a `KeepAlive` names. sent: when it was sent, by local time, not after `now`.
@@ -161,7 +161,7 @@ class Serving:
                 self._warn_stranger(kept.id, "keep_alive")
                 continue
             is_newer = record.request.is_updatable and kept.revision > record.request.revision
-            self._step(record, Event.EXTENDED if is_newer else Event.NAMED, now, Renewal(kept, sent))
+            self._step(record, ServingEvent.EXTENDED if is_newer else ServingEvent.NAMED, now, Renewal(kept, sent))
         return self._new_effects()
 
     def answer(self, name: str, answer: Answer, now: Seconds) -> list[Effect]:
@@ -170,14 +170,14 @@ class Serving:
         if record is None:
             self._warn_ended(name, answer, "was never made")
         else:
-            self._step(record, _DECISIONS.get(type(answer), Event.END), now, answer)
+            self._step(record, _DECISIONS.get(type(answer), ServingEvent.END), now, answer)
         return self._new_effects()
 
     def requester_gone(self, requester: str, now: Seconds) -> list[Effect]:
         """Take the news that the presence token of a requester has gone."""
         self._runs.pop(requester, None)
         for record in self._live_of(requester):
-            self._step(record, Event.GONE, now)
+            self._step(record, ServingEvent.GONE, now)
         return self._new_effects()
 
     def requester_there(self, requester: str, run: str, now: Seconds) -> list[Effect]:
@@ -185,7 +185,7 @@ class Serving:
         self._runs[requester] = run
         for record in self._live_of(requester):
             is_another = bool(record.run and run and record.run != run)
-            self._step(record, Event.REBORN if is_another else Event.BACK, now)
+            self._step(record, ServingEvent.REBORN if is_another else ServingEvent.BACK, now)
             record.run = run
         return self._new_effects()
 
@@ -251,7 +251,7 @@ class Serving:
         if self._newest.get(record.key) is record:
             del self._newest[record.key]
 
-    def _step(self, record: Record, event: Event, now: Seconds, cause: _Cause = None) -> None:
+    def _step(self, record: Record, event: ServingEvent, now: Seconds, cause: _Cause = None) -> None:
         """Let `event` happen to a request: take its row of the table and do what that says."""
         before = record.state
         record.state, actions = TABLE[before][event]
@@ -303,7 +303,7 @@ class Serving:
         self._deadlines.set(clock, max(self._deadlines[clock] or 0.0, sent + unheard))
         if record.is_held:
             record.is_held = False
-            self._effects.append(Hold(record.name, None))
+            self._effects.append(HoldRequest(record.name, None))
 
     def _hold(self, record: Record, now: Seconds, cause: _Cause) -> None:
         if record.is_held or not 0.0 < record.request.unheard < inf:
@@ -314,7 +314,7 @@ class Serving:
         is_there = not record.run or requester in self._runs
         missed = self._sight.unrenewed if is_there else self._sight.misses
         why = missed(requester, record.name, record.renewed_at, now)
-        self._effects.append(Hold(record.name, inf if lease is None else lease, why))
+        self._effects.append(HoldRequest(record.name, inf if lease is None else lease, why))
 
     def _wait_grace(self, record: Record, now: Seconds, cause: _Cause) -> None:
         if not record.request.unheard:  # else it is held meanwhile, and may take the time of its lease
@@ -324,17 +324,17 @@ class Serving:
         self._deadlines.clear((_GRACE_OVER, record.name))
 
     def _say_outdated(self, record: Record, now: Seconds, cause: _Cause) -> None:
-        self._effects.append(Publish(answering(record.request, Outdated(id=record.name))))
+        self._effects.append(PublishAnswer(answering(record.request, Outdated(id=record.name))))
 
     def _answer(self, record: Record, now: Seconds, cause: _Cause) -> None:
         assert isinstance(cause, Answer)
         record.answer = answer = answering(record.request, cause)
-        self._effects.append(Publish(answer))
+        self._effects.append(PublishAnswer(answer))
 
     def _repeat(self, record: Record, now: Seconds, cause: _Cause) -> None:
         """Answer again: the request that comes now, since a cancellation of no kind may have come before it."""
         asks = cause if isinstance(cause, Request) and not isinstance(cause, Cancel) else record.request
-        self._effects.append(Publish(answering(asks, record.answer or Heard(id=record.name)), again=True))
+        self._effects.append(PublishAnswer(answering(asks, record.answer or Heard(id=record.name)), again=True))
 
     def _refuse_unheard(self, record: Record, now: Seconds, cause: _Cause) -> None:
         reason = f"cancelled before {self._server} had heard of it; it is refused should it come yet"
@@ -345,7 +345,7 @@ class Serving:
     def _refuse_forgotten(self, record: Record, now: Seconds, cause: _Cause) -> None:
         id = record.request.id
         fault = self._fault(id, f"{self._server} does not know it any more", ANEW, "forgotten", self._server)
-        self._effects.append(Publish(answering(record.request, Refused(id=id, fault=fault))))
+        self._effects.append(PublishAnswer(answering(record.request, Refused(id=id, fault=fault))))
 
     def _warn_different(self, record: Record, now: Seconds, cause: _Cause) -> None:
         which = "an ended" if record.state is _ENDED else "a live"
@@ -384,10 +384,10 @@ class Serving:
 
     def _refuse(self, request: Request, reason: str, advice: str) -> None:
         refusal = Refused(id=request.id, fault=self._fault(request.id, reason, advice))
-        self._effects.append(Publish(answering(request, refusal)))
+        self._effects.append(PublishAnswer(answering(request, refusal)))
 
     def _complain(self, where: str, reason: str, advice: str, *, is_ours: bool) -> None:
-        self._effects.append(Complain(self._fault(where, reason, advice), is_ours))
+        self._effects.append(ServingFault(self._fault(where, reason, advice), is_ours))
 
     def _warn_stranger(self, id: str, what: str) -> None:
         advice = "only who has asked can change, renew or cancel a request"
@@ -398,22 +398,22 @@ class Serving:
         self._complain(name, reason, "a mistake of this service", is_ours=True)
 
 
-_ACTIONS: Mapping[Do, Callable[[Serving, Record, Seconds, _Cause], None]] = {
-    Do.HAND: Serving._hand_asked,
-    Do.HAND_EXTENDED: Serving._hand_extended,
-    Do.HAND_CANCEL: Serving._hand_asked,
-    Do.HAND_GONE: Serving._hand_gone,
-    Do.HAND_REBORN: Serving._hand_reborn,
-    Do.HAND_LAPSED: Serving._hand_lapsed,
-    Do.RENEW: Serving._renew,
-    Do.HOLD: Serving._hold,
-    Do.WAIT_GRACE: Serving._wait_grace,
-    Do.STOP_GRACE: Serving._stop_grace,
-    Do.SAY_OUTDATED: Serving._say_outdated,
-    Do.REPEAT: Serving._repeat,
-    Do.ANSWER: Serving._answer,
-    Do.REFUSE_UNHEARD: Serving._refuse_unheard,
-    Do.REFUSE_FORGOTTEN: Serving._refuse_forgotten,
-    Do.WARN_DIFFERENT: Serving._warn_different,
-    Do.WARN_ENDED: Serving._warn_over,
+_ACTIONS: Mapping[ServingAction, Callable[[Serving, Record, Seconds, _Cause], None]] = {
+    ServingAction.HAND: Serving._hand_asked,
+    ServingAction.HAND_EXTENDED: Serving._hand_extended,
+    ServingAction.HAND_CANCEL: Serving._hand_asked,
+    ServingAction.HAND_GONE: Serving._hand_gone,
+    ServingAction.HAND_REBORN: Serving._hand_reborn,
+    ServingAction.HAND_LAPSED: Serving._hand_lapsed,
+    ServingAction.RENEW: Serving._renew,
+    ServingAction.HOLD: Serving._hold,
+    ServingAction.WAIT_GRACE: Serving._wait_grace,
+    ServingAction.STOP_GRACE: Serving._stop_grace,
+    ServingAction.SAY_OUTDATED: Serving._say_outdated,
+    ServingAction.REPEAT: Serving._repeat,
+    ServingAction.ANSWER: Serving._answer,
+    ServingAction.REFUSE_UNHEARD: Serving._refuse_unheard,
+    ServingAction.REFUSE_FORGOTTEN: Serving._refuse_forgotten,
+    ServingAction.WARN_DIFFERENT: Serving._warn_different,
+    ServingAction.WARN_ENDED: Serving._warn_over,
 }

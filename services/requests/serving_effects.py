@@ -7,7 +7,7 @@ from engage_hri.schemas.requests import Answer, Request
 from engage_hri.schemas.units import Seconds
 
 
-class Publish(Struct, frozen=True):
+class PublishAnswer(Struct, frozen=True):
     """Publish this answer. again: it has been given before."""
 
     answer: Answer
@@ -24,7 +24,7 @@ class Hand(Struct, frozen=True):
     is_asked: bool
 
 
-class Hold(Struct, frozen=True):
+class HoldRequest(Struct, frozen=True):
     """Tell the service to hold the request of this name, since nobody renews it, or to go on with it.
 
     until: when it ends unless it is renewed; None: it goes on. why: what has happened, and whose it was.
@@ -35,11 +35,11 @@ class Hold(Struct, frozen=True):
     why: Fault | None = None
 
 
-class Complain(Struct, frozen=True):
+class ServingFault(Struct, frozen=True):
     """Publish this fault for all to see. is_ours: it is a mistake of the service itself."""
 
     fault: Fault
     is_ours: bool
 
 
-Effect = Publish | Hand | Hold | Complain
+Effect = PublishAnswer | Hand | HoldRequest | ServingFault

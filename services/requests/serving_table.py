@@ -17,10 +17,10 @@ follows this table.
 from collections.abc import Mapping
 from enum import auto
 
-from engage_hri.services.requests.transitions import Name, rows
+from engage_hri.services.requests.transitions import TableMember, rows
 
 
-class State(Name):
+class ServingState(TableMember):
     """State of one request at its server."""
 
     UNKNOWN = auto()
@@ -34,7 +34,7 @@ class State(Name):
     """The last answer is kept, for a requester that asks again."""
 
 
-class Event(Name):
+class ServingEvent(TableMember):
     """Event in the life of one request."""
 
     CAME = auto()
@@ -64,7 +64,7 @@ class Event(Name):
     LEASE_OVER = auto()
 
 
-class Do(Name):
+class ServingAction(TableMember):
     """Action that follows from an event."""
 
     HAND = auto()
@@ -101,75 +101,75 @@ class Do(Name):
     """Report a mistake of the service: it answers a request that has ended or never was."""
 
 
-Row = tuple[State, tuple[Do, ...]]
+Row = tuple[ServingState, tuple[ServingAction, ...]]
 
-S, E = State, Event
-TABLE: Mapping[State, Mapping[Event, Row]] = {
+S, E = ServingState, ServingEvent
+TABLE: Mapping[ServingState, Mapping[ServingEvent, Row]] = {
     S.UNKNOWN: rows(S.UNKNOWN, {
-        E.CAME: (S.TAKEN, Do.RENEW, Do.HAND),
-        E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
-        E.DIFFERED: (S.TAKEN, Do.RENEW, Do.HAND),
-        E.CANCEL: (S.ENDED, Do.REFUSE_UNHEARD),
-        E.NAMED: (S.UNKNOWN, Do.REFUSE_FORGOTTEN),
-        E.EXTENDED: (S.UNKNOWN, Do.REFUSE_FORGOTTEN),
-        E.HEAR: (S.UNKNOWN, Do.WARN_ENDED),
-        E.ACCEPT: (S.UNKNOWN, Do.WARN_ENDED),
-        E.REFUSE: (S.UNKNOWN, Do.WARN_ENDED),
-        E.END: (S.UNKNOWN, Do.WARN_ENDED),
+        E.CAME: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND),
+        E.CHANGED: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND),
+        E.DIFFERED: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND),
+        E.CANCEL: (S.ENDED, ServingAction.REFUSE_UNHEARD),
+        E.NAMED: (S.UNKNOWN, ServingAction.REFUSE_FORGOTTEN),
+        E.EXTENDED: (S.UNKNOWN, ServingAction.REFUSE_FORGOTTEN),
+        E.HEAR: (S.UNKNOWN, ServingAction.WARN_ENDED),
+        E.ACCEPT: (S.UNKNOWN, ServingAction.WARN_ENDED),
+        E.REFUSE: (S.UNKNOWN, ServingAction.WARN_ENDED),
+        E.END: (S.UNKNOWN, ServingAction.WARN_ENDED),
     }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.TAKEN: rows(S.TAKEN, {
-        E.CAME: (S.TAKEN, Do.RENEW, Do.REPEAT),
-        E.CHANGED: (S.TAKEN, Do.RENEW, Do.HAND),
-        E.DIFFERED: (S.TAKEN, Do.RENEW, Do.WARN_DIFFERENT, Do.REPEAT),
-        E.CANCEL: (S.CANCELLED, Do.HAND_CANCEL),
-        E.NAMED: (S.TAKEN, Do.RENEW),
-        E.EXTENDED: (S.TAKEN, Do.RENEW, Do.HAND_EXTENDED, Do.SAY_OUTDATED),
-        E.HEAR: (S.TAKEN, Do.ANSWER),
-        E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
-        E.REFUSE: (S.ENDED, Do.ANSWER),
-        E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: (S.TAKEN, Do.WAIT_GRACE, Do.HOLD),
-        E.BACK: (S.TAKEN, Do.STOP_GRACE),
-        E.REBORN: (S.CANCELLED, Do.HAND_REBORN),
-        E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
-        E.UNHEARD: (S.TAKEN, Do.HOLD),
-        E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
+        E.CAME: (S.TAKEN, ServingAction.RENEW, ServingAction.REPEAT),
+        E.CHANGED: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND),
+        E.DIFFERED: (S.TAKEN, ServingAction.RENEW, ServingAction.WARN_DIFFERENT, ServingAction.REPEAT),
+        E.CANCEL: (S.CANCELLED, ServingAction.HAND_CANCEL),
+        E.NAMED: (S.TAKEN, ServingAction.RENEW),
+        E.EXTENDED: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND_EXTENDED, ServingAction.SAY_OUTDATED),
+        E.HEAR: (S.TAKEN, ServingAction.ANSWER),
+        E.ACCEPT: (S.ACCEPTED, ServingAction.ANSWER),
+        E.REFUSE: (S.ENDED, ServingAction.ANSWER),
+        E.END: (S.ENDED, ServingAction.ANSWER),
+        E.GONE: (S.TAKEN, ServingAction.WAIT_GRACE, ServingAction.HOLD),
+        E.BACK: (S.TAKEN, ServingAction.STOP_GRACE),
+        E.REBORN: (S.CANCELLED, ServingAction.HAND_REBORN),
+        E.GRACE_OVER: (S.CANCELLED, ServingAction.HAND_GONE),
+        E.UNHEARD: (S.TAKEN, ServingAction.HOLD),
+        E.LEASE_OVER: (S.CANCELLED, ServingAction.HAND_LAPSED),
     }),
     S.ACCEPTED: rows(S.ACCEPTED, {
-        E.CAME: (S.ACCEPTED, Do.RENEW, Do.REPEAT),
-        E.CHANGED: (S.ACCEPTED, Do.RENEW, Do.HAND),
-        E.DIFFERED: (S.ACCEPTED, Do.RENEW, Do.WARN_DIFFERENT, Do.REPEAT),
-        E.CANCEL: (S.CANCELLED, Do.HAND_CANCEL),
-        E.NAMED: (S.ACCEPTED, Do.RENEW),
-        E.EXTENDED: (S.ACCEPTED, Do.RENEW, Do.HAND_EXTENDED, Do.SAY_OUTDATED),
-        E.ACCEPT: (S.ACCEPTED, Do.ANSWER),
-        E.REFUSE: (S.ENDED, Do.ANSWER),
-        E.END: (S.ENDED, Do.ANSWER),
-        E.GONE: (S.ACCEPTED, Do.WAIT_GRACE, Do.HOLD),
-        E.BACK: (S.ACCEPTED, Do.STOP_GRACE),
-        E.REBORN: (S.CANCELLED, Do.HAND_REBORN),
-        E.GRACE_OVER: (S.CANCELLED, Do.HAND_GONE),
-        E.UNHEARD: (S.ACCEPTED, Do.HOLD),
-        E.LEASE_OVER: (S.CANCELLED, Do.HAND_LAPSED),
+        E.CAME: (S.ACCEPTED, ServingAction.RENEW, ServingAction.REPEAT),
+        E.CHANGED: (S.ACCEPTED, ServingAction.RENEW, ServingAction.HAND),
+        E.DIFFERED: (S.ACCEPTED, ServingAction.RENEW, ServingAction.WARN_DIFFERENT, ServingAction.REPEAT),
+        E.CANCEL: (S.CANCELLED, ServingAction.HAND_CANCEL),
+        E.NAMED: (S.ACCEPTED, ServingAction.RENEW),
+        E.EXTENDED: (S.ACCEPTED, ServingAction.RENEW, ServingAction.HAND_EXTENDED, ServingAction.SAY_OUTDATED),
+        E.ACCEPT: (S.ACCEPTED, ServingAction.ANSWER),
+        E.REFUSE: (S.ENDED, ServingAction.ANSWER),
+        E.END: (S.ENDED, ServingAction.ANSWER),
+        E.GONE: (S.ACCEPTED, ServingAction.WAIT_GRACE, ServingAction.HOLD),
+        E.BACK: (S.ACCEPTED, ServingAction.STOP_GRACE),
+        E.REBORN: (S.CANCELLED, ServingAction.HAND_REBORN),
+        E.GRACE_OVER: (S.CANCELLED, ServingAction.HAND_GONE),
+        E.UNHEARD: (S.ACCEPTED, ServingAction.HOLD),
+        E.LEASE_OVER: (S.CANCELLED, ServingAction.HAND_LAPSED),
     }, E.HEAR),
     S.CANCELLED: rows(S.CANCELLED, {
-        E.CAME: (S.CANCELLED, Do.REPEAT),
-        E.CHANGED: (S.CANCELLED, Do.REPEAT),
-        E.DIFFERED: (S.CANCELLED, Do.REPEAT),
-        E.CANCEL: (S.CANCELLED, Do.REPEAT),
-        E.ACCEPT: (S.CANCELLED, Do.ANSWER),
-        E.REFUSE: (S.ENDED, Do.ANSWER),
-        E.END: (S.ENDED, Do.ANSWER),
+        E.CAME: (S.CANCELLED, ServingAction.REPEAT),
+        E.CHANGED: (S.CANCELLED, ServingAction.REPEAT),
+        E.DIFFERED: (S.CANCELLED, ServingAction.REPEAT),
+        E.CANCEL: (S.CANCELLED, ServingAction.REPEAT),
+        E.ACCEPT: (S.CANCELLED, ServingAction.ANSWER),
+        E.REFUSE: (S.ENDED, ServingAction.ANSWER),
+        E.END: (S.ENDED, ServingAction.ANSWER),
     }, E.HEAR, E.NAMED, E.EXTENDED, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
     S.ENDED: rows(S.ENDED, {
-        E.CAME: (S.ENDED, Do.REPEAT),
-        E.CHANGED: (S.ENDED, Do.REPEAT),
-        E.DIFFERED: (S.ENDED, Do.WARN_DIFFERENT, Do.REPEAT),
-        E.CANCEL: (S.ENDED, Do.REPEAT),
-        E.NAMED: (S.ENDED, Do.REPEAT),
-        E.EXTENDED: (S.ENDED, Do.REPEAT),
-        E.ACCEPT: (S.ENDED, Do.WARN_ENDED),
-        E.REFUSE: (S.ENDED, Do.WARN_ENDED),
-        E.END: (S.ENDED, Do.WARN_ENDED),
+        E.CAME: (S.ENDED, ServingAction.REPEAT),
+        E.CHANGED: (S.ENDED, ServingAction.REPEAT),
+        E.DIFFERED: (S.ENDED, ServingAction.WARN_DIFFERENT, ServingAction.REPEAT),
+        E.CANCEL: (S.ENDED, ServingAction.REPEAT),
+        E.NAMED: (S.ENDED, ServingAction.REPEAT),
+        E.EXTENDED: (S.ENDED, ServingAction.REPEAT),
+        E.ACCEPT: (S.ENDED, ServingAction.WARN_ENDED),
+        E.REFUSE: (S.ENDED, ServingAction.WARN_ENDED),
+        E.END: (S.ENDED, ServingAction.WARN_ENDED),
     }, E.HEAR, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
 }  # fmt: skip

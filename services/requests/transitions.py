@@ -5,15 +5,15 @@ from enum import Enum
 from typing import TypeVar
 
 
-class Name(Enum):
+class TableMember(Enum):
     """Member of a table. It is looked up with each message, so it hashes as any object does: faster than an enum."""
 
     __hash__ = object.__hash__
 
 
-StateT = TypeVar("StateT", bound=Name)
-EventT = TypeVar("EventT", bound=Name)
-DoT = TypeVar("DoT", bound=Name)
+StateT = TypeVar("StateT", bound=TableMember)
+EventT = TypeVar("EventT", bound=TableMember)
+DoT = TypeVar("DoT", bound=TableMember)
 
 
 def rows(

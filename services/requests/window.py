@@ -5,7 +5,7 @@ too, and would send again what only has not come yet.
 """
 
 
-class Window:
+class SendWindow:
     """Requests to one server that are on their way without an answer; those that wait for that, in their order."""
 
     def __init__(self, size: int) -> None:

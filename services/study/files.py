@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from engage_hri.services.study.hypotheses import Finding
+from engage_hri.services.study.hypotheses import HypothesisResult
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.summary import KINDS
 
@@ -29,8 +29,8 @@ def sessions(records: Iterable[SessionRecord]) -> str:
     return _csv(SESSION_COLUMNS, map(_session, records))
 
 
-def findings(found: Iterable[Finding]) -> str:
-    return _csv(Finding.__struct_fields__, (msgspec.structs.astuple(finding) for finding in found))
+def findings(found: Iterable[HypothesisResult]) -> str:
+    return _csv(HypothesisResult.__struct_fields__, (msgspec.structs.astuple(finding) for finding in found))
 
 
 def _session(record: SessionRecord) -> list[Cell]:

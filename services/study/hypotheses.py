@@ -74,7 +74,7 @@ HYPOTHESES = (
 )  # fmt: skip
 
 
-class Finding(Struct, frozen=True, kw_only=True):
+class HypothesisResult(Struct, frozen=True, kw_only=True):
     """A hypothesis in one degraded condition: a row of hypotheses.csv.
 
     operational, degraded: means over the n sessions compared (operational: None if it is not compared with).
@@ -105,7 +105,7 @@ def findings(
     baseline: str = BASELINE,
     others: Sequence[str] = DEGRADED,
     is_paired: bool = True,
-) -> list[Finding]:
+) -> list[HypothesisResult]:
     """Test every hypothesis in every other condition, with the finished sessions.
 
     is_paired: sessions of one number belong together; else all are of different people.
@@ -128,7 +128,7 @@ def findings(
     ]
     corrected = holm([test.p for test in tests])
     return [
-        Finding(
+        HypothesisResult(
             hypothesis=hypothesis.name, claim=hypothesis.claim, measure=hypothesis.measure, unit=hypothesis.unit,
             condition=condition, n=test.n, operational=_mean(bases) if hypothesis.baseline else None,
             degraded=_mean(degraded), difference=test.mean, low=test.low, high=test.high, effect=test.effect,

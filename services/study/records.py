@@ -66,7 +66,7 @@ class SessionRecord(Struct, frozen=True, kw_only=True):
         return next(found, KindStatistics(kind=kind))
 
 
-class Recording:
+class SessionRecorder:
     """Sink that records a session. Instants count from the session's beginning."""
 
     def __init__(self, robot: str) -> None:

@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import KindStatistics
-from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, PEOPLE_CAVEAT, Finding
+from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, PEOPLE_CAVEAT, HypothesisResult
 from engage_hri.services.study.records import SessionRecord
 
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
@@ -18,7 +18,7 @@ RESPONDED = tuple(kind for kind in KINDS if kind != "backchannel")
 MISSING = "-"
 
 
-class Table(Struct, frozen=True, kw_only=True):
+class NumberTable(Struct, frozen=True, kw_only=True):
     """Table with words in its first column and numbers in the others."""
 
     title: str
@@ -75,7 +75,7 @@ def known(values: Iterable[float | None]) -> list[float]:
 # -- tables -----------------------------------------------------------------------------------------------------
 
 
-def overview(records: Sequence[SessionRecord], ordered: Mapping[str, int] | None = None) -> Table:
+def overview(records: Sequence[SessionRecord], ordered: Mapping[str, int] | None = None) -> NumberTable:
     """Table with a column for each condition, without rows that are empty in all of them.
 
     ordered: number of sessions by condition that were to be played; None: as many as there are records.
@@ -96,7 +96,7 @@ def overview(records: Sequence[SessionRecord], ordered: Mapping[str, int] | None
             rows.append(("- delay (s)", *map(numbers, delays)))
     known_rows = tuple(row for row in rows if set(row[1:]) != {MISSING})
     face = any(row[0].startswith("face") for row in known_rows)
-    return Table(
+    return NumberTable(
         title="Sessions", columns=("", *groups), rows=known_rows,
         notes=(
             "Finished sessions; mean ± standard deviation of a session. Failure rates, and delays of what succeeded "
@@ -121,7 +121,7 @@ _MEASURES: tuple[tuple[str, int, Callable[[SessionRecord], float | None]], ...] 
 )
 
 
-class Compared(Struct, frozen=True, kw_only=True):
+class Comparison(Struct, frozen=True, kw_only=True):
     """Words about a comparison. baseline: name of the condition that others are compared with, short.
 
     how: which sessions are compared with which, and by what test. caveat: what it cannot say.
@@ -134,7 +134,7 @@ class Compared(Struct, frozen=True, kw_only=True):
     caveat: str
 
 
-SIMULATED = Compared(
+SIMULATED = Comparison(
     title="Hypotheses of the thesis (5.2.2), in simulation", baseline="oper.", other="degr.",
     how="Sessions of the same seed are compared as pairs, though they are hardly more alike than others. p: "
     "two-sided permutation test of their differences (signs flipped), corrected for the number of questions (Holm). "
@@ -145,13 +145,13 @@ SIMULATED = Compared(
 _TESTED = (
     "corrected for the number of questions (Holm). 95 %: the differences that the test does not reject, uncorrected."
 )
-WITHIN = Compared(
+WITHIN = Comparison(
     title="Hypotheses of the thesis (5.2.2), in these recordings", baseline="base", other="other",
     how="Sessions of the same participant are compared as pairs; participants who lack one of the two are left out. "
     f"p: two-sided permutation test of their differences (signs flipped), {_TESTED} d: mean / standard deviation of "
     "the differences.", caveat=PEOPLE_CAVEAT,
 )  # fmt: skip
-BETWEEN = Compared(
+BETWEEN = Comparison(
     title=WITHIN.title, baseline="base", other="other",
     how="Sessions of different people are compared; n is of both together. p: two-sided permutation test (people "
     f"divided anew), {_TESTED} d: difference of the means / standard deviation within conditions. 11a looks at one "
@@ -159,7 +159,7 @@ BETWEEN = Compared(
 )  # fmt: skip
 
 
-def hypotheses(found: Sequence[Finding], compared: Compared = SIMULATED) -> Table:
+def hypotheses(found: Sequence[HypothesisResult], compared: Comparison = SIMULATED) -> NumberTable:
     """Table with a row for each finding."""
     rows = (
         (
@@ -170,7 +170,7 @@ def hypotheses(found: Sequence[Finding], compared: Compared = SIMULATED) -> Tabl
         )
         for finding in found
     )  # fmt: skip
-    return Table(
+    return NumberTable(
         title=compared.title,
         columns=("", "condition" if compared is not SIMULATED else "degraded", "n", compared.baseline, compared.other,
                  "diff.", "95 %", "d", "p", "verdict"),
@@ -187,13 +187,13 @@ def _interval(low: float | None, high: float | None) -> str:
     return MISSING if low is None or high is None else f"{number(low)}..{number(high)}"
 
 
-def unfinished(records: Sequence[SessionRecord]) -> Table:
+def unfinished(records: Sequence[SessionRecord]) -> NumberTable:
     rows = (
         (f"{record.condition} {record.session}", str(record.seed), record.reason)
         for record in records
         if not record.finished
     )
-    return Table(title="Not finished", columns=("session", "seed", "reason"), rows=tuple(rows))
+    return NumberTable(title="Not finished", columns=("session", "seed", "reason"), rows=tuple(rows))
 
 
 def number(value: float | None, digits: int = 2) -> str:

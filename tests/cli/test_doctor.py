@@ -15,28 +15,35 @@ from rich.console import Console
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.status import ClockOffset
-from engage_hri.services.doctor.facts import Body, Certificate, Door, Facts, Known, Package
-from engage_hri.services.doctor.findings import Finding, findings, satisfies
+from engage_hri.services.doctor.facts import (
+    BodyFacts,
+    Certificate,
+    EndpointFacts,
+    Package,
+    ParticipantFacts,
+    SystemFacts,
+)
+from engage_hri.services.doctor.findings import Diagnosis, findings, satisfies
 from engage_hri.services.doctor.matrix import HERE, matrix
 from engage_hri.services.doctor.report import as_json, report
 from tests.cli.command import Engage, start
 from tests.cli.doctor_facts import AT, NAMES, known, listening, well, with_one
 
-SHUT = Door(endpoint="tcp/10.0.0.1:7447", problem="no process listens there", is_local=False)
+SHUT = EndpointFacts(endpoint="tcp/10.0.0.1:7447", problem="no process listens there", is_local=False)
 CLOSED = well().doors[0]
 
 
-def without(name: str) -> tuple[Known, ...]:
+def without(name: str) -> tuple[ParticipantFacts, ...]:
     return tuple(one for one in well().known if one.name != name)
 
 
-def hidden(*places: str) -> Facts:
+def hidden(*places: str) -> SystemFacts:
     """The simulation is not seen by recognition, and listens there."""
     blind = known("recognition", bus={"peers": keys.SERVICES, "clocks": (), **listening(*places)})
     return well(known=tuple(blind if one.name == "recognition" else one for one in well().known))
 
 
-ILL: dict[str, tuple[Facts, str, str, str]] = {
+ILL: dict[str, tuple[SystemFacts, str, str, str]] = {
     "a package is missing": (
         well(packages=(Package(name="lxml", wanted=">=5.2"),)),
         "wrong",
@@ -64,7 +71,7 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
     ),
     "one of two opens": (well(doors=(SHUT, CLOSED)), "doubtful", SHUT.endpoint, "no process listens there"),
     "the network is open": (
-        well(doors=(Door(endpoint="tcp/10.0.0.1:7447", is_local=False),)),
+        well(doors=(EndpointFacts(endpoint="tcp/10.0.0.1:7447", is_local=False),)),
         "doubtful",
         "tcp/10.0.0.1:7447",
         "open to all",
@@ -98,7 +105,7 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
     "not seen from here": (with_one("control", seen=False), "wrong", "control", "not seen by here"),
     "two of a name": (with_one("control", lives=2), "wrong", "control", "2 processes have this name"),
     "silent": (
-        well(known=(*without("control"), Known(name="control"))),
+        well(known=(*without("control"), ParticipantFacts(name="control"))),
         "wrong",
         "control",
         "it is there, and does not answer",
@@ -172,13 +179,18 @@ ILL: dict[str, tuple[Facts, str, str, str]] = {
         "desk",
         "its wall clock is 70 s behind this machine's",
     ),
-    "no body": (well(body=Body(problem="no reply")), "wrong", "control", "nothing is known of the body: no reply"),
-    "no voice": (well(body=Body(name="arm", types=("pointing",))), "doubtful", "arm", "the body has no voice"),
+    "no body": (
+        well(body=BodyFacts(problem="no reply")),
+        "wrong",
+        "control",
+        "nothing is known of the body: no reply",
+    ),
+    "no voice": (well(body=BodyFacts(name="arm", types=("pointing",))), "doubtful", "arm", "the body has no voice"),
     "no world": (well(sight=None), "doubtful", "perception", "nobody tells what there is to be seen"),
 }
 
 
-def drawn(facts: Facts, width: int) -> list[str]:
+def drawn(facts: SystemFacts, width: int) -> list[str]:
     console = Console(width=width, file=io.StringIO(), emoji=False)
     console.print(report(facts, findings(facts), width))
     return [line.rstrip() for line in console.file.getvalue().splitlines()]  # type: ignore[attr-defined]
@@ -232,7 +244,9 @@ def test_versions_are_compared_as_numbers(wanted: str, version: str, fits: bool)
 
 def test_the_matrix_has_a_row_for_each_that_answers_and_a_column_for_all() -> None:
     facts = hidden("tcp/10.0.0.3:1")
-    facts = msgspec.structs.replace(facts, known=(*facts.known, Known(name="watch-1", answers=False, trip=0.004)))
+    facts = msgspec.structs.replace(
+        facts, known=(*facts.known, ParticipantFacts(name="watch-1", answers=False, trip=0.004))
+    )
     cells = {(cell.viewer, cell.other): cell for cell in matrix(facts)}
     assert len(cells) == (1 + len(NAMES)) * (len(NAMES) + 1)
     assert cells["recognition", "simulation"].sees == "no"
@@ -240,15 +254,15 @@ def test_the_matrix_has_a_row_for_each_that_answers_and_a_column_for_all() -> No
     assert cells["simulation", "recognition"].trip == 0.002
     assert cells["control", "realizer"].trip is None
     assert cells[HERE, "watch-1"].trip == 0.004
-    silent = well(known=(*without("control"), Known(name="control")))
+    silent = well(known=(*without("control"), ParticipantFacts(name="control")))
     assert {cell.sees for cell in matrix(silent) if cell.viewer == "control"} == {"unknown", "itself"}
 
 
 def test_services_need_to_see_their_clients_and_no_observer_whatever_its_name_is() -> None:
     """With keys `up` is an observer, and without them a client."""
     up, client, simulation = (
-        Known(name="up-1234abcd", part="observer", answers=False),
-        Known(name="up-5678abcd", part="client", answers=False),
+        ParticipantFacts(name="up-1234abcd", part="observer", answers=False),
+        ParticipantFacts(name="up-5678abcd", part="client", answers=False),
         known("simulation"),
     )
     facts = well(known=(*without("simulation"), simulation, up, client))
@@ -297,7 +311,7 @@ def test_the_newest_counts_of_a_participant_are_drawn() -> None:
 
 @pytest.mark.parametrize("width", [60, 80, 120])
 def test_a_crowd_of_watchers_is_listed_below_the_matrix(width: int) -> None:
-    watchers = tuple(Known(name=f"watch-{number}", answers=False) for number in range(60))
+    watchers = tuple(ParticipantFacts(name=f"watch-{number}", answers=False) for number in range(60))
     lines = drawn(well(known=(*well().known, *watchers)), width)
     assert max(map(len, lines)) <= width
     (row,) = [line.split() for line in lines if "recognition" in line.split()[:2] and "·" in line]
@@ -308,8 +322,8 @@ def test_a_crowd_of_watchers_is_listed_below_the_matrix(width: int) -> None:
 def test_json_has_all() -> None:
     told = json.loads(as_json(hidden(), findings(hidden())))
     assert set(told) == {"facts", "findings", "matrix"}
-    assert msgspec.convert(told["findings"], tuple[Finding, ...]) == findings(hidden())
-    assert msgspec.convert(told["facts"], Facts) == hidden()
+    assert msgspec.convert(told["findings"], tuple[Diagnosis, ...]) == findings(hidden())
+    assert msgspec.convert(told["facts"], SystemFacts) == hidden()
 
 
 def free_port() -> int:

@@ -17,7 +17,7 @@ from engage_hri.services.commandline.study.session import Order, SessionResult, 
 from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.virtual_time import Deadlock
 from engage_hri.services.study import summary
-from engage_hri.services.study.hypotheses import Finding
+from engage_hri.services.study.hypotheses import HypothesisResult
 from engage_hri.services.study.records import SessionRecord
 from tests.cli.command import Engage, start, threads
 
@@ -225,7 +225,7 @@ def test_the_users_settings_are_stronger_than_a_conditions_but_not_than_its_name
 
 def test_tables_of_many_sessions_fit_a_narrow_terminal() -> None:
     """Three conditions of 200 sessions, in 80 columns."""
-    found = Finding(
+    found = HypothesisResult(
         hypothesis="11a", claim="", measure="", unit="s", condition="degraded-recognition", n=200, operational=189.66,
         degraded=195.47, difference=-26.46, low=-126.46, high=118.13, effect=-0.5, p=1.0, p_corrected=1.0,
         verdict="opposite",

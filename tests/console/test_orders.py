@@ -21,9 +21,9 @@ from engage_hri.services.console.web.laying import NEAR, laid
 from engage_hri.services.console.web.orders import (
     RIGHTS,
     AnyOrder,
-    Condition,
+    ConditionOrder,
     InhibitGaze,
-    LookAt,
+    LookOrder,
     SteerOrder,
     SwitchOrder,
     Tell,
@@ -38,11 +38,11 @@ from engage_hri.services.tangram.table import tangram_table
 @pytest.mark.parametrize(
     ("text", "order"),
     [
-        ('{"do": "look"}', LookAt()),
-        ('{"do": "look", "target": "cup"}', LookAt(target="cup")),
+        ('{"do": "look"}', LookOrder()),
+        ('{"do": "look", "target": "cup"}', LookOrder(target="cup")),
         ('{"do": "steer", "to": "stop", "by": "ann"}', SteerOrder(to="stop", by="ann")),
         ('{"do": "faults", "fault": {"kind": "slow"}}', SwitchOrder(fault=BodyFault(kind="slow"))),
-        ('{"do": "condition", "name": "b", "speech_only": true}', Condition(name="b", speech_only=True)),
+        ('{"do": "condition", "name": "b", "speech_only": true}', ConditionOrder(name="b", speech_only=True)),
     ],
 )
 def test_an_order_is_read(text: str, order: AnyOrder) -> None:
@@ -96,8 +96,8 @@ def test_the_log_has_what_was_ordered_but_not_the_words() -> None:
     assert written(SwitchOrder(fault=BodyFault(kind="slow"))) == "fault on: slow"
     assert written(SwitchOrder(fault=BodyFault(kind="slow"), off=True)) == "fault off: slow"
     assert written(SteerOrder(to="hold")) == "hold"
-    assert written(Condition(name="b", speech_only=True)) == "condition: b, speech only"
-    assert written(Condition()) == "condition: none"
+    assert written(ConditionOrder(name="b", speech_only=True)) == "condition: b, speech only"
+    assert written(ConditionOrder()) == "condition: none"
     assert written(InhibitGaze(on=True, mode="target", target="cup")) == "keeps the gaze on cup"
     assert written(InhibitGaze(on=True)) == "keeps the gaze where it is"
 

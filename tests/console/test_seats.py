@@ -15,7 +15,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console.web.orders import Given
-from engage_hri.services.console.web.receipts import Receipts, Told
+from engage_hri.services.console.web.receipts import OrderNews, Receipts
 from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.seats import Seats
 from engage_hri.services.console.web.service import window
@@ -63,7 +63,7 @@ def give(visitor: Visitor, order: str) -> None:
     visitor.take(Given(number=1, order=Raw(order.encode())))
 
 
-def news(visitor: Visitor) -> tuple[Told, ...]:
+def news(visitor: Visitor) -> tuple[OrderNews, ...]:
     """News of the orders since this was asked last."""
     told = visitor.receipts.news()
     visitor.receipts.confirm()

@@ -13,7 +13,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.presence import PeerGone
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.sections import Left
-from engage_hri.services.console.web.sections import Utterance as Turn
+from engage_hri.services.console.web.sections import UtteranceShown as Turn
 from tests.console.scenes import at
 
 

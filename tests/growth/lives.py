@@ -31,7 +31,7 @@ from engage_hri.services.console.web import orders
 from engage_hri.services.console.web.frames import Viewer
 from engage_hri.services.console.web.receipts import Receipts
 from engage_hri.services.console.web.script import Script
-from engage_hri.services.console.web.service import Window, window
+from engage_hri.services.console.web.service import WindowServer, window
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from engage_hri.services.runtime.service import running
@@ -182,7 +182,7 @@ async def _read(feed: Any) -> None:
         pass
 
 
-async def _looks(desk: Window) -> None:
+async def _looks(desk: WindowServer) -> None:
     """A browser that draws each frame at once."""
     receipts, viewer = Receipts("session"), Viewer()
     looker = Visitor(desk, trusted=False, receipts=receipts)
@@ -193,7 +193,7 @@ async def _looks(desk: Window) -> None:
         await asyncio.sleep(1.0)
 
 
-async def _visits(desk: Window, k: int) -> None:
+async def _visits(desk: WindowServer, k: int) -> None:
     """Somebody opens the page, sits down, says something, has the robot say something, and closes the page."""
     visitor = Visitor(desk, trusted=True, receipts=Receipts(f"session-{k}"))
     given = (

@@ -8,7 +8,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import Forgotten
+from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -52,10 +52,10 @@ class Lobby:
         return min((at for at in times if at is not None), default=None)
 
     def _tell(self, results: list[Result], now: Seconds) -> None:
-        changes = [result for result in results if isinstance(result, ConnectionEvent | Forgotten)]
+        changes = [result for result in results if isinstance(result, ConnectionEvent | PersonForgotten)]
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for change in changes:
-            if isinstance(change, Forgotten):
+            if isinstance(change, PersonForgotten):
                 self.reporters.forget(change.actor)
         self.book.feed(events, stamp(now))
         self.published.feed(changes, self.recognizer.session.busy, now)

@@ -15,7 +15,7 @@ from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.clock_errors import KEPT, PEOPLE_KEPT, ClockErrors
 from engage_hri.services.recognition.service import recognize
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.runtime.service import running
 from tests.recognition.observations import HUMAN, ROBOT
 
@@ -78,7 +78,7 @@ def test_what_is_remembered_is_bounded() -> None:
 
 
 def test_statistics_tell_the_greatest_error() -> None:
-    tally = Tally(60.0)
+    tally = EventTally(60.0)
     for number, (state, error) in enumerate([("succeeded", 0.01), ("failed", 0.04), ("succeeded", None)]):
         errors = ClockErrors("robot")
         errors.heard("ann", 100.0, inf if error is None else error)

@@ -14,9 +14,9 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statis
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events import people
-from engage_hri.services.recognition.events.machine import Forgotten
+from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
-from engage_hri.services.recognition.events.person import AFTER_ROBOT_DIRECTED, DIRECT_BY_LOOK, Person
+from engage_hri.services.recognition.events.person import AFTER_ROBOT_DIRECTED, DIRECT_BY_LOOK, PersonRecognition
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
@@ -30,7 +30,7 @@ NEVER = 1e9
 
 
 def forgotten(log: Log) -> list[str]:
-    return [effect.actor for effect in log.effects if isinstance(effect, Forgotten)]
+    return [effect.actor for effect in log.effects if isinstance(effect, PersonForgotten)]
 
 
 # -- who is forgotten ---------------------------------------------------------------------------------------------
@@ -130,7 +130,7 @@ def test_who_comes_back_later_is_somebody_new_and_the_totals_stay():
     log.until(700.0)
     log.found("ann", 700.0)
     log.looks("ann", ROBOT, 700.0)
-    changes = [effect for effect in log.effects if isinstance(effect, ConnectionEvent | Forgotten)]
+    changes = [effect for effect in log.effects if isinstance(effect, ConnectionEvent | PersonForgotten)]
     (first, everybody) = sorted(published.feed(changes, set(), 700.0), key=lambda one: one.session.events)
 
     assert (first.actor, first.session.events) == ("ann", 1)
@@ -174,8 +174,8 @@ def test_what_is_kept_does_not_grow_with_those_who_have_passed(raw: bool):
 
 def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
     asked: list[str] = []
-    deadline = Person.deadline.fget  # type: ignore[attr-defined]
-    monkeypatch.setattr(Person, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
+    deadline = PersonRecognition.deadline.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(PersonRecognition, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
     lobby = Lobby(RecognitionConfig())
     for number in range(60):
         asked.clear()
@@ -191,8 +191,8 @@ def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
 def test_a_step_asks_no_more_than_one_of_many_who_are_here(monkeypatch: pytest.MonkeyPatch):
     log = Log(*(f"person-{number}" for number in range(50)))
     asked: list[str] = []
-    deadline = Person.deadline.fget  # type: ignore[attr-defined]
-    monkeypatch.setattr(Person, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
+    deadline = PersonRecognition.deadline.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(PersonRecognition, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
     log.looks("person-7", ROBOT, 1.0)
     log.until(2.0)
 
@@ -259,7 +259,7 @@ def _told(stream: Stream, config: RecognitionConfig) -> tuple[Counter[object], S
     effects = []
     for at, observation in stream:
         new = session.feed(observation, at)
-        published.feed((one for one in new if isinstance(one, ConnectionEvent | Forgotten)), session.busy, at)
+        published.feed((one for one in new if isinstance(one, ConnectionEvent | PersonForgotten)), session.busy, at)
         effects += new
     end = stream[-1][0]
     known = len(session.persons)

@@ -12,7 +12,7 @@ from engage_hri.schemas.requests import Accepted
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Mishap, UndefinedTransition
 from engage_hri.services.recognition.events.mutual_facial_gaze import MutualFacialGaze
-from engage_hri.services.recognition.events.person import Person
+from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.perceive.looks import Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation
@@ -126,7 +126,7 @@ def test_a_bug_that_shows_by_the_passing_of_time_does_not_show_for_ever(monkeypa
 
 def test_a_bug_while_a_request_is_taken_answers_it_all_the_same(monkeypatch: pytest.MonkeyPatch):
     session = meeting()
-    monkeypatch.setattr(Person, "robot_directs", lambda *given: 1 / 0)
+    monkeypatch.setattr(PersonRecognition, "robot_directs", lambda *given: 1 / 0)
     effects = session.feed(request_event("directed_gaze", 1.0, "blue-square", responder="bob"), 1.0)
 
     assert [type(effect).__name__ for effect in effects] == [
@@ -189,7 +189,7 @@ def test_track_of_a_person_can_be_lost_from_outside():
 def test_every_event_ends_and_every_request_is_answered_whatever_breaks(monkeypatch: pytest.MonkeyPatch, seed: int):
     chance = random.Random(seed)
     for name in ("gaze_changed", "points", "block_ended", "robot_looks_at_face", "leave", "pass_time"):
-        monkeypatch.setattr(Person, name, _sometimes(getattr(Person, name), chance))
+        monkeypatch.setattr(PersonRecognition, name, _sometimes(getattr(PersonRecognition, name), chance))
     session = Session(ROBOT, RecognitionConfig(), strict=False)
     session.feed(world("ann", "bob"), 0.0)
     effects: list[object] = []

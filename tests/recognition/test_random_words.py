@@ -19,7 +19,7 @@ from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events import session
-from engage_hri.services.recognition.perceive.words import WORDS_MARGIN, HeardWords
+from engage_hri.services.recognition.perceive.words import WORDS_MARGIN, TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer
 from tests.recognition.observations import ROBOT, stamp, world
 
@@ -126,7 +126,7 @@ def recognized(story: Talk, *, with_words: bool = True) -> list[ConnectionEvent]
             (ended, 3, SignalTurn(id=f"{turn}-end", requester="r", signal=over, at=stamp(ended / 10)), ended),
         ]
     for each in story.messages if with_words else ():
-        heard = HeardWords(
+        heard = TimedWords(
             actor=each.who, id=each.id, text=each.text, began=each.began / 10, ended=each.ended / 10, final=each.final
         )
         steps.append((each.arrives, 4, heard, each.known))

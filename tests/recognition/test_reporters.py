@@ -6,7 +6,7 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.reports.reporters import Reporters
-from engage_hri.services.reports.reports import GoesOn, Told
+from engage_hri.services.reports.reports import GoesOn, TimedReport
 from tests.recognition.observations import ROBOT, stamp
 
 GRACE = 4.0
@@ -59,7 +59,7 @@ class World:
     def until(self, at: float) -> list[str]:
         return told(self._until(at))
 
-    def _until(self, at: float) -> list[Told]:
+    def _until(self, at: float) -> list[TimedReport]:
         found = []
         while (due := self.reporters.deadline) is not None and due <= at:
             found += self.reporters.advance(due)
@@ -67,12 +67,12 @@ class World:
         return found
 
 
-def told(all_told: list[Told]) -> list[str]:
+def told(all_told: list[TimedReport]) -> list[str]:
     """Each in short: `5 ann +look robot`, `~` for what goes on, `?` for a time that is a guess."""
     return [_short(one) for one in all_told]
 
 
-def _short(one: Told) -> str:
+def _short(one: TimedReport) -> str:
     at, observation = f"{round(one.at, 4):g}{'' if one.is_sure else '?'}", one.observation
     match observation:
         case GoesOn(began=action, since=since):

@@ -7,7 +7,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.engagement import Engagement, next_level, pace
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 
 KIND = {
     "dg": "directed_gaze", "mfg": "mutual_facial_gaze", "ap": "adjacency_pair", "bc": "backchannel",
@@ -51,7 +51,7 @@ def table_2_1() -> list[ConnectionEvent]:
 
 
 def test_a_log_made_from_table_2_1_gives_its_numbers():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for change in table_2_1():
         tally.feed(change)
     session = tally.session()
@@ -73,7 +73,7 @@ def test_a_log_made_from_table_2_1_gives_its_numbers():
 
 
 def test_neither_optional_nor_preempted_nor_withdrawn_is_a_failure():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for id, state, optional in (
         ("mfg-1", "failed", True), ("mfg-2", "preempted", False), ("mfg-3", "withdrawn", False),
         ("mfg-4", "superseded", False), ("mfg-5", "failed", False), ("mfg-6", "succeeded", True),
@@ -87,7 +87,7 @@ def test_neither_optional_nor_preempted_nor_withdrawn_is_a_failure():
 
 
 def test_maintenance_glances_are_left_out_of_their_own_mean():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for id, start, cause in (("dg-1", 0.0, "turn"), ("mfg-1", 5.0, "maintenance"), ("dg-2", 10.0, "turn")):
         tally.feed(event(id, "started", start, cause=cause))
     session = tally.session()
@@ -97,7 +97,7 @@ def test_maintenance_glances_are_left_out_of_their_own_mean():
 
 
 def test_starts_that_become_known_late_fall_into_place():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for id, start in (("dg-1", 0.0), ("dg-2", 10.0), ("bc-1", 9.0), ("dg-3", 12.0)):
         tally.feed(event(id, "started", start))
 
@@ -105,7 +105,7 @@ def test_starts_that_become_known_late_fall_into_place():
 
 
 def test_events_leave_the_recent_window_and_stay_in_the_session():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for id, start in (("dg-1", 0.0), ("dg-2", 10.0), ("dg-3", 20.0)):
         tally.feed(event(id, "started", start))
 
@@ -115,7 +115,7 @@ def test_events_leave_the_recent_window_and_stay_in_the_session():
 
 
 def test_repeated_changes_count_once():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for change in table_2_1():
         tally.feed(change)
         tally.feed(change)
@@ -125,7 +125,7 @@ def test_repeated_changes_count_once():
 
 
 def test_memory_does_not_grow_with_the_session():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for number in range(5000):
         tally.feed(event(f"dg-{number}", "started", number * 5.0))
         tally.feed(event(f"dg-{number}", "failed", number * 5.0, 1.0))
@@ -161,7 +161,7 @@ def test_levels_change_only_beyond_the_margin():
 
 
 def engagement(starts: list[float], failed: int = 0) -> Engagement:
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for number, start in enumerate(starts):
         tally.feed(event(f"dg-{number}", "started", start))
         tally.feed(event(f"dg-{number}", "failed" if number < failed else "succeeded", start, 0.5))

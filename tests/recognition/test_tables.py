@@ -15,7 +15,7 @@ from engage_hri.services.recognition.events.machine import (
     IDLE,
     EventWriter,
     OngoingEvent,
-    Row,
+    TransitionRow,
     UndefinedTransition,
     table,
 )
@@ -74,7 +74,7 @@ def test_the_documentation_shows_the_tables_as_they_are(rows):
     assert diagram(rows.values()) in PAGE.read_text()
 
 
-def diagram(rows: Iterable[Row]) -> str:
+def diagram(rows: Iterable[TransitionRow]) -> str:
     """The table as a Mermaid state diagram."""
     lines = ["stateDiagram-v2", f"    [*] --> {IDLE}"]
     for row in rows:
@@ -85,7 +85,7 @@ def diagram(rows: Iterable[Row]) -> str:
 
 def test_two_rows_for_one_input_are_a_mistake():
     with pytest.raises(ValueError, match="two rows"):
-        table(Row(IDLE, "speaks", "a"), Row(IDLE, "speaks", "b"))
+        table(TransitionRow(IDLE, "speaks", "a"), TransitionRow(IDLE, "speaks", "b"))
 
 
 @pytest.mark.parametrize("gaze", [directed_gaze.DirectedGaze, mutual_facial_gaze.MutualFacialGaze])

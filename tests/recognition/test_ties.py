@@ -8,7 +8,7 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.presence import Presence
+from engage_hri.services.recognition.events.presence import FacePresence
 from engage_hri.services.recognition.perceive.attention import Attention
 from engage_hri.services.recognition.recognizer import Recognizer
 from engage_hri.services.recognition.statistics.tally import Starts
@@ -29,8 +29,8 @@ def test_a_single_start_is_settled_too():
     assert (starts.count, starts.largest_difference) == (4, 200.0)
 
 
-def presence() -> Presence:
-    return Presence()
+def presence() -> FacePresence:
+    return FacePresence()
 
 
 def test_who_is_found_and_lost_at_one_instant_is_lost():

@@ -6,7 +6,7 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.perceive.words import HeardWords
+from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Recognizer, Result
 from tests.recognition.observations import HUMAN, ROBOT, stamp, world
 
@@ -46,7 +46,7 @@ class Talk:
     def hears(
         self, text: str, began: float, ended: float, at: float, *, id: str = "u", final: bool = True, who: str = HUMAN
     ) -> None:
-        self.feed(HeardWords(actor=who, id=id, text=text, began=began, ended=ended, final=final), at)
+        self.feed(TimedWords(actor=who, id=id, text=text, began=began, ended=ended, final=final), at)
 
     def told(self, kind: str = "adjacency_pair") -> list[tuple[object, ...]]:
         """(state, at, words, retold) of each change of the events of a kind."""
@@ -232,7 +232,7 @@ def test_speech_that_is_nothing_but_words_is_told_as_an_action() -> None:
 )
 def test_what_is_no_speech_by_itself(text: str, final: bool, confidence: float) -> None:
     talk = Talk()
-    heard = HeardWords(
+    heard = TimedWords(
         actor=HUMAN, id="u", text=text, began=3.0, ended=3.0, final=final, confidence=confidence
     )  # fmt: skip
     talk.feed(heard, 3.0)

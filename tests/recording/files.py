@@ -7,7 +7,7 @@ from zlib import crc32
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode, encoding_of, published
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording.form import Form, kept
+from engage_hri.services.recording.form import StoredForm, kept
 from engage_hri.services.recording.reading import BILLION, Recording
 from engage_hri.services.recording.writing import Line, Writer
 
@@ -22,7 +22,7 @@ def sample(
     return Sample(key, payload, encoding, source, at, life=life, number=number, clock="loop", sent=at)
 
 
-def line(one: Sample, form: Form) -> Line:
+def line(one: Sample, form: StoredForm) -> Line:
     return Line(
         topic=f"robot/{one.key}", form=form.encoding, is_typed=form.is_typed, key=one.key, sender=one.source,
         life=one.life, clock=one.clock, encoding=one.encoding, is_past=one.past,

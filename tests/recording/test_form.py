@@ -12,7 +12,7 @@ from engage_hri.schemas.messages import encode, encoding_of
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording.form import BYTES, JSON, MSGPACK, XML, Form, kept, payload
+from engage_hri.services.recording.form import BYTES, JSON, MSGPACK, XML, StoredForm, kept, payload
 
 PACKED = "application/msgpack;engage.Fault/1"
 
@@ -56,7 +56,7 @@ def test_all_bytes_come_back_whatever_they_are_called(data: bytes, encoding: str
 def test_what_we_send_is_kept_as_json() -> None:
     data = msgspec.msgpack.encode({"type": "fault", "reason": "too far", "at": [0.1, -0.0, 1e300, 7]})
 
-    assert kept(Sample("key", data, PACKED, "there", 0.0)) == Form(
+    assert kept(Sample("key", data, PACKED, "there", 0.0)) == StoredForm(
         JSON, b'{"type":"fault","reason":"too far","at":[0.1,-0.0,1e300,7]}'
     )
 

@@ -10,7 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording.player import Player, Timeline
+from engage_hri.services.recording.player import Playback, Timeline
 from tests.recording.files import recording, sample
 
 NAMES = ("a", "b", "c")
@@ -69,7 +69,7 @@ def standing(samples: Sequence[Sample]) -> list[Sample]:
 
 @given(stories(), st.lists(st.tuples(ticks(8000), ticks(1500)), max_size=6))
 def test_wherever_it_goes_it_gives_what_a_scan_gives(samples: list[Sample], ways: list[tuple[float, float]]) -> None:
-    player = Player(recording(samples, chunk=4), 0.0)
+    player = Playback(recording(samples, chunk=4), 0.0)
     now = 0.0
     for to, while_ in ways:
         place = min(to, player.end)
@@ -83,7 +83,7 @@ def test_wherever_it_goes_it_gives_what_a_scan_gives(samples: list[Sample], ways
 
 @given(stories(), st.sampled_from([0.25, 1.0, 3.0, 7.0]))
 def test_from_deadline_to_deadline_each_message_comes_once_in_order(samples: list[Sample], speed: float) -> None:
-    player = Player(recording(samples), 100.0, speed=speed)
+    player = Playback(recording(samples), 100.0, speed=speed)
     found: list[Sample] = []
     while (due := player.deadline) is not None:
         before = len(found)
@@ -97,7 +97,7 @@ def test_from_deadline_to_deadline_each_message_comes_once_in_order(samples: lis
 
 def test_a_pause_stops_time_and_a_change_of_speed_keeps_the_place() -> None:
     samples = [sample(keys.fault("a"), Fault(reason=str(at)), float(at), number=at + 1) for at in range(10)]
-    player = Player(recording(samples), 0.0)
+    player = Playback(recording(samples), 0.0)
 
     assert [one.at for one in player.advance(2.5)] == [0.0, 1.0, 2.0]
     player.pause(2.5)
@@ -113,7 +113,7 @@ def test_a_pause_stops_time_and_a_change_of_speed_keeps_the_place() -> None:
 
 def test_it_ends_where_it_is_told_to() -> None:
     samples = [sample(keys.fault("a"), Fault(reason=str(at)), float(at), number=at + 1) for at in range(10)]
-    player = Player(recording(samples), 0.0, until=4.0)
+    player = Playback(recording(samples), 0.0, until=4.0)
 
     assert [one.at for one in player.advance(100.0)] == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert player.is_over

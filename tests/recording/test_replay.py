@@ -15,9 +15,9 @@ from engage_hri.services.bus.interface import Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.study.replay import control_of, keys_in
 from engage_hri.services.console.follow import following
-from engage_hri.services.recording.player import Player
+from engage_hri.services.recording.player import Playback
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.replay import Control, Stage, replay
+from engage_hri.services.recording.replay import Control, ReplayBus, replay
 from engage_hri.services.recording.times import moved
 from tests.recording.conftest import Anchor
 from tests.recording.files import recording, sample
@@ -26,13 +26,13 @@ from tests.recording.files import recording, sample
 @asynccontextmanager
 async def replaying(
     hub: MemoryHub, recording: Recording, *, speed: float = 1.0, begin: float = 0.0, commands: bool = False
-) -> AsyncIterator[tuple[Player, "asyncio.Queue[Control]", "asyncio.Task[None]"]]:
+) -> AsyncIterator[tuple[Playback, "asyncio.Queue[Control]", "asyncio.Task[None]"]]:
     async def same() -> Hub:
         return hub
 
-    player = Player(recording, asyncio.get_running_loop().time(), speed=speed)
+    player = Playback(recording, asyncio.get_running_loop().time(), speed=speed)
     controls: asyncio.Queue[Control] = asyncio.Queue()
-    stage = Stage(player, same, commands=commands, owns=False)
+    stage = ReplayBus(player, same, commands=commands, owns=False)
     task = asyncio.create_task(replay(stage, player, controls, begin=begin))
     try:
         yield player, controls, task

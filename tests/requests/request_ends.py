@@ -66,7 +66,7 @@ class Client:
     def carry_out(self, effects: list[asking_effects.Effect]) -> None:
         for effect in effects:
             match effect:
-                case asking_effects.Publish(message=message):
+                case asking_effects.PublishCommand(message=message):
                     self._publish(message)
                 case asking_effects.Renew(live=live):
                     still = KeepAlive(live=live, at=Stamp("w", self.world.now), requester=self.name, life=self.life)
@@ -104,7 +104,7 @@ class Server:
     def carry_out(self, effects: list[serving_effects.Effect]) -> None:
         for effect in effects:
             match effect:
-                case serving_effects.Publish(answer=answer):
+                case serving_effects.PublishAnswer(answer=answer):
                     self.world.to_clients(self, answer)
                 case serving_effects.Hand(request=Cancel() as cancel):
                     whose = self.names[cancel.id][0]
@@ -115,7 +115,7 @@ class Server:
                     self.stop(cancel.id)
                 case serving_effects.Hand(request=request):
                     self.begin(request)
-                case serving_effects.Complain(fault=fault, is_ours=True):
+                case serving_effects.ServingFault(fault=fault, is_ours=True):
                     self.mistakes.append(fault)
         self.world.wake(self.machine.deadline, self.tick)
 

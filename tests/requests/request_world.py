@@ -15,7 +15,7 @@ from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Kept, Outcome
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.requests import asking, asking_effects
 from engage_hri.services.requests.asking import NeverEnded, RequestRefused
-from engage_hri.services.requests.serving_effects import Complain
+from engage_hri.services.requests.serving_effects import ServingFault
 from tests.requests.request_ends import REQUESTS, Asked, Client, Server
 
 CALM = 150.0
@@ -108,7 +108,7 @@ class World:
         still = KeepAlive(live=(kept,), at=Stamp("w", self.now), requester=name, life=client.life)
         effects = [effect for lie in lies for effect in server.machine.take(lie, self.now, "stranger")]
         effects += server.machine.keep_alive(still, self.now, self.now, "stranger")
-        assert all(isinstance(effect, Complain) and not effect.is_ours for effect in effects)
+        assert all(isinstance(effect, ServingFault) and not effect.is_ours for effect in effects)
 
     def to_clients(self, server: Server, answer: Answer) -> None:
         for client in list(self.clients.values()):
@@ -192,7 +192,7 @@ class World:
         """Ids are small numbers, so that clients, lives and kinds collide."""
         client, id = self.clients[name], str(self.chance.randrange(6))
         request, key = self.chance.choice(REQUESTS)
-        is_new = client.machine.state(id) is asking.State.ENDED
+        is_new = client.machine.state(id) is asking.AskingState.ENDED
         was = client.machine.request(id)
         if is_new and id in client.asked:
             return  # within one life an id is used once
@@ -202,7 +202,7 @@ class World:
         elif was is not None and type(was) is not type(request(id)):
             assert isinstance(effects[0], asking_effects.TellEnd)  # refused by name, and the live one goes on
             return
-        elif client.machine.state(id) is asking.State.GIVEN_UP:
+        elif client.machine.state(id) is asking.AskingState.GIVEN_UP:
             return
         client.carry_out(effects)
 

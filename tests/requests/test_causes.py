@@ -12,10 +12,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import Effect, Publish, TellEnd
+from engage_hri.services.requests.asking_effects import Effect, PublishCommand, TellEnd
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
-from engage_hri.services.requests.serving_effects import Hand, Hold
+from engage_hri.services.requests.serving_effects import Hand, HoldRequest
 
 PLEASE = PerformFragment(
     id="a", requester="me", life="1", lease=5.0,
@@ -86,7 +86,7 @@ def held(unlinked_at: float, *, leaves: bool) -> Fault:
     serving.requester_there("me", "r1", 9.0)
     serving.take(MOVES, 10.0)
     (hold,) = serving.requester_gone("me", 10.3) if leaves else serving.tick(10.5 - LATE)
-    assert isinstance(hold, Hold)
+    assert isinstance(hold, HoldRequest)
     assert hold.why is not None
     return hold.why
 
@@ -177,7 +177,7 @@ def test_what_takes_too_long_is_cancelled_for_its_server_unless_the_requester_it
     unlinked_at: float, cause: Cause, whose: str
 ) -> None:
     asking = asked(unlinked_at, within=5.0)
-    published = [each for each in ticked(asking) if isinstance(each, Publish)]
+    published = [each for each in ticked(asking) if isinstance(each, PublishCommand)]
     (cancel,) = [each.message for each in published if isinstance(each.message, Cancel)]
 
     assert (cancel.cause, cancel.whose) == (cause, whose)

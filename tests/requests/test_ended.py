@@ -12,7 +12,7 @@ from engage_hri.schemas.faults import OutcomeUnknown
 from engage_hri.schemas.messages import decode, encode
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.requests.asking import ASLEEP, Asking
-from engage_hri.services.requests.asking_effects import Publish, TellEnd
+from engage_hri.services.requests.asking_effects import PublishCommand, TellEnd
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
@@ -82,13 +82,13 @@ def test_its_memory_is_bounded_by_the_bytes_that_it_truly_takes(words: int) -> N
 
 
 def test_who_was_asleep_for_long_sends_nothing_again_and_says_that_nobody_knows_what_became_of_it() -> None:
-    for asleep, kinds in ((ASLEEP - 1, {Publish}), (ASLEEP + 1, {TellEnd, Publish})):
+    for asleep, kinds in ((ASLEEP - 1, {PublishCommand}), (ASLEEP + 1, {TellEnd, PublishCommand})):
         asking = Asking("me", "1", Patience(silence=2 * ASLEEP))
         asking.server_there("realizer", "r", 0.0)
         asking.send(keys.BLOCK, BLOCK, 0.0)
         effects = asking.tick(asleep)
 
         assert {type(each) for each in effects} == kinds
-        sent = [each.message for each in effects if isinstance(each, Publish)]
+        sent = [each.message for each in effects if isinstance(each, PublishCommand)]
         assert any(isinstance(each, PerformBlock) for each in sent) == (asleep < ASLEEP)
         assert all(isinstance(each.end, OutcomeUnknown) for each in effects if isinstance(each, TellEnd))

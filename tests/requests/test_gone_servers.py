@@ -3,7 +3,7 @@
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, RequestRefused
 from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import Publish, TellEnd
+from engage_hri.services.requests.asking_effects import PublishCommand, TellEnd
 from engage_hri.services.requests.patience import Patience
 from tests.bus.performer import block
 
@@ -21,7 +21,7 @@ def test_what_is_asked_of_a_server_that_has_gone_is_sent_when_it_is_back() -> No
     assert asking.send(keys.BLOCK, block(), 2.0) == []
     assert asking.tick(30.0) == []
     (sent,) = asking.server_there("realizer", "1", 31.0)
-    assert isinstance(sent, Publish)
+    assert isinstance(sent, PublishCommand)
 
 
 def test_what_is_cancelled_before_its_server_is_back_never_gets_there() -> None:
@@ -41,4 +41,4 @@ def test_a_server_of_which_nothing_is_known_may_not_show_itself_and_is_sent_to()
     asking = Asking("client", "life", Patience())
     asking.server_gone("realizer", 1.0)
 
-    assert [type(one) for one in asking.send(keys.BLOCK, block(), 2.0)] == [Publish]
+    assert [type(one) for one in asking.send(keys.BLOCK, block(), 2.0)] == [PublishCommand]

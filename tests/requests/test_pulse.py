@@ -16,12 +16,12 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import Publish, Renew, TellEnd
+from engage_hri.services.requests.asking_effects import PublishCommand, Renew, TellEnd
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import Serving
-from engage_hri.services.requests.serving_effects import Hand, Hold
-from engage_hri.services.requests.serving_effects import Publish as Answered
+from engage_hri.services.requests.serving_effects import Hand, HoldRequest
+from engage_hri.services.requests.serving_effects import PublishAnswer as Answered
 
 MOVES = PerformBehavior(
     id="a", requester="me", life="1", block="b", behavior=Wait(id="w"), through="start", lease=4.0, held_after=0.5
@@ -38,7 +38,7 @@ def pulse(serving: Serving, sent: float, now: float) -> list[Any]:
 
 
 def holds(effects: list[Any]) -> list[float | None]:
-    return [each.until for each in effects if isinstance(each, Hold)]
+    return [each.until for each in effects if isinstance(each, HoldRequest)]
 
 
 def test_what_is_not_renewed_is_held_goes_on_when_it_is_and_ends_with_its_lease() -> None:
@@ -108,7 +108,7 @@ def test_what_is_not_answered_is_sent_again_after_0_3_s_and_twice_as_late_each_t
     asking.send(keys.BEHAVIOR, replace(MOVES, held_after=0.0), 10.0)
     for hundredth in range(1, 1001):
         at = 10.0 + hundredth / 100
-        sent += [at for each in asking.tick(at) if isinstance(each, Publish)]
+        sent += [at for each in asking.tick(at) if isinstance(each, PublishCommand)]
 
     assert sent[:5] == pytest.approx([10.3, 10.9, 12.1, 12.1 + 4 / 3, 12.1 + 8 / 3], abs=0.021)
 
@@ -123,7 +123,7 @@ def test_what_has_not_ended_within_the_time_that_it_was_given_is_cancelled_then_
         if at == again:
             asking.send(keys.BEHAVIOR, replace(MOVES, through="end"), at, within=3.0)
         effects = asking.tick(at)
-        cancelled += [at for each in effects if isinstance(each, Publish) and isinstance(each.message, Cancel)]
+        cancelled += [at for each in effects if isinstance(each, PublishCommand) and isinstance(each.message, Cancel)]
 
     assert cancelled[0] == pytest.approx(13.0 if again is None else 15.0)
 
@@ -151,7 +151,7 @@ def test_what_is_not_accepted_yet_is_sent_as_often_since_it_may_have_begun() -> 
     asking, at, sent = asked_to_move(), 10.0, list[float]()
     while at < 12.0:
         at += 0.01
-        sent += [at for each in asking.tick(at) if isinstance(each, Publish)]
+        sent += [at for each in asking.tick(at) if isinstance(each, PublishCommand)]
 
     assert max(after - before for before, after in pairwise(sent)) <= 0.5 / 3 + 0.011
 
@@ -169,8 +169,8 @@ def test_while_the_server_is_gone_nothing_is_sent_and_what_is_given_up_is_cancel
     cancels = list[float]()
     for tenth in range(100):
         effects = asking.server_there("control", "run", 40.0) if not tenth else asking.tick(40.0 + tenth / 10)
-        cancels += [40.0 + tenth / 10 for each in effects if isinstance(each, Publish)]
-        assert all(isinstance(each.message, Cancel) for each in effects if isinstance(each, Publish))
+        cancels += [40.0 + tenth / 10 for each in effects if isinstance(each, PublishCommand)]
+        assert all(isinstance(each.message, Cancel) for each in effects if isinstance(each, PublishCommand))
     assert len(cancels) == pytest.approx(7, abs=1)  # 0.3 s, doubling to 2 s
     outcome = BehaviorOutcome(
         id="a", requester="me", life="1", kind="perform_behavior", block="b", behavior="w", status="aborted",
@@ -197,7 +197,7 @@ def test_what_is_cancelled_while_the_server_is_gone_is_cancelled_once_when_it_is
     during = [*asking.cancel("a", Fault(reason="no more"), 12.0), *asking.tick(12.5), *asking.tick(14.9)]
     assert during == []
     (cancel,) = asking.server_there("control", "run", 14.95)
-    assert isinstance(cancel, Publish)
+    assert isinstance(cancel, PublishCommand)
     assert isinstance(cancel.message, Cancel)
 
 
@@ -244,9 +244,9 @@ def test_what_a_server_has_heard_is_not_begun_again_by_its_next_life(is_heard: b
     if is_heard:
         (end,) = [each.end for each in effects if isinstance(each, TellEnd)]
         assert isinstance(end, ServerRestarted)
-        assert all(isinstance(each.message, Cancel) for each in effects if isinstance(each, Publish))
+        assert all(isinstance(each.message, Cancel) for each in effects if isinstance(each, PublishCommand))
     else:
-        assert [each.message for each in effects if isinstance(each, Publish)] == [asking.request("a")]
+        assert [each.message for each in effects if isinstance(each, PublishCommand)] == [asking.request("a")]
 
 
 def test_a_service_says_that_it_has_begun_what_it_has_not_accepted() -> None:

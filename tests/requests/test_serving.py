@@ -18,12 +18,12 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.requests.asking import Asking, RequestRefused
-from engage_hri.services.requests.asking_effects import Publish as AskedToPublish
+from engage_hri.services.requests.asking_effects import PublishCommand as AskedToPublish
 from engage_hri.services.requests.asking_effects import TellEnd
 from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.serving import LIFELESS_KEPT, Serving
-from engage_hri.services.requests.serving_effects import Complain, Hand, Publish
+from engage_hri.services.requests.serving_effects import Hand, PublishAnswer, ServingFault
 from tests.bus.performer import Server
 from tests.commanding import key_of
 
@@ -39,7 +39,7 @@ def handed(effects: list[Any]) -> list[Request]:
 
 
 def told(effects: list[Any]) -> list[Any]:
-    return [each.answer for each in effects if isinstance(each, Publish)]
+    return [each.answer for each in effects if isinstance(each, PublishAnswer)]
 
 
 def test_an_answer_names_requester_life_kind_and_id() -> None:
@@ -70,7 +70,7 @@ def test_other_content_under_a_live_id_is_ignored_and_told_unless_its_kind_allow
     serving.take(BLOCK, 0.0)
     different = serving.take(OTHER, 0.0)
     assert handed(different) == []
-    assert [each.fault.reason for each in different if isinstance(each, Complain)] == [
+    assert [each.fault.reason for each in different if isinstance(each, ServingFault)] == [
         "a live perform_block of this id has other content, and that counts"
     ]
 

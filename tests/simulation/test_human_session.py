@@ -10,7 +10,7 @@ import pytest
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.simulation.human_session import Pace, Planned, draw, observations
 from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 from tests.simulation.table_session import exactly
@@ -72,7 +72,7 @@ def test_the_coarse_resolution_recognizes_the_same():
 def test_two_hundred_seeds_have_the_mean_time_between_events():
     means = []
     for _, changes in sessions():
-        tally = Tally(30.0)
+        tally = EventTally(30.0)
         for change in changes:
             tally.feed(change)
         means.append(tally.session().mtbce or 0.0)
@@ -138,7 +138,7 @@ def test_a_session_depends_on_its_seed_alone():
 
 
 def test_the_table_itself_as_a_session_gives_its_numbers_exactly():
-    tally = Tally(30.0)
+    tally = EventTally(30.0)
     for change in recognized(exactly()):
         tally.feed(change)
     session = tally.session()

@@ -3,7 +3,7 @@
 import pytest
 
 from engage_hri.schemas.recognition import KindStatistics
-from engage_hri.services.study.hypotheses import Finding, findings
+from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.records import SessionRecord
 from tests.study.sessions import kind, session
 
@@ -27,7 +27,7 @@ def study(sessions: int = 6) -> list[SessionRecord]:
     return [*good, *bad]
 
 
-def by_name(found: list[Finding]) -> dict[str, Finding]:
+def by_name(found: list[HypothesisResult]) -> dict[str, HypothesisResult]:
     return {finding.hypothesis: finding for finding in found}
 
 

@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.study.records import EyeContact, Recording, SessionRecord
+from engage_hri.services.study.records import EyeContact, SessionRecord, SessionRecorder
 
 
 def at(seconds: float) -> Stamp:
@@ -19,15 +19,15 @@ def event(id: str, state: str, started: float, when: float, **more: Any) -> Conn
     return ConnectionEvent(id=id, state=state, at=at(when), started=at(started), **fields)
 
 
-def recording(*messages: Any) -> Recording:
+def recording(*messages: Any) -> SessionRecorder:
     """Of messages that happen when they say."""
-    recording = Recording("robot")
+    recording = SessionRecorder("robot")
     for message in messages:
         recording(message, message.at.seconds)
     return recording
 
 
-def record(made: Recording, reason: str = "") -> SessionRecord:
+def record(made: SessionRecorder, reason: str = "") -> SessionRecord:
     return made.session(session=2, condition="operational", seed=7, reason=reason)
 
 

@@ -77,7 +77,7 @@ def test_what_nobody_measured_is_left_out():
 
 
 def test_a_table_in_markdown():
-    table = summary.Table(title="T", columns=("", "a"), rows=(("x", "1"), ("y", "2")), notes=("Why.",))
+    table = summary.NumberTable(title="T", columns=("", "a"), rows=(("x", "1"), ("y", "2")), notes=("Why.",))
 
     assert table.markdown() == "## T\n\n|  | a |\n| --- | ---: |\n| x | 1 |\n| y | 2 |\n\nWhy.\n"
 

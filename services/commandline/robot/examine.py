@@ -32,7 +32,15 @@ from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.neighbors import protocols, robots
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, ROUTER_WITH_KEYS
 from engage_hri.services.commandline.shell.process import unique_name
-from engage_hri.services.doctor.facts import Body, Certificate, Door, Facts, Known, Package, Sight
+from engage_hri.services.doctor.facts import (
+    BodyFacts,
+    Certificate,
+    EndpointFacts,
+    Package,
+    ParticipantFacts,
+    SystemFacts,
+    WorldFacts,
+)
 from engage_hri.services.runtime.service import installed_version
 
 KNOCK: Seconds = 2.0
@@ -55,7 +63,7 @@ _NEEDED = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*([^;]*)(;.*)?")
 
 
 @asynccontextmanager
-async def examining(bus: BusConfig) -> AsyncIterator[Facts]:
+async def examining(bus: BusConfig) -> AsyncIterator[SystemFacts]:
     """Gather the facts, for the body of `async with`; then leave the bus. What cannot be had is a fact, too."""
     facts, own = await _outside(bus)
     endpoints = tuple(door.endpoint for door in facts.doors)
@@ -77,12 +85,12 @@ async def examining(bus: BusConfig) -> AsyncIterator[Facts]:
         yield await _look_around(hub, facts, endpoints)
 
 
-async def _outside(bus: BusConfig) -> tuple[Facts, Keys | None]:
+async def _outside(bus: BusConfig) -> tuple[SystemFacts, Keys | None]:
     """Gather what can be learned without the bus."""
     own, problem = _keys(bus)
     endpoints = bus.connect or ((ROUTER_WITH_KEYS,) if bus.keys else (RENDEZVOUS,))
     doors = tuple(await asyncio.gather(*(_knock(endpoint, own) for endpoint in endpoints)))
-    facts = Facts(
+    facts = SystemFacts(
         robot=bus.robot, at=time.time(), version=installed_version(), protocol=keys.PREFIX, own=_itself(),
         services=keys.SERVICES, packages=tuple(_packages()), doors=doors, bus=False, problem=problem,
         certificates=tuple(_certificates(bus)),
@@ -96,7 +104,7 @@ def _itself() -> ProcessFacts:
     return ProcessFacts(host=platform.node(), python=platform.python_version(), wall=time.time(), zenoh=zenoh)
 
 
-async def _look_around(hub: ZenohHub, facts: Facts, endpoints: tuple[str, ...]) -> Facts:
+async def _look_around(hub: ZenohHub, facts: SystemFacts, endpoints: tuple[str, ...]) -> SystemFacts:
     """Add what can be learned on the bus."""
     bus = hub.join(unique_name("doctor"), "observer")
     hub.peers.see(keys.ANY_ALIVE)
@@ -116,7 +124,7 @@ async def _look_around(hub: ZenohHub, facts: Facts, endpoints: tuple[str, ...]) 
     )  # fmt: skip
 
 
-async def _participants(hub: ZenohHub, bus: Bus) -> tuple[Known, ...]:
+async def _participants(hub: ZenohHub, bus: Bus) -> tuple[ParticipantFacts, ...]:
     seen = {name: tuple(runs) for name, runs in hub.peers.names.items() if name != bus.name}
     first = dict(
         zip(seen, await asyncio.gather(*(_ask(hub, bus, name, runs) for name, runs in seen.items())), strict=True)
@@ -132,14 +140,16 @@ async def _participants(hub: ZenohHub, bus: Bus) -> tuple[Known, ...]:
         for name, one in first.items()
     ]
     known += [
-        Known(name=name, part=keys.part_of(role_of(name)), seen=False, lives=0, answers=name in PARTICIPANTS)
+        ParticipantFacts(
+            name=name, part=keys.part_of(role_of(name)), seen=False, lives=0, answers=name in PARTICIPANTS
+        )
         for name in hidden
     ]
     order = {name: number for number, name in enumerate(PARTICIPANTS)}
     return tuple(sorted(known, key=lambda one: (order.get(one.name, len(order)), one.name)))
 
 
-async def _ask(hub: ZenohHub, bus: Bus, name: str, runs: tuple[str, ...]) -> Known:
+async def _ask(hub: ZenohHub, bus: Bus, name: str, runs: tuple[str, ...]) -> ParticipantFacts:
     """Ask one participant all that it can answer for itself."""
     trips = []
     for _ in range(TRIPS):
@@ -152,7 +162,7 @@ async def _ask(hub: ZenohHub, bus: Bus, name: str, runs: tuple[str, ...]) -> Kno
     wall = 0.0
     if status is not None and status.process.wall:
         wall = status.process.wall - (asked + time.time()) / 2
-    return Known(
+    return ParticipantFacts(
         name=name, lives=len(runs), answers=status is not None or name in PARTICIPANTS, status=status,
         trip=min(trips, default=None), wall=wall,
     )  # fmt: skip
@@ -166,7 +176,7 @@ async def _status(bus: Bus, name: str) -> Status | None:
     return answer if isinstance(answer, Status) else None
 
 
-async def _body(hub: ZenohHub, bus: Bus) -> Body | None:
+async def _body(hub: ZenohHub, bus: Bus) -> BodyFacts | None:
     """Ask for the body; None if our keys do not let us ask."""
     try:
         if hub.rights is not None:
@@ -176,13 +186,15 @@ async def _body(hub: ZenohHub, bus: Bus) -> Body | None:
     try:
         answer = await bus.query(keys.DESCRIBE, DescribeBody(), ANSWER)
     except EngageError as error:
-        return Body(problem=error.fault.reason)
+        return BodyFacts(problem=error.fault.reason)
     return (
-        Body(name=answer.body, types=answer.types) if isinstance(answer, Capabilities) else Body(problem="nonsense")
+        BodyFacts(name=answer.body, types=answer.types)
+        if isinstance(answer, Capabilities)
+        else BodyFacts(problem="nonsense")
     )
 
 
-async def _sight(bus: Bus) -> Sight | Literal["unknown"] | None:
+async def _sight(bus: Bus) -> WorldFacts | Literal["unknown"] | None:
     """Wait for the last world; `unknown` if our keys do not let us look."""
     try:
         subscription = bus.subscribe(keys.WORLD)
@@ -194,7 +206,7 @@ async def _sight(bus: Bus) -> Sight | Literal["unknown"] | None:
         return None
     world = received.message
     age = 0.0 if world.at is None else max(0.0, bus.now() - bus.local(world.at))
-    return Sight(source=received.source, people=len(world.people), objects=len(world.objects), age=age)
+    return WorldFacts(source=received.source, people=len(world.people), objects=len(world.objects), age=age)
 
 
 # -- this machine ---------------------------------------------------------------------------------------------------
@@ -244,10 +256,10 @@ def _certificates(bus: BusConfig) -> Iterator[Certificate]:
                 yield Certificate(name=who.common_name, until=who.until)
 
 
-async def _knock(endpoint: str, own: Keys | None) -> Door:
+async def _knock(endpoint: str, own: Keys | None) -> EndpointFacts:
     """Try whether somebody opens at an endpoint, and, with keys, whether both sides like the other's certificate."""
     is_closed = is_encrypted(endpoint)
-    door = Door(endpoint=endpoint, is_local=is_on_this_machine(endpoint), is_closed=is_closed)
+    door = EndpointFacts(endpoint=endpoint, is_local=is_on_this_machine(endpoint), is_closed=is_closed)
     match = ENDPOINT.fullmatch(endpoint)
     assert match is not None, "the configuration has checked it"
     host, port = match["host"].strip("[]"), int(match["port"])

@@ -26,8 +26,8 @@ from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
 from engage_hri.services.runtime.settings import shown
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import BASELINE
-from engage_hri.services.study.hypotheses import Finding, findings
-from engage_hri.services.study.summary import BETWEEN, WITHIN, Table
+from engage_hri.services.study.hypotheses import HypothesisResult, findings
+from engage_hri.services.study.summary import BETWEEN, WITHIN, NumberTable
 
 FILES = ("recordings.csv", "settings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
 DIFFERENT = 1
@@ -126,7 +126,7 @@ def _with_number(one: Session, number: int) -> Session:
 
 def compare(
     sessions: Sequence[Session], baseline: str | None, *, is_within: bool
-) -> tuple[list[Finding], list[Table]]:
+) -> tuple[list[HypothesisResult], list[NumberTable]]:
     """Make the findings and all tables. Raises InputRefused: there is no such baseline."""
     records = [one.record for one in sessions]
     conditions = list(dict.fromkeys(record.condition for record in records))
@@ -137,7 +137,7 @@ def compare(
         )
     tables = [summary.overview(records)]
     against = baseline or BASELINE
-    found: list[Finding] = []
+    found: list[HypothesisResult] = []
     if len(conditions) > 1 and against in conditions:
         others = [name for name in conditions if name != against]
         found = findings(records, baseline=against, others=others, is_paired=is_within)
@@ -146,7 +146,7 @@ def compare(
     return found, tables
 
 
-def overview(sessions: Sequence[Session], baseline: str) -> Table:
+def overview(sessions: Sequence[Session], baseline: str) -> NumberTable:
     """Table with a row for each session, and what to doubt."""
     rows = tuple(
         (
@@ -162,10 +162,10 @@ def overview(sessions: Sequence[Session], baseline: str) -> Table:
     if UNNAMED in conditions:
         notes.append("Some name no condition (by `engage record --condition` or the window): they count together.")
     columns = ("", "condition", "participant", "seconds", "events", "MTBCE (s)")
-    return Table(title="Recordings", columns=columns, rows=rows, notes=tuple(notes))
+    return NumberTable(title="Recordings", columns=columns, rows=rows, notes=tuple(notes))
 
 
-def configured(sessions: Sequence[Session]) -> Table:
+def configured(sessions: Sequence[Session]) -> NumberTable:
     """Table with the settings of the services that are not as by default, and those of later lives that changed."""
     by_default = dict(flat(shown(Config())))
     found: list[tuple[str, ...]] = []
@@ -185,7 +185,7 @@ def configured(sessions: Sequence[Session]) -> Table:
             notes.append(f"{one.path.name}: it has no settings of its services; nobody knows what they were.")
     if any(one.settings for one in sessions):
         notes.append("All others are as by default in this Engage; `engage export --settings` has them all.")
-    return Table(
+    return NumberTable(
         title="Settings", columns=("", "service", "life", "setting"), rows=tuple(found), notes=tuple(notes)
     )  # fmt: skip
 

@@ -22,13 +22,13 @@ from engage_hri.services.console.follow import FOLLOWED
 from engage_hri.services.console.heard import Heard
 from engage_hri.services.recognition.again import Again, Lack, events_in
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.settings import Life, flat, settings_of
-from engage_hri.services.recording.times import Times, messages, moved
+from engage_hri.services.recording.settings import LifeSettings, flat, settings_of
+from engage_hri.services.recording.times import RecordingTimes, messages, moved
 from engage_hri.services.study.records import EventRecord, SessionRecord
-from engage_hri.services.study.records import Recording as Record
+from engage_hri.services.study.records import SessionRecorder as Record
 
 WINDOW: Seconds = 30.0
 """Window of a tally whose recent numbers nobody reads."""
@@ -60,7 +60,7 @@ class Session(Struct, frozen=True, kw_only=True):
     events: tuple[EventRecord, ...]
     published: WindowStatistics | None
     doubts: tuple[str, ...] = ()
-    settings: tuple[Life, ...] = ()
+    settings: tuple[LifeSettings, ...] = ()
 
 
 def sessions(recording: Recording) -> list[Session]:
@@ -68,7 +68,7 @@ def sessions(recording: Recording) -> list[Session]:
 
     Of several, those under no condition, and those with nobody there, are left out; a doubt says so.
     """
-    times = Times(recording)
+    times = RecordingTimes(recording)
     told = [*_told(recording, times)]
     doubts, settings = tuple(_doubts(recording, told, times)), tuple(settings_of(recording))
     parts = stretches(
@@ -86,7 +86,7 @@ def sessions(recording: Recording) -> list[Session]:
     return kept
 
 
-def _told(recording: Recording, times: Times) -> Iterator[Told]:
+def _told(recording: Recording, times: RecordingTimes) -> Iterator[Told]:
     """The messages that count, as people are to hear them: what a killed program told is over with it."""
     heard = Heard(recording.robot, recording.clock, times.at, times.told)
     for received, _ in messages(recording):
@@ -98,9 +98,9 @@ def _told(recording: Recording, times: Times) -> Iterator[Told]:
     yield from (Told(*one) for one in heard.advance(recording.duration))
 
 
-def _session(recording: Recording, told: Sequence[Told], times: Times, part: Stretch) -> Session:
+def _session(recording: Recording, told: Sequence[Told], times: RecordingTimes, part: Stretch) -> Session:
     """Take the numbers of a part: of all connection events that began in it, as recognition decided them."""
-    tally, record = Tally(WINDOW), Record(recording.robot)
+    tally, record = EventTally(WINDOW), Record(recording.robot)
     published: WindowStatistics | None = None
     until = part.end if part.end < recording.duration else inf
     within: dict[str, bool] = {}
@@ -125,7 +125,9 @@ def _session(recording: Recording, told: Sequence[Told], times: Times, part: Str
     )  # fmt: skip
 
 
-def _began(event: ConnectionEvent, times: Times, recording: Recording, begin: Seconds, until: Seconds) -> bool:
+def _began(
+    event: ConnectionEvent, times: RecordingTimes, recording: Recording, begin: Seconds, until: Seconds
+) -> bool:
     """Tell whether an event began between these times."""
     began = times.at(event.started, recording.duration)
     return began is not None and begin <= began < until
@@ -137,7 +139,7 @@ def _lasts(message: Message) -> bool:
     return is_look or isinstance(message, ActorFound | ActorLost)
 
 
-def _in_time(message: Message, times: Times, at: Seconds, begin: Seconds) -> Message:
+def _in_time(message: Message, times: RecordingTimes, at: Seconds, begin: Seconds) -> Message:
     """The message with its instants in seconds since `begin`. at: when it came, in the recording."""
 
     def instant(stamp: Stamp) -> Stamp:
@@ -148,7 +150,7 @@ def _in_time(message: Message, times: Times, at: Seconds, begin: Seconds) -> Mes
     return told
 
 
-def _doubts(recording: Recording, told: Sequence[Told], times: Times) -> Iterable[str]:
+def _doubts(recording: Recording, told: Sequence[Told], times: RecordingTimes) -> Iterable[str]:
     """List what is doubtful in all numbers of a recording."""
     lives, known = set[str](), dict[str, bool]()
     for event, _, past in told:

@@ -21,7 +21,7 @@ from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfi
 
 if TYPE_CHECKING:
     from engage_hri.services.bus.interface import Hub
-    from engage_hri.services.recording.player import Player
+    from engage_hri.services.recording.player import Playback
     from engage_hri.services.recording.reading import Recording
     from engage_hri.services.recording.replay import Control
 
@@ -61,14 +61,14 @@ def main(options: Options) -> int:
 
 
 async def _replay(options: Options, config: RobotConfig, recording: "Recording") -> int:
-    from engage_hri.services.recording.player import Player
-    from engage_hri.services.recording.replay import Stage, replay
+    from engage_hri.services.recording.player import Playback
+    from engage_hri.services.recording.replay import ReplayBus, replay
 
     async def hub() -> "Hub":
         return await options.open(config.bus, "replay", options.listen or ())
 
-    player = Player(recording, asyncio.get_running_loop().time(), speed=options.speed, until=options.until)
-    stage = Stage(player, hub, commands=options.commands)
+    player = Playback(recording, asyncio.get_running_loop().time(), speed=options.speed, until=options.until)
+    stage = ReplayBus(player, hub, commands=options.commands)
     controls: asyncio.Queue[Control] = asyncio.Queue()
     async with typing(controls):
         await replay(stage, player, controls, begin=options.at)
@@ -122,7 +122,7 @@ def control_of(pressed: bytes) -> "Control | None":
         return lambda player, now: max(0.0, player.at(now) + by)
 
     def faster(factor: float) -> "Control":
-        def change(player: "Player", now: Seconds) -> None:
+        def change(player: "Playback", now: Seconds) -> None:
             paused = player.is_paused
             player.play(now, player.speed * factor)
             if paused:
@@ -130,7 +130,7 @@ def control_of(pressed: bytes) -> "Control | None":
 
         return change
 
-    def pause(player: "Player", now: Seconds) -> None:
+    def pause(player: "Playback", now: Seconds) -> None:
         (player.play if player.is_paused else player.pause)(now)
 
     return {
@@ -140,7 +140,7 @@ def control_of(pressed: bytes) -> "Control | None":
 
 
 async def _show(controls: "asyncio.Queue[Control]") -> None:
-    def show(player: "Player", now: Seconds) -> None:
+    def show(player: "Playback", now: Seconds) -> None:
         state = "paused " if player.is_paused else f"x{player.speed:g}"
         with suppress(OSError):
             print(

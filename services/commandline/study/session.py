@@ -19,10 +19,10 @@ from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.recognition.events.session import Session
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.simulation import human_session
-from engage_hri.services.study.records import EventRecord, Recording, SessionRecord
+from engage_hri.services.study.records import EventRecord, SessionRecord, SessionRecorder
 
 A_WHILE: Seconds = 120.0
 """Time after the last drawn event by which all open events have ended."""
@@ -67,7 +67,7 @@ def main(options: Options) -> int:
 
 def play(order: Order) -> SessionResult:
     """Play one session in virtual time. An error is in the result; nothing is raised."""
-    recording = Recording(order.config.robot)
+    recording = SessionRecorder(order.config.robot)
     reason = trace = ""
     try:
         if order.people:
@@ -83,15 +83,15 @@ def play(order: Order) -> SessionResult:
     return SessionResult(record=record, events=events, trace=trace)
 
 
-async def _play_robot(order: Order, recording: Recording) -> None:
+async def _play_robot(order: Order, recording: SessionRecorder) -> None:
     """Play the tangram. Raises TimeoutError at the limit."""
     async with asyncio.timeout(order.limit):
         await play_tangram(order.config, (recording,))
 
 
-def _play_people(order: Order, recording: Recording) -> None:
+def _play_people(order: Order, recording: SessionRecorder) -> None:
     config = order.config.recognition
-    session, tally = Session(order.config.robot, config), Tally(config.window)
+    session, tally = Session(order.config.robot, config), EventTally(config.window)
     plan = human_session.draw(random.Random(order.seed))
     observations = human_session.observations(plan)
     effects = [effect for observation, at in observations for effect in session.feed(observation, at)]

@@ -33,9 +33,9 @@ from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
-from engage_hri.services.study.hypotheses import Finding, findings
+from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.records import EventRecord, SessionRecord
-from engage_hri.services.study.summary import Table
+from engage_hri.services.study.summary import NumberTable
 
 PEOPLE = "table-2-1"
 """Name of the human for sessions of two people, without a robot and so without a condition."""
@@ -166,8 +166,8 @@ def _order(options: Options, condition: str, number: int) -> Order:
 
 
 def tables_of(
-    records: Sequence[SessionRecord], found: Sequence[Finding], ordered: Mapping[str, int], *, people: bool
-) -> list[Table]:
+    records: Sequence[SessionRecord], found: Sequence[HypothesisResult], ordered: Mapping[str, int], *, people: bool
+) -> list[NumberTable]:
     """Tables for the terminal and for summary.md. ordered: number of sessions by condition, played or not."""
     tables = [summary.overview(records, ordered)]
     if people:
@@ -183,8 +183,8 @@ def contents(
     options: Options,
     orders: Sequence[Order],
     played: Sequence[SessionResult],
-    found: Sequence[Finding],
-    tables: Sequence[Table],
+    found: Sequence[HypothesisResult],
+    tables: Sequence[NumberTable],
     draw: Draw,
 ) -> dict[str, bytes]:
     """Results by file name. Nothing in them depends on the number of processes."""
@@ -234,12 +234,12 @@ def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
     )  # fmt: skip
 
 
-def rendered(table: Table) -> RenderableType:
+def rendered(table: NumberTable) -> RenderableType:
     """Draw a table with its notes, for a terminal."""
     return Group(grid(table), *(Text(note, style="dim") for note in table.notes))
 
 
-def grid(table: Table) -> RichTable:
+def grid(table: NumberTable) -> RichTable:
     """Draw a table without its notes."""
     made = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
     for index, column in enumerate(table.columns):

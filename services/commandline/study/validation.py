@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 from engage_hri.services.study.records import SessionRecord
-from engage_hri.services.study.summary import Table, known, mean_and_deviation, number, numbers, pooled
+from engage_hri.services.study.summary import NumberTable, known, mean_and_deviation, number, numbers, pooled
 
 
-def beside_table_2_1(records: Sequence[SessionRecord]) -> Table:
+def beside_table_2_1(records: Sequence[SessionRecord]) -> NumberTable:
     """Compare each number of the table with the finished sessions."""
     done = [record for record in records if record.finished]
     rows: list[tuple[str, str, str]] = []
@@ -30,7 +30,7 @@ def beside_table_2_1(records: Sequence[SessionRecord]) -> Table:
     rows.append(("MTBCE (s)", number(MTBCE, 1), mean_and_deviation(means, 2)))
     gaps = known(record.statistics.max_gap for record in done)
     rows.append(("longest gap (s)", number(LONGEST_GAP, 0), mean_and_deviation(gaps, 1)))
-    return Table(
+    return NumberTable(
         title="Beside Table 2.1", columns=("", "table", "sessions, pooled"), rows=tuple(rows),
         notes=(
             "Success rates and delays are of all events together; ± is the standard deviation of a session. Numbers "

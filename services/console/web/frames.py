@@ -5,13 +5,13 @@ from msgspec.json import Encoder
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.picture import Picture
-from engage_hri.services.console.web.receipts import Receipts, Told
+from engage_hri.services.console.web.receipts import OrderNews, Receipts
 
 HEARTBEAT: Seconds = 1.0
 """Time after which a browser gets a frame though nothing has changed, so that it knows that the window is there."""
 
 
-class Frame(Struct, frozen=True, omit_defaults=True):
+class PageFrame(Struct, frozen=True, omit_defaults=True):
     """Message to the browser. now: seconds of the picture. sections: by name. gone: names of those that are over.
 
     session: id of what the window keeps of this page, in the first frame of a link. taken: number of the last
@@ -25,11 +25,11 @@ class Frame(Struct, frozen=True, omit_defaults=True):
     session: str = ""
     taken: int | None = None
     you: "You | None" = None
-    told: tuple[Told, ...] = ()
-    place: "Place | None" = None
+    told: tuple[OrderNews, ...] = ()
+    place: "PlaybackPlace | None" = None
 
 
-class Place(Struct, frozen=True):
+class PlaybackPlace(Struct, frozen=True):
     """Place of a page in a recording.
 
     at, end: seconds from its beginning. speed: times as fast as it was. visit: counts how often the page has jumped;
@@ -70,7 +70,7 @@ class Viewer:
         self._you: You | None = None
         self._taken: int | None = None
         self._told: Seconds | None = None
-        self._place: Place | None = None
+        self._place: PlaybackPlace | None = None
         self._encoder = Encoder()
 
     def frame(
@@ -79,7 +79,7 @@ class Viewer:
         now: Seconds,
         you: You | None = None,
         receipts: Receipts | None = None,
-        place: Place | None = None,
+        place: PlaybackPlace | None = None,
         clock: Seconds | None = None,
     ) -> bytes | None:
         """The next frame as JSON; None: there is nothing new, and the browser has heard of the window lately.
@@ -87,7 +87,7 @@ class Viewer:
         receipts: of the orders of its page. place: with a recording; at another visit the picture is another one, and
         is told whole. clock: what runs on while the time of the picture stands still; None: that never does.
         """
-        told: tuple[Told, ...] = ()
+        told: tuple[OrderNews, ...] = ()
         taken, session = None, ""
         if receipts is not None:
             told = receipts.news()
@@ -107,4 +107,4 @@ class Viewer:
         self._known = dict(picture.versions)
         sections = {name: Raw(picture.section(name)) for name in new}
         news, self._you = (you if you != self._you else None), you
-        return self._encoder.encode(Frame(picture.zero(now), sections, gone, session, taken, news, told, place))
+        return self._encoder.encode(PageFrame(picture.zero(now), sections, gone, session, taken, news, told, place))

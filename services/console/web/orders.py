@@ -30,29 +30,29 @@ Id = Annotated[str, Meta(max_length=200)]
 Text = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
 
 
-class Order(Struct, frozen=True, kw_only=True, tag_field="do", omit_defaults=True):
+class PageOrder(Struct, frozen=True, kw_only=True, tag_field="do", omit_defaults=True):
     """Order of a page. needs: the right that it takes; empty: none."""
 
     needs: ClassVar[Right | Literal[""]] = ""
 
 
-class SeatOrder(Order, frozen=True, kw_only=True):
+class SeatOrder(PageOrder, frozen=True, kw_only=True):
     """Order of somebody who is a person, or wants to be."""
 
     needs: ClassVar[Right] = "seat"
 
 
-class Sit(SeatOrder, frozen=True, kw_only=True, tag="sit"):
+class SitOrder(SeatOrder, frozen=True, kw_only=True, tag="sit"):
     """Become a person. name: id of the person; empty: one is made up."""
 
     name: Name = ""
 
 
-class Leave(SeatOrder, frozen=True, kw_only=True, tag="leave"):
+class LeaveOrder(SeatOrder, frozen=True, kw_only=True, tag="leave"):
     """Stand up and go."""
 
 
-class LookAt(SeatOrder, frozen=True, kw_only=True, tag="look"):
+class LookOrder(SeatOrder, frozen=True, kw_only=True, tag="look"):
     """Look at an entity; empty: away from everything."""
 
     target: Id = ""
@@ -90,7 +90,7 @@ class Type(SeatOrder, frozen=True, kw_only=True, tag="type"):
     text: Text
 
 
-class WizardOrder(Order, frozen=True, kw_only=True):
+class WizardOrder(PageOrder, frozen=True, kw_only=True):
     """Order of somebody who drives the robot by hand. by: who it is, for the log."""
 
     needs: ClassVar[Right] = "speak"
@@ -116,7 +116,7 @@ class Prepared(WizardOrder, frozen=True, kw_only=True, tag="prepared"):
     addressee: Id = ""
 
 
-class Backchannel(WizardOrder, frozen=True, kw_only=True, tag="backchannel"):
+class BackchannelOrder(WizardOrder, frozen=True, kw_only=True, tag="backchannel"):
     """Show that the robot listens. how: by a nod or a word."""
 
     how: Literal["nod", "uh-huh"] = "nod"
@@ -131,7 +131,7 @@ class InhibitGaze(WizardOrder, frozen=True, kw_only=True, tag="inhibit"):
     target: Id = ""
 
 
-class Condition(WizardOrder, frozen=True, kw_only=True, tag="condition"):
+class ConditionOrder(WizardOrder, frozen=True, kw_only=True, tag="condition"):
     """Begin a condition of a study. speech_only: the robot says the task's words and does nothing else."""
 
     needs: ClassVar[Right] = "condition"
@@ -139,7 +139,7 @@ class Condition(WizardOrder, frozen=True, kw_only=True, tag="condition"):
     speech_only: bool = False
 
 
-class SteerOrder(Order, frozen=True, kw_only=True, tag="steer"):
+class SteerOrder(PageOrder, frozen=True, kw_only=True, tag="steer"):
     """Hold, continue or stop all that the robot performs."""
 
     needs: ClassVar[Right] = "steer"
@@ -147,7 +147,7 @@ class SteerOrder(Order, frozen=True, kw_only=True, tag="steer"):
     by: Name = ""
 
 
-class SwitchOrder(Order, frozen=True, kw_only=True, tag="faults"):
+class SwitchOrder(PageOrder, frozen=True, kw_only=True, tag="faults"):
     """Switch a fault of the body on, or off; all others stay as they are, whoever has switched them.
 
     off: all of its kind go off that have the fields which it has.
@@ -159,7 +159,7 @@ class SwitchOrder(Order, frozen=True, kw_only=True, tag="faults"):
     by: Name = ""
 
 
-class Play(Order, frozen=True, kw_only=True, tag="play"):
+class Play(PageOrder, frozen=True, kw_only=True, tag="play"):
     """Play a recording, or stand still in it.
 
     at: where to go first, in seconds; None: nowhere. speed: times as fast as it was; None: as before.
@@ -171,8 +171,8 @@ class Play(Order, frozen=True, kw_only=True, tag="play"):
 
 
 AnyOrder = (
-    Sit | Leave | LookAt | PointAt | MoveHead | Move | Speak | Type
-    | Tell | Prepared | Backchannel | InhibitGaze | Condition | SteerOrder | SwitchOrder
+    SitOrder | LeaveOrder | LookOrder | PointAt | MoveHead | Move | Speak | Type
+    | Tell | Prepared | BackchannelOrder | InhibitGaze | ConditionOrder | SteerOrder | SwitchOrder
 )  # fmt: skip
 
 
@@ -221,12 +221,12 @@ def decoded_in_recording(text: str | bytes | msgspec.Raw) -> Play:
         raise InputRefused(Fault(reason="it can only be played", where="this is a recording")) from error
 
 
-def panel(order: Order) -> Panel:
+def panel(order: PageOrder) -> Panel:
     """The panel in which an order is given."""
     return "part" if order.needs == "seat" else "wizard"
 
 
-def server(order: Order) -> str:
+def server(order: PageOrder) -> str:
     """The service that carries an order out; empty: none has to."""
     match order:
         case SteerOrder():
@@ -259,7 +259,7 @@ def denied(role: str, trusted: bool, *, keyed: bool = False) -> dict[str, str]:
     return found
 
 
-def written(order: Order) -> str:
+def written(order: PageOrder) -> str:
     """An order in words, for the log, without what is said."""
     match order:
         case Tell(text=text, target=target, asks=asks):
@@ -267,11 +267,11 @@ def written(order: Order) -> str:
             return f"{'asks' if asks else 'says'} {len(text)} characters{about}"
         case Prepared(number=number):
             return f"performs fragment {number + 1} of the script"
-        case Backchannel(how=how):
+        case BackchannelOrder(how=how):
             return f"backchannel: {how}"
         case InhibitGaze(on=on, mode=mode, target=target):
             return f"keeps the gaze {GAZE[mode]}{target}" if on else "lets the gaze go"
-        case Condition(name=name, speech_only=speech_only):
+        case ConditionOrder(name=name, speech_only=speech_only):
             return f"condition: {words(name, speech_only)}"
         case SteerOrder(to=to):
             return to

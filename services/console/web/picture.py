@@ -34,8 +34,8 @@ from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
 from engage_hri.services.console.web.looking import plainly
 from engage_hri.services.console.web.measures import Measures
-from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, Utterance
-from engage_hri.services.console.web.turns import Turns
+from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
+from engage_hri.services.console.web.turns import ShownTurns
 from engage_hri.services.runtime.absent import Acquaintances
 
 CHOICES_KEPT = 40
@@ -75,7 +75,7 @@ class Picture:
         self._head_since = began
         self._events = EventLanes()
         self._blocks = BlockLanes()
-        self._turns = Turns()
+        self._turns = ShownTurns()
         self._nets: nets.Nets = {}
         self._structures: dict[str, object] = {}
         self._measures = Measures()
@@ -334,7 +334,7 @@ class Picture:
         }
         return made[name]()
 
-    def _words(self) -> list[Utterance]:
+    def _words(self) -> list[UtteranceShown]:
         holds = [each.hold for each in self._scene.held]
         return self._turns.shown(self._scene.said, holds, self.zero)
 

@@ -7,11 +7,11 @@ from msgspec.structs import replace
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Sample
 from engage_hri.services.console.heard import Heard
-from engage_hri.services.console.web.frames import Place
+from engage_hri.services.console.web.frames import PlaybackPlace
 from engage_hri.services.console.web.picture import Picture
-from engage_hri.services.recording.player import Player, Timeline
+from engage_hri.services.recording.player import Playback, Timeline
 from engage_hri.services.recording.reading import Recording, received
-from engage_hri.services.recording.times import Times
+from engage_hri.services.recording.times import RecordingTimes
 
 BEFORE: Seconds = 30.0
 """Time before a place that is played at once when somebody goes there: what the lanes and the words still show."""
@@ -22,8 +22,8 @@ class PlayedPicture:
 
     def __init__(self, recording: Recording, now: Seconds) -> None:
         self._recording = recording
-        self._times = Times(recording)
-        self._player = Player(recording, now)
+        self._times = RecordingTimes(recording)
+        self._player = Playback(recording, now)
         self.visit = 0
         self._begin()
 
@@ -32,10 +32,10 @@ class PlayedPicture:
         self.picture = Picture(self._recording.robot, 0.0)
         self._heard = Heard(self._recording.robot, self._recording.clock, self._times.at, self._times.told)
 
-    def place(self, now: Seconds) -> Place:
+    def place(self, now: Seconds) -> PlaybackPlace:
         """Place where it is now."""
         at, player = self._player.at(now), self._player
-        return Place(floor(at * 1000) / 1000, player.end, player.is_paused, player.speed, self.visit)
+        return PlaybackPlace(floor(at * 1000) / 1000, player.end, player.is_paused, player.speed, self.visit)
 
     def advance(self, now: Seconds) -> None:
         """Take what is due."""

@@ -17,7 +17,7 @@ MOST = 1000
 """Number of news that wait for a page that draws nothing; it may give no more orders then."""
 
 
-class Told(Struct, frozen=True, omit_defaults=True):
+class OrderNews(Struct, frozen=True, omit_defaults=True):
     """News of an order for who gave it. number: of the news; a page that has seen it does not show it again.
 
     refused: number of the order that was not done for the reason in `text`; 0: none was refused.
@@ -38,7 +38,7 @@ class Receipts:
     def __init__(self, session: str = "") -> None:
         self.session = session
         self.taken = 0
-        self._news: deque[Told] = deque()
+        self._news: deque[OrderNews] = deque()
         self._told = 0
         """Number of the last news."""
         self._shown = 0
@@ -58,9 +58,9 @@ class Receipts:
     def tell(self, panel: Panel, text: str, *, refused: int = 0) -> None:
         """Tell the page something about an order. refused: the number of one that is not done."""
         self._told += 1
-        self._news.append(Told(self._told, panel, text, refused))
+        self._news.append(OrderNews(self._told, panel, text, refused))
 
-    def news(self) -> tuple[Told, ...]:
+    def news(self) -> tuple[OrderNews, ...]:
         """All news for the next frame: those of which it is not known that they were drawn."""
         self._shown = self._told
         return tuple(self._news)

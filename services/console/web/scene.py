@@ -4,7 +4,7 @@ from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.units import Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
-from engage_hri.services.console.web.sections import Above, Arm, Body, Person, SceneSection, Thing
+from engage_hri.services.console.web.sections import Above, Arm, BodyShown, PersonShown, SceneSection, Thing
 from engage_hri.services.recording import above
 
 HALF_ANGLE: Radians = 0.1
@@ -23,7 +23,7 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,
         things=tuple(_thing(entity) for entity in entities if entity.kind != "person"),
         people=shown,
-        above=Above(above.RIGHT, above.DOWN, above.Frame(*map(_short, edges))),
+        above=Above(above.RIGHT, above.DOWN, above.PictureEdges(*map(_short, edges))),
     )
 
 
@@ -40,12 +40,12 @@ def _thing(entity: Entity) -> Thing:
     )  # fmt: skip
 
 
-def _person(actor: Actor, at: Vector | None) -> Person:
+def _person(actor: Actor, at: Vector | None) -> PersonShown:
     def targets(action: str) -> tuple[str, ...]:
         return tuple(target for doing in actor.doing if doing.action == action for target in doing.targets)
 
     doing = {each.action for each in actor.doing}
-    return Person(
+    return PersonShown(
         id=actor.id, at=None if at is None else _place(at), present=actor.present,
         looks=actor.look.targets if actor.look is not None else None,
         points=targets("point"), acts=targets("act") or (("",) if "act" in doing else ()),
@@ -53,13 +53,13 @@ def _person(actor: Actor, at: Vector | None) -> Person:
     )  # fmt: skip
 
 
-def _body(state: RobotState, actor: Actor, body: Capabilities | None) -> Body:
+def _body(state: RobotState, actor: Actor, body: Capabilities | None) -> BodyShown:
     arms = [
         Arm(side, _place(ray.origin), _place(ray.tip or ray.origin))
         for side, ray in (("left", state.left_arm), ("right", state.right_arm))
         if ray is not None
     ]
-    return Body(
+    return BodyShown(
         eyes=_place(state.gaze.origin) if state.gaze else None,
         gaze=_place(state.gaze.axis) if state.gaze else None,
         spread=_short((body.gaze_half_angle if body else HALF_ANGLE) + (state.gaze.error if state.gaze else 0.0)),

@@ -31,7 +31,7 @@ class Thing(Struct, frozen=True):
     owner: str
 
 
-class Person(Struct, frozen=True):
+class PersonShown(Struct, frozen=True):
     """A person. at: the face; None: the world does not say where.
 
     looks: ids of what they look at; empty: away; None: nobody says. points, acts: ids. present: False: gone.
@@ -55,7 +55,7 @@ class Arm(Struct, frozen=True):
     hand: Vector
 
 
-class Body(Struct, frozen=True):
+class BodyShown(Struct, frozen=True):
     """The robot's body. eyes, gaze: place and direction; None: it has no eyes. spread: half the gaze cone's angle.
 
     points: ids of what it points at. joints: angles by name, of the face a share of the way.
@@ -86,9 +86,9 @@ class SceneSection(Struct, frozen=True):
     """Scene in space. robot: its actor id. body: None: nothing is known of it yet. above: its view from above."""
 
     robot: str
-    body: Body | None
+    body: BodyShown | None
     things: tuple[Thing, ...]
-    people: tuple[Person, ...]
+    people: tuple[PersonShown, ...]
     above: Above
 
 
@@ -99,7 +99,7 @@ class Left(Struct, frozen=True):
     words: str
 
 
-class Utterance(Struct, frozen=True):
+class UtteranceShown(Struct, frozen=True):
     """A turn of an actor, as far as it is said. words: empty: they are not known. open: it goes on.
 
     settled: characters of the words that will not change any more. left: words that were not said, or not yet.

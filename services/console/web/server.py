@@ -30,8 +30,8 @@ from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.receipts import Receipts
-from engage_hri.services.console.web.service import Window
-from engage_hri.services.console.web.sessions import CLOSED, Session, Sessions
+from engage_hri.services.console.web.service import WindowServer
+from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
 
@@ -66,7 +66,7 @@ NO_TEXT = 1003
 """Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
 
-def application(window: Window, hosts: Hosts, token: str, pages: Path | None = None) -> App:
+def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | None = None) -> App:
     """The page and its frames, for requests that name one of these hosts.
 
     pages: a folder of pages of somebody else, which may listen to the messages. token: who takes part has it in the
@@ -196,7 +196,7 @@ async def _shown(browser: WebSocket, sessions: Sessions, trusted: bool) -> None:
         await sessions.part(session, link, code)
 
 
-async def _show(browser: WebSocket, session: Session) -> None:
+async def _show(browser: WebSocket, session: PageSession) -> None:
     """Send frames until the browser has made another link. Raises WebSocketDisconnect when it has gone."""
     viewer, drawn, receipts = Viewer(), asyncio.Event(), session.receipts
 
@@ -262,7 +262,7 @@ class _Played:
         return viewer.frame(self._played.picture, place.at, self._you, self._receipts, place, now)
 
 
-async def _tell(window: Window, program: WebSocket, outbox: Outbox) -> None:
+async def _tell(window: WindowServer, program: WebSocket, outbox: Outbox) -> None:
     """Send messages until the program has gone. Raises WebSocketDisconnect then."""
     news = asyncio.Event()
 

@@ -36,7 +36,7 @@ PATIENCE: Seconds = 1.0
 """Time that they have to answer."""
 
 
-class Window:
+class WindowServer:
     """The picture of a robot's bus, kept up to date, and what people need who take part.
 
     keyed: its role is that of its keys. viewers: number of browsers; while there is none, services are not asked how
@@ -137,19 +137,19 @@ class Window:
 @asynccontextmanager
 async def window(
     hub: Hub, bus: Bus, script: Script, *, keyed: bool = False, began: Seconds | None = None
-) -> AsyncIterator[Window]:
+) -> AsyncIterator[WindowServer]:
     """Follow the bus while the body of `async with` runs. bus: the window's own, with its role.
 
     keyed: the role is that of its keys. began: the instant of this machine that counts as zero; None: now.
     """
     async with Robot.on(bus) as robot:
-        shown = Window(hub, bus, robot, script, keyed=keyed, began=began)
+        shown = WindowServer(hub, bus, robot, script, keyed=keyed, began=began)
         async with _following(shown):
             yield shown
 
 
 @asynccontextmanager
-async def _following(shown: Window) -> AsyncIterator[None]:
+async def _following(shown: WindowServer) -> AsyncIterator[None]:
     async with following(shown.bus, (shown,), patterns=PATTERNS):
         with shown.bus.subscribe(keys.ANY_PERCEIVED_ONGOING) as reports:
             looking = asyncio.create_task(shown.look_after(), name="status")

@@ -33,7 +33,7 @@ class Guest(Protocol):
         """The next frame for this viewer; None: there is none."""
 
 
-class Session:
+class PageSession:
     """One page. links: number of its links so far; only the last one counts."""
 
     def __init__(self, receipts: Receipts, guest: Guest, trusted: bool) -> None:
@@ -58,9 +58,9 @@ class Sessions:
     def __init__(self, make: Callable[[Receipts, bool], Guest], most: int) -> None:
         self._make = make
         self._most = most
-        self._known: dict[str, Session] = {}
+        self._known: dict[str, PageSession] = {}
 
-    async def enter(self, id: str, trusted: bool) -> Session | None:
+    async def enter(self, id: str, trusted: bool) -> PageSession | None:
         """The session of a page that opens a link; None: there is no room for it.
 
         id: of the session that the page says that it had; empty: none. trusted: it has the token of the window.
@@ -74,11 +74,11 @@ class Sessions:
             if len(self._known) >= self._most and not await self._make_room():
                 return None
             receipts = Receipts(secrets.token_urlsafe(12))
-            session = self._known[receipts.session] = Session(receipts, self._make(receipts, trusted), trusted)
+            session = self._known[receipts.session] = PageSession(receipts, self._make(receipts, trusted), trusted)
         session.links += 1
         return session
 
-    async def part(self, session: Session, link: int, code: int) -> None:
+    async def part(self, session: PageSession, link: int, code: int) -> None:
         """Take note that a link has ended. link: its number. code: of RFC 6455, with which it did."""
         if session.links != link or session.receipts.session not in self._known:
             return
@@ -100,7 +100,7 @@ class Sessions:
             await self._end(session)
         return session is not None
 
-    async def _end(self, session: Session, after: Seconds = 0.0) -> None:
+    async def _end(self, session: PageSession, after: Seconds = 0.0) -> None:
         if after:
             await asyncio.sleep(after)
         elif session.ending is not None:

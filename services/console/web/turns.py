@@ -20,7 +20,7 @@ from engage_hri.schemas.speakable import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.view import OWN_BLOCKS, UtteranceInView
 from engage_hri.services.console.web.lanes import Zero
-from engage_hri.services.console.web.sections import Left, Utterance
+from engage_hri.services.console.web.sections import Left, UtteranceShown
 
 TURNS_KEPT = 30
 BLOCKS_KEPT = 160
@@ -56,7 +56,7 @@ class _Piece(NamedTuple):
     is_over: bool
 
 
-class Turns:
+class ShownTurns:
     """The blocks of which words may be shown."""
 
     def __init__(self) -> None:
@@ -114,7 +114,7 @@ class Turns:
 
     # -- what is shown --------------------------------------------------------------------------------------------
 
-    def shown(self, said: Iterable[UtteranceInView], holds: Collection[Hold], zero: Zero) -> list[Utterance]:
+    def shown(self, said: Iterable[UtteranceInView], holds: Collection[Hold], zero: Zero) -> list[UtteranceShown]:
         """Turns of all speakers, the oldest first. said: speeches, in any order. holds: those in force."""
         speeches = sorted(said, key=lambda each: each.began)
         turns = dict[object, list[tuple[UtteranceInView, _Block | None]]]()
@@ -124,12 +124,12 @@ class Turns:
         return [_turn(parts, holds, zero) for parts in list(turns.values())[-TURNS_KEPT:]]
 
 
-def _turn(parts: list[tuple[UtteranceInView, _Block | None]], holds: Collection[Hold], zero: Zero) -> Utterance:
+def _turn(parts: list[tuple[UtteranceInView, _Block | None]], holds: Collection[Hold], zero: Zero) -> UtteranceShown:
     """One turn. parts: its speeches, by their beginning."""
     first, begun_in = parts[0]
     if begun_in is None:
         settled = 0 if first.open else len(first.text)
-        return Utterance(first.actor, zero(first.began), first.text, first.open, settled)
+        return UtteranceShown(first.actor, zero(first.began), first.text, first.open, settled)
     blocks = list(dict.fromkeys(block for _, block in parts if block is not None))
     pieces, states = list[_Piece](), list[State]()
     for block in blocks:
@@ -140,7 +140,7 @@ def _turn(parts: list[tuple[UtteranceInView, _Block | None]], holds: Collection[
         states += [state] if state == "held" or any(not each.is_said for each in found) else []
     words, left, settled = _put_together(pieces)
     is_open = any(each.open for each, _ in parts) or not all(block.status for block in blocks)
-    return Utterance(first.actor, zero(first.began), words, is_open, settled, left, states[-1] if states else "")
+    return UtteranceShown(first.actor, zero(first.began), words, is_open, settled, left, states[-1] if states else "")
 
 
 def _state(block: _Block, holds: Collection[Hold]) -> State:

@@ -24,7 +24,7 @@ from engage_hri.services.console.web.frames import Viewer, You
 from engage_hri.services.console.web.laying import laid
 from engage_hri.services.console.web.receipts import Panel, Receipts
 from engage_hri.services.console.web.seats import SETTLED
-from engage_hri.services.console.web.service import Window
+from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.text.pieces import Ids
 
 REACH: Seconds = 0.9
@@ -36,7 +36,7 @@ PATIENCE: Seconds = 5.0
 class Visitor:
     """The one at a browser. trusted: the page was called with the token of the window."""
 
-    def __init__(self, window: Window, trusted: bool, receipts: Receipts) -> None:
+    def __init__(self, window: WindowServer, trusted: bool, receipts: Receipts) -> None:
         self._window = window
         self.receipts = receipts
         self._denied = orders.denied(window.bus.role, trusted, keyed=window.keyed)
@@ -95,7 +95,7 @@ class Visitor:
     # -- a person -------------------------------------------------------------------------------------------------
 
     def _be(self, order: orders.SeatOrder) -> None:
-        if isinstance(order, orders.Sit):
+        if isinstance(order, orders.SitOrder):
             if self._sitting is not None and not self._sitting.done():
                 raise InputRefused(Fault(reason="you have a seat, or are about to", advice="leave it first"))
             self._stands_up.clear()
@@ -104,9 +104,9 @@ class Visitor:
         if self._person is None:
             raise InputRefused(Fault(reason="you have no seat", advice="take a seat first"))
         match order:
-            case orders.Leave():
+            case orders.LeaveOrder():
                 self._stands_up.set()
-            case orders.LookAt(target=target):
+            case orders.LookOrder(target=target):
                 self._person.begin("look", target)
             case orders.PointAt(target=target):
                 self._begin(self._person.point_at(target))
@@ -169,7 +169,7 @@ class Visitor:
 
     # -- the robot by hand ----------------------------------------------------------------------------------------
 
-    def _drive(self, order: orders.Order) -> None:
+    def _drive(self, order: orders.PageOrder) -> None:
         by = getattr(order, "by", "") or "somebody"
         self._window.log(f"{by}: {orders.written(order)}")
         if (server := orders.server(order)) and not self._window.picture.has(server):
@@ -188,7 +188,7 @@ class Visitor:
                 if number >= len(self._window.script):
                     raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))
                 self._drives(self._perform(self._window.script.take(number, addressee)))
-            case orders.Backchannel(how=how, addressee=addressee):
+            case orders.BackchannelOrder(how=how, addressee=addressee):
                 self._drives(self._perform(script.backchannel(how, addressee)))
             case orders.InhibitGaze(on=True, mode=mode, target=target):
                 if self._inhibits:
@@ -206,7 +206,7 @@ class Visitor:
             case orders.SwitchOrder(fault=fault, off=off):
                 switch = robot.switch_off if off else robot.switch_on
                 self._drives(_done(switch(fault, timeout=PATIENCE)))
-            case orders.Condition(name=name, speech_only=speech_only, by=who):
+            case orders.ConditionOrder(name=name, speech_only=speech_only, by=who):
                 named = name.strip()
                 self._drives(_done(robot.set_condition(named, speech_only=speech_only, by=who, timeout=PATIENCE)))
 

@@ -7,36 +7,43 @@ that comes while the turn still goes on is known at once, but decided only when 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent, Row, table
+from engage_hri.services.recognition.events.machine import (
+    IDLE,
+    EventWriter,
+    Machine,
+    OngoingEvent,
+    TransitionRow,
+    table,
+)
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
 
 TABLE = table(
-    Row(IDLE, "robot_asks", ROBOT_WAITING, ("started",)),
-    Row(IDLE, "human_asks", HUMAN_WAITING, ("started",)),
-    Row(IDLE, "third_turn", IDLE),
-    Row(ROBOT_WAITING, "turn_ends", ROBOT_WAITING),
-    Row(ROBOT_WAITING, "responder_interrupts", INTERRUPTED),
-    Row(ROBOT_WAITING, "human_answers", RESPONDING, ("succeeded",)),
-    Row(ROBOT_WAITING, "repaired", IDLE, ("succeeded", "completed")),
-    Row(ROBOT_WAITING, "limit", IDLE, ("failed",)),
-    Row(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
-    Row(ROBOT_WAITING, "person_gone", IDLE, ("failed",)),
-    Row(ROBOT_WAITING, "supersede", IDLE, ("superseded",)),
-    Row(HUMAN_WAITING, "turn_ends", HUMAN_WAITING),
-    Row(HUMAN_WAITING, "turn_goes_on", HUMAN_WAITING),
-    Row(HUMAN_WAITING, "responder_interrupts", INTERRUPTED),
-    Row(HUMAN_WAITING, "robot_answers", RESPONDING, ("succeeded",)),
-    Row(HUMAN_WAITING, "limit", IDLE, ("failed",)),
-    Row(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
-    Row(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
-    Row(INTERRUPTED, "turn_ends", RESPONDING, ("succeeded",)),
-    Row(INTERRUPTED, "was_listening", ROBOT_WAITING),
-    Row(RESPONDING, "response_ends", IDLE, ("completed",)),
-    Row(RESPONDING, "repaired", IDLE, ("completed",)),
-    Row(RESPONDING, "supersede", IDLE, ("completed",)),
-    Row(RESPONDING, "person_gone", IDLE, ("completed",)),
+    TransitionRow(IDLE, "robot_asks", ROBOT_WAITING, ("started",)),
+    TransitionRow(IDLE, "human_asks", HUMAN_WAITING, ("started",)),
+    TransitionRow(IDLE, "third_turn", IDLE),
+    TransitionRow(ROBOT_WAITING, "turn_ends", ROBOT_WAITING),
+    TransitionRow(ROBOT_WAITING, "responder_interrupts", INTERRUPTED),
+    TransitionRow(ROBOT_WAITING, "human_answers", RESPONDING, ("succeeded",)),
+    TransitionRow(ROBOT_WAITING, "repaired", IDLE, ("succeeded", "completed")),
+    TransitionRow(ROBOT_WAITING, "limit", IDLE, ("failed",)),
+    TransitionRow(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
+    TransitionRow(ROBOT_WAITING, "person_gone", IDLE, ("failed",)),
+    TransitionRow(ROBOT_WAITING, "supersede", IDLE, ("superseded",)),
+    TransitionRow(HUMAN_WAITING, "turn_ends", HUMAN_WAITING),
+    TransitionRow(HUMAN_WAITING, "turn_goes_on", HUMAN_WAITING),
+    TransitionRow(HUMAN_WAITING, "responder_interrupts", INTERRUPTED),
+    TransitionRow(HUMAN_WAITING, "robot_answers", RESPONDING, ("succeeded",)),
+    TransitionRow(HUMAN_WAITING, "limit", IDLE, ("failed",)),
+    TransitionRow(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
+    TransitionRow(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
+    TransitionRow(INTERRUPTED, "turn_ends", RESPONDING, ("succeeded",)),
+    TransitionRow(INTERRUPTED, "was_listening", ROBOT_WAITING),
+    TransitionRow(RESPONDING, "response_ends", IDLE, ("completed",)),
+    TransitionRow(RESPONDING, "repaired", IDLE, ("completed",)),
+    TransitionRow(RESPONDING, "supersede", IDLE, ("completed",)),
+    TransitionRow(RESPONDING, "person_gone", IDLE, ("completed",)),
 )
 
 

@@ -5,22 +5,29 @@ whether it was one; longer speech is a change of floor, and so is speech that ou
 """
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent, Row, table
+from engage_hri.services.recognition.events.machine import (
+    IDLE,
+    EventWriter,
+    Machine,
+    OngoingEvent,
+    TransitionRow,
+    table,
+)
 
 UNDECIDED, BRIEF = "undecided", "brief"
 
 TABLE = table(
-    Row(IDLE, "speaks", UNDECIDED),
-    Row(IDLE, "gestures", BRIEF, ("started", "succeeded")),
-    Row(IDLE, "announced", BRIEF, ("started", "succeeded")),
-    Row(UNDECIDED, "ends", IDLE, ("started", "succeeded", "completed")),
-    Row(UNDECIDED, "limit", IDLE),
-    Row(UNDECIDED, "words", IDLE),
-    Row(UNDECIDED, "outlasts_turn", IDLE),
-    Row(UNDECIDED, "announced", BRIEF, ("started", "succeeded")),
-    Row(UNDECIDED, "person_gone", IDLE),
-    Row(BRIEF, "ends", IDLE, ("completed",)),
-    Row(BRIEF, "person_gone", IDLE, ("completed",)),
+    TransitionRow(IDLE, "speaks", UNDECIDED),
+    TransitionRow(IDLE, "gestures", BRIEF, ("started", "succeeded")),
+    TransitionRow(IDLE, "announced", BRIEF, ("started", "succeeded")),
+    TransitionRow(UNDECIDED, "ends", IDLE, ("started", "succeeded", "completed")),
+    TransitionRow(UNDECIDED, "limit", IDLE),
+    TransitionRow(UNDECIDED, "words", IDLE),
+    TransitionRow(UNDECIDED, "outlasts_turn", IDLE),
+    TransitionRow(UNDECIDED, "announced", BRIEF, ("started", "succeeded")),
+    TransitionRow(UNDECIDED, "person_gone", IDLE),
+    TransitionRow(BRIEF, "ends", IDLE, ("completed",)),
+    TransitionRow(BRIEF, "person_gone", IDLE, ("completed",)),
 )
 
 

@@ -5,32 +5,32 @@ matters only for the length of the shared phase. If the person looks there first
 its way, the shared phase begins when the head arrives.
 """
 
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Row, table
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, TransitionRow, table
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
 ROBOT_DIRECTING, HUMAN_DIRECTING, SHARED = "robot_directing", "human_directing", "shared"
 
 TABLE = table(
-    Row(IDLE, "robot_directs", ROBOT_DIRECTING, ("started",)),
-    Row(IDLE, "robot_directs_shared", SHARED, ("started", "succeeded")),
-    Row(IDLE, "human_directs", HUMAN_DIRECTING, ("started",)),
-    Row(IDLE, "human_directs_shared", SHARED, ("started", "succeeded")),
-    Row(IDLE, "human_directs_in_vain", IDLE, ("started", "preempted")),
-    Row(ROBOT_DIRECTING, "human_follows", SHARED, ("succeeded",)),
-    Row(ROBOT_DIRECTING, "robot_leaves", ROBOT_DIRECTING),
-    Row(ROBOT_DIRECTING, "limit", IDLE, ("failed",)),
-    Row(ROBOT_DIRECTING, "person_gone", IDLE, ("failed",)),
-    Row(ROBOT_DIRECTING, "withdraw", IDLE, ("withdrawn",)),
-    Row(ROBOT_DIRECTING, "supersede", IDLE, ("superseded",)),
-    Row(HUMAN_DIRECTING, "robot_follows", SHARED, ("succeeded",)),
-    Row(HUMAN_DIRECTING, "human_leaves", HUMAN_DIRECTING),
-    Row(HUMAN_DIRECTING, "limit", IDLE, ("failed",)),
-    Row(HUMAN_DIRECTING, "person_gone", IDLE, ("withdrawn",)),
-    Row(HUMAN_DIRECTING, "fragment_takes_head", IDLE, ("preempted",)),
-    Row(HUMAN_DIRECTING, "supersede", IDLE, ("superseded",)),
-    Row(SHARED, "part", IDLE, ("completed",)),
-    Row(SHARED, "supersede", IDLE, ("completed",)),
-    Row(SHARED, "person_gone", IDLE, ("completed",)),
+    TransitionRow(IDLE, "robot_directs", ROBOT_DIRECTING, ("started",)),
+    TransitionRow(IDLE, "robot_directs_shared", SHARED, ("started", "succeeded")),
+    TransitionRow(IDLE, "human_directs", HUMAN_DIRECTING, ("started",)),
+    TransitionRow(IDLE, "human_directs_shared", SHARED, ("started", "succeeded")),
+    TransitionRow(IDLE, "human_directs_in_vain", IDLE, ("started", "preempted")),
+    TransitionRow(ROBOT_DIRECTING, "human_follows", SHARED, ("succeeded",)),
+    TransitionRow(ROBOT_DIRECTING, "robot_leaves", ROBOT_DIRECTING),
+    TransitionRow(ROBOT_DIRECTING, "limit", IDLE, ("failed",)),
+    TransitionRow(ROBOT_DIRECTING, "person_gone", IDLE, ("failed",)),
+    TransitionRow(ROBOT_DIRECTING, "withdraw", IDLE, ("withdrawn",)),
+    TransitionRow(ROBOT_DIRECTING, "supersede", IDLE, ("superseded",)),
+    TransitionRow(HUMAN_DIRECTING, "robot_follows", SHARED, ("succeeded",)),
+    TransitionRow(HUMAN_DIRECTING, "human_leaves", HUMAN_DIRECTING),
+    TransitionRow(HUMAN_DIRECTING, "limit", IDLE, ("failed",)),
+    TransitionRow(HUMAN_DIRECTING, "person_gone", IDLE, ("withdrawn",)),
+    TransitionRow(HUMAN_DIRECTING, "fragment_takes_head", IDLE, ("preempted",)),
+    TransitionRow(HUMAN_DIRECTING, "supersede", IDLE, ("superseded",)),
+    TransitionRow(SHARED, "part", IDLE, ("completed",)),
+    TransitionRow(SHARED, "supersede", IDLE, ("completed",)),
+    TransitionRow(SHARED, "person_gone", IDLE, ("completed",)),
 )
 
 

@@ -17,7 +17,7 @@ from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
 
 
-class Forgotten(NamedTuple):
+class PersonForgotten(NamedTuple):
     """A person has been gone for long and is forgotten. The same id then means a new person."""
 
     actor: str
@@ -36,7 +36,7 @@ class Mishap(NamedTuple):
 
 TEXTS_KEPT = 64
 """Number of speeches whose words, and of events with speech, that are remembered."""
-Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused | Forgotten | Mishap
+Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused | PersonForgotten | Mishap
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
 DECIDED: frozenset[EventState] = DECISIONS | {"lost"}
@@ -50,7 +50,7 @@ class UndefinedTransition(Exception):
     """An input for which the table has no row in the present state. Nothing has changed."""
 
 
-class Row(NamedTuple):
+class TransitionRow(NamedTuple):
     """A transition: in `state`, the input `given` leads to state `next`."""
 
     state: str
@@ -59,10 +59,10 @@ class Row(NamedTuple):
     publishes: tuple[EventState, ...] = ()
 
 
-Table = Mapping[tuple[str, str], Row]
+Table = Mapping[tuple[str, str], TransitionRow]
 
 
-def table(*rows: Row) -> Table:
+def table(*rows: TransitionRow) -> Table:
     """Rows by state and input. Raises ValueError if two rows answer the same input."""
     by_input = {(row.state, row.given): row for row in rows}
     if len(by_input) != len(rows):

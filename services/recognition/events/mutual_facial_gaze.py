@@ -5,33 +5,33 @@ the face since the request; before that its gaze is still on the way.
 """
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.recognition.events.machine import IDLE, Row, table
+from engage_hri.services.recognition.events.machine import IDLE, TransitionRow, table
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
 ROBOT_WAITING, HUMAN_WAITING, MUTUAL = "robot_waiting", "human_waiting", "mutual"
 
 TABLE = table(
-    Row(IDLE, "robot_looks", ROBOT_WAITING, ("started",)),
-    Row(IDLE, "robot_looks_mutual", MUTUAL, ("started", "succeeded")),
-    Row(IDLE, "human_looks", HUMAN_WAITING, ("started",)),
-    Row(IDLE, "human_looks_mutual", MUTUAL, ("started", "succeeded")),
-    Row(IDLE, "human_looks_in_vain", IDLE, ("started", "preempted")),
-    Row(ROBOT_WAITING, "human_answers", MUTUAL, ("succeeded",)),
-    Row(ROBOT_WAITING, "limit", IDLE, ("failed",)),
-    Row(ROBOT_WAITING, "robot_leaves", IDLE, ("withdrawn",)),
-    Row(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
-    Row(ROBOT_WAITING, "person_gone", IDLE, ("failed",)),
-    Row(ROBOT_WAITING, "supersede", IDLE, ("superseded",)),
-    Row(HUMAN_WAITING, "robot_answers", MUTUAL, ("succeeded",)),
-    Row(HUMAN_WAITING, "limit", IDLE, ("failed",)),
-    Row(HUMAN_WAITING, "human_leaves", IDLE, ("failed",)),
-    Row(HUMAN_WAITING, "fragment_takes_head", IDLE, ("preempted",)),
-    Row(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
-    Row(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
-    Row(MUTUAL, "part", IDLE, ("completed",)),
-    Row(MUTUAL, "directed_gaze_begins", IDLE, ("completed",)),
-    Row(MUTUAL, "supersede", IDLE, ("completed",)),
-    Row(MUTUAL, "person_gone", IDLE, ("completed",)),
+    TransitionRow(IDLE, "robot_looks", ROBOT_WAITING, ("started",)),
+    TransitionRow(IDLE, "robot_looks_mutual", MUTUAL, ("started", "succeeded")),
+    TransitionRow(IDLE, "human_looks", HUMAN_WAITING, ("started",)),
+    TransitionRow(IDLE, "human_looks_mutual", MUTUAL, ("started", "succeeded")),
+    TransitionRow(IDLE, "human_looks_in_vain", IDLE, ("started", "preempted")),
+    TransitionRow(ROBOT_WAITING, "human_answers", MUTUAL, ("succeeded",)),
+    TransitionRow(ROBOT_WAITING, "limit", IDLE, ("failed",)),
+    TransitionRow(ROBOT_WAITING, "robot_leaves", IDLE, ("withdrawn",)),
+    TransitionRow(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
+    TransitionRow(ROBOT_WAITING, "person_gone", IDLE, ("failed",)),
+    TransitionRow(ROBOT_WAITING, "supersede", IDLE, ("superseded",)),
+    TransitionRow(HUMAN_WAITING, "robot_answers", MUTUAL, ("succeeded",)),
+    TransitionRow(HUMAN_WAITING, "limit", IDLE, ("failed",)),
+    TransitionRow(HUMAN_WAITING, "human_leaves", IDLE, ("failed",)),
+    TransitionRow(HUMAN_WAITING, "fragment_takes_head", IDLE, ("preempted",)),
+    TransitionRow(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
+    TransitionRow(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
+    TransitionRow(MUTUAL, "part", IDLE, ("completed",)),
+    TransitionRow(MUTUAL, "directed_gaze_begins", IDLE, ("completed",)),
+    TransitionRow(MUTUAL, "supersede", IDLE, ("completed",)),
+    TransitionRow(MUTUAL, "person_gone", IDLE, ("completed",)),
 )
 
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import EventWriter, Forgotten, Mishap
-from engage_hri.services.recognition.events.person import Person
+from engage_hri.services.recognition.events.machine import EventWriter, Mishap, PersonForgotten
+from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
@@ -20,8 +20,8 @@ class People:
     """The persons of a session. strict: a bug with one raises; else it ends that person's events (see `Session`)."""
 
     def __init__(self, scene: SessionScene, config: RecognitionConfig, writer: EventWriter, *, strict: bool) -> None:
-        self.persons: dict[str, Person] = {}
-        self._here: dict[str, Person] = {}
+        self.persons: dict[str, PersonRecognition] = {}
+        self._here: dict[str, PersonRecognition] = {}
         """Persons who are here, in the order of acquaintance."""
         self._agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number)
         self._unseen: dict[str, Seconds] = {}
@@ -36,11 +36,11 @@ class People:
 
     # -- acquaintances ------------------------------------------------------------------------------------------
 
-    def person(self, id: str) -> Person:
+    def person(self, id: str) -> PersonRecognition:
         """The person with this id, made if it is new."""
         if id not in self.persons:
             self._met += 1
-            person = Person(id, self._met, self._scene, self._config, self._writer)
+            person = PersonRecognition(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
         return self.persons[id]
 
@@ -55,7 +55,7 @@ class People:
             self._note(self.persons[id], at)
         self.apply_to_all(at, lambda person: None)  # an entity may have become known as an object
 
-    def _note(self, person: Person, at: Seconds) -> None:
+    def _note(self, person: PersonRecognition, at: Seconds) -> None:
         """Note a sign of the person, or its leaving, at `at`."""
         self._unseen.pop(person.id, None)
         reported = person.presence.here and person.presence.reported
@@ -75,12 +75,12 @@ class People:
             self._agenda.clear(id)
             self._here.pop(id, None)
             del self.persons[id], self._unseen[id]
-            self._writer.effects.append(Forgotten(id))
+            self._writer.effects.append(PersonForgotten(id))
             self._follow_speech(now)
 
-    def lose_track(self, person: Person, at: Seconds) -> None:
+    def lose_track(self, person: PersonRecognition, at: Seconds) -> None:
         """Begin anew with a person: its open events end as lost, and its actions have to be observed again."""
-        fresh = Person(person.id, person.number, self._scene, self._config, self._writer)
+        fresh = PersonRecognition(person.id, person.number, self._scene, self._config, self._writer)
         fresh.presence, fresh.history = person.presence, person.history
         self.persons[person.id] = fresh
         if person.id in self._here:
@@ -104,19 +104,19 @@ class People:
         assert at is not None
         self.apply(id, at, lambda person: person.pass_time(at))
 
-    def observe(self, id: str, at: Seconds, step: Callable[[Person], object]) -> None:
+    def observe(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step that an observation of one person asks for; the person may be new."""
         person = self.person(id)
         self.apply(id, at, step)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 
-    def apply(self, id: str, at: Seconds, step: Callable[[Person], object]) -> None:
+    def apply(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to one person."""
         self._apply(self.persons[id], at, step)
         self._follow_speech(at)
 
-    def apply_to_all(self, at: Seconds, step: Callable[[Person], object]) -> None:
+    def apply_to_all(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to all who are here."""
         self._speech = self._scene.speech
         for person in list(self._here.values()):
@@ -128,7 +128,7 @@ class People:
         if self._speech != self._scene.speech:
             self.apply_to_all(at, lambda person: None)
 
-    def _apply(self, person: Person, at: Seconds, step: Callable[[Person], object]) -> None:
+    def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to one person; a bug that shows in it does not affect the others."""
         try:
             step(person)
@@ -139,7 +139,7 @@ class People:
             self._writer.effects.append(Mishap(person.id, at, error))
             self.lose_track(person, at)
 
-    def _update(self, person: Person) -> None:
+    def _update(self, person: PersonRecognition) -> None:
         """Note when the person is due, and whether it is here."""
         self._agenda.set(person.id, person.deadline)
         here, was_here = person.presence.here, person.id in self._here

@@ -14,7 +14,7 @@ from engage_hri.services.recognition.events.history import ActionHistory
 from engage_hri.services.recognition.events.limits import LimitClock, in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
-from engage_hri.services.recognition.events.presence import Presence
+from engage_hri.services.recognition.events.presence import FacePresence
 from engage_hri.services.recognition.events.scene import GazeState, SessionScene
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
@@ -49,7 +49,7 @@ class _Doing(NamedTuple):
     until: Seconds
 
 
-class Person:
+class PersonRecognition:
     """The recognizers of one person. number: position in the order of acquaintance."""
 
     def __init__(
@@ -57,7 +57,7 @@ class Person:
     ) -> None:
         self.id = id
         self.number = number
-        self.presence = Presence()
+        self.presence = FacePresence()
         self.gaze = GazeState()
         self.directed: list[DirectedGaze] = []
         self.facial = MutualFacialGaze(writer)

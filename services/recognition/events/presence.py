@@ -12,7 +12,7 @@ from engage_hri.services.reports.action_reports import FACE_GRACE
 NEVER: Seconds = float("-inf")
 
 
-class Presence:
+class FacePresence:
     """Presence of one person."""
 
     def __init__(self) -> None:

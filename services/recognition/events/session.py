@@ -27,7 +27,7 @@ from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.people import People
-from engage_hri.services.recognition.events.person import Person
+from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
 from engage_hri.services.reports.reports import GoesOn
 
@@ -81,7 +81,7 @@ class Session:
         """The robot's actions."""
 
     @property
-    def persons(self) -> dict[str, Person]:
+    def persons(self) -> dict[str, PersonRecognition]:
         """Persons who are here, or have not been gone for long."""
         return self._people.persons
 
@@ -283,7 +283,7 @@ class Session:
             self._writer.publish(event, "started", at)
             self._writer.publish(event, "lost", at)
 
-    def _begin(self, person: Person, event: OngoingEvent, wanted: Event) -> None:
+    def _begin(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         """Begin the robot's event with this person."""
         match wanted.kind:
             case "directed_gaze":
@@ -349,14 +349,14 @@ class Session:
             clock.stop_waiting(ended)
         return clock
 
-    def _ask(self, person: Person, event: OngoingEvent, wanted: Event) -> None:
+    def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or ACCEPT
         person.conversation.robot_asks(event)
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         if turn_end is not None:
             person.conversation.turn_ends(max(turn_end, event.started))
 
-    def _announce_backchannel(self, person: Person, event: OngoingEvent) -> None:
+    def _announce_backchannel(self, person: PersonRecognition, event: OngoingEvent) -> None:
         """Begin the robot's backchannel, unless noticed already. The person holds the floor: it is the initiator."""
         event.initiator, event.responder = person.id, self.robot
         self.scene.listening_blocks[event.block] = None
@@ -397,7 +397,7 @@ class Session:
                 self._apply_to_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
 
-    def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[Person], object]) -> None:
+    def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to a known person, or to all (actor: empty)."""
         if not actor:
             self._people.apply_to_all(at, step)

@@ -25,7 +25,7 @@ from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, is_direction, is_place
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
-from engage_hri.services.recognition.perceive.speech import Voice
+from engage_hri.services.recognition.perceive.speech import SpeechDetector
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.absent import Absent
 
@@ -40,7 +40,7 @@ class _Actor:
         self.number = number
         """Position in the order in which people came."""
         self.looking = Looking()
-        self.voice = Voice()
+        self.voice = SpeechDetector()
         self.posed_at = self.heard_at = self.alive_at = NEVER
         """Times of the latest head pose and voice level, and of the latest sign of life."""
         self.seen = False

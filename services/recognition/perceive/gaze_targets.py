@@ -27,7 +27,7 @@ SAME_ANGLE: Radians = 1e-6
 ROUNDING: Meters = 1e-9
 
 
-class Seen(NamedTuple):
+class GazeTarget(NamedTuple):
     """Targets of a gaze, and the confidence that it is on them."""
 
     targets: Targets
@@ -177,7 +177,7 @@ class GazeTargets:
 
     def target(
         self, looker: str, gaze: tuple[Vector, Vector], *, present: Targets | None, at: Seconds, sure: Probability
-    ) -> Seen:
+    ) -> GazeTarget:
         """Target of `looker`'s gaze: the nearest by angle in the cone, else the surface it meets, else `AWAY`.
 
         gaze: place of the eyes and direction. present: target before, which stays unless another thing is nearer by
@@ -201,12 +201,12 @@ class GazeTargets:
             best = min(found)
             kept = min((one for one in found if one.targets == present), default=best)
             best = kept if kept.angle - best.angle < self._margin else best
-            return Seen(best.targets, best.confidence)
+            return GazeTarget(best.targets, best.confidence)
         for surface in self._surfaces:
             confidence = sure * self._confidence(surface, at)
             if confidence >= self._least and ray.meets(surface):
-                return Seen((surface.entity.id,), confidence)
-        return Seen(AWAY, sure)
+                return GazeTarget((surface.entity.id,), confidence)
+        return GazeTarget(AWAY, sure)
 
     def _around(self, gaze: _Gaze) -> list[tuple[Radians, int, _Thing]]:
         """Things that may be in the cone, as (least possible angle, number, thing), in order."""

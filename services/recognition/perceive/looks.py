@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
-from engage_hri.services.recognition.perceive.gaze_targets import Seen, Targets
+from engage_hri.services.recognition.perceive.gaze_targets import GazeTarget, Targets
 
 DWELL: Seconds = 0.15
 """Time for which the gaze stays on a target before that is a look, and off it before the look is over: a glance in
@@ -28,7 +28,7 @@ class Change(NamedTuple):
 class _Candidate(NamedTuple):
     """A look that may have begun."""
 
-    seen: Seen
+    seen: GazeTarget
     since: Seconds
 
 
@@ -51,7 +51,7 @@ class Looking:
             return self._left
         return None if self._candidate is None else self._candidate.since
 
-    def feed(self, seen: Seen, at: Seconds) -> list[Change]:
+    def feed(self, seen: GazeTarget, at: Seconds) -> list[Change]:
         """Take the gaze target at `at`, later than the last. Returns the looks that began and ended."""
         self.nearest = seen.targets
         if seen.targets == self.target:

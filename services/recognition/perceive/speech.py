@@ -14,7 +14,7 @@ VOICE_LOST: Seconds = 0.5
 """Time without a voice level after which speech has ended, at the time of the last level. Ours."""
 
 
-class Voice:
+class SpeechDetector:
     """Speech of one person."""
 
     def __init__(self) -> None:

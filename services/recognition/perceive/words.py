@@ -22,7 +22,7 @@ SPEECHES_KEPT = 64
 """Number of speeches of each person, and of utterances, that are remembered."""
 
 
-class HeardWords(Struct, frozen=True, kw_only=True):
+class TimedWords(Struct, frozen=True, kw_only=True):
     """Observation: an `Utterance`, with its times on the local clock. ended: as it was said, or when it was known."""
 
     actor: str
@@ -78,7 +78,7 @@ class _Person:
         """Note a speech that nothing but words tells of."""
         self.speeches = sorted([*self.speeches[1 - SPEECHES_KEPT :], _Speech(began, ended)], key=_since)
 
-    def speech_with(self, words: HeardWords) -> Seconds | None:
+    def speech_with(self, words: TimedWords) -> Seconds | None:
         """Start of the speech that these words belong to; None if there is none."""
         least = -ROUNDING if words.is_line else -WORDS_MARGIN - ROUNDING
         found: tuple[Seconds, Seconds] | None = None
@@ -110,7 +110,7 @@ class Words:
         elif (person := self._people.get(action.actor)) is not None:
             person.ends(at)
 
-    def hear(self, words: HeardWords, at: Seconds) -> Worded | None:
+    def hear(self, words: TimedWords, at: Seconds) -> Worded | None:
         """Take words that are known at `at`. Returns what a speech consists of now; None if they say nothing new."""
         person = self._people.get(words.actor) or _Person()
         known = person.utterances.get(words.id)
@@ -131,7 +131,7 @@ class Words:
             is_line=is_alone and words.is_line,
         )  # fmt: skip
 
-    def speech(self, words: HeardWords) -> list[ActionBegan | ActionEnded]:
+    def speech(self, words: TimedWords) -> list[ActionBegan | ActionEnded]:
         """The speech that words without any are by themselves, as actions."""
         began, ended = Stamp(self._clock, words.began), Stamp(self._clock, max(words.began, words.ended))
         return [

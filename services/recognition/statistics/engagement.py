@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 
 ENOUGH_EVENTS = 5
 """Number of connection events from which a person's own mean counts; at least 2, since one event has no time between
@@ -53,7 +53,7 @@ def next_level(level: Level, value: Probability, config: RecognitionConfig) -> L
 class Engagement:
     """Estimate for one actor (or all), from its tally."""
 
-    def __init__(self, config: RecognitionConfig, tally: Tally) -> None:
+    def __init__(self, config: RecognitionConfig, tally: EventTally) -> None:
         self.estimate = UNKNOWN
         self.busy = False
         self._config = config

@@ -7,9 +7,9 @@ from functools import partial
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import Forgotten
+from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.statistics.engagement import Engagement
-from engage_hri.services.recognition.statistics.tally import Tally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.requests.deadlines import Deadlines
 
 EVERYBODY = ""
@@ -19,7 +19,7 @@ class _ActorStatistics:
     """Counts and estimate of one person, or of all."""
 
     def __init__(self, config: RecognitionConfig, clock: str) -> None:
-        self.tally = Tally(config.window, clock)
+        self.tally = EventTally(config.window, clock)
         self.engagement = Engagement(config, self.tally)
 
 
@@ -38,11 +38,13 @@ class PublishedStatistics:
         """Time at which statistics of an actor next change by the passing of time."""
         return self._agenda.earliest
 
-    def feed(self, changes: Iterable[ConnectionEvent | Forgotten], busy: Set[str], now: Seconds) -> list[Statistics]:
+    def feed(
+        self, changes: Iterable[ConnectionEvent | PersonForgotten], busy: Set[str], now: Seconds
+    ) -> list[Statistics]:
         """Count changes, in their order. Returns the statistics that are new. busy: persons with a task in hand."""
         touched = set(iter(lambda: self._agenda.due(now), None))
         for change in changes:
-            if isinstance(change, Forgotten):
+            if isinstance(change, PersonForgotten):
                 self._actors.pop(change.actor, None)
                 self._agenda.clear(change.actor)
                 touched.discard(change.actor)

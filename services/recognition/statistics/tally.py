@@ -189,7 +189,7 @@ def _order(event: ConnectionEvent) -> tuple[Seconds, str]:
     return event.started.seconds, event.id
 
 
-class Tally:
+class EventTally:
     """Statistics of one actor's events, or of all. window: length of the recent window. clock: of the stamps.
 
     The recent window holds the events that started in the last `window` seconds, as they have been decided since.
