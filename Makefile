@@ -9,22 +9,28 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_D
 	$(BIN)/python -m pip install -qq
 PROFILE := same
 
-.PHONY: demo test test-long test-machines mutants lint style docs generate coverage bench reachy-mini clean
+.PHONY: demo test test-long test-rest test-machines mutants lint style docs generate coverage bench reachy-mini clean
 
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
 
-# mypy keeps one processor busy for as long as others would wait for it: it runs beside the tests.
-test: style
+# Whoever changes something runs this: all that needs no process of its own, in four minutes on two free processors.
+# mypy keeps one of them busy for as long as others would wait for it: it runs beside the tests.
+test: SOME := -m "not long"
+test test-long: style
 	@$(BIN)/mypy --no-error-summary & types=$$!; \
-	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) $(ARGS); tests=$$?; \
+	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) $(SOME) $(ARGS); tests=$$?; \
 	wait $$types && exit $$tests
 
-# All random cases; `make test` tries one of three (tests/random_cases.py).
+# All tests: real processes, browsers, the wheel and the site as well (tests/long.toml), and all random cases of those of
+# which `make test` tries one of six (tests/random_cases.py).
 test-long: PROFILE := long
-test-long: test
 
-# What `make test` leaves out on most machines, and never has the time for: several machines on this one, which wants root,
+# What `make test` leaves out, with the same share of random cases: `.ci/run` runs both.
+test-rest: $(READY)
+	@$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) -m long $(ARGS)
+
+# What `make test-long` leaves out on most machines, and never has the time for: several machines on this one, which wants root,
 # and all of the contract on the mock-up of a Reachy Mini. CI does it each week.
 test-machines: $(READY) reachy-mini
 	@REACHY_MINI_FULL=1 ENGAGE_PLATFORM=weekly $(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder \

@@ -18,6 +18,7 @@ from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
+from tests.long_tests import is_long
 from tests.longest import LONGEST
 from tests.skips import Skips
 
@@ -50,6 +51,8 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "smoke: in real time, and quick: `make test` runs it")
+    config.addinivalue_line("markers", "long: `make test` leaves it out (tests/long.toml says which)")
     config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
     config.addinivalue_line(
         "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
@@ -58,10 +61,18 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Skips(), "skips")
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` asks for the marks that are given here
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Long files first: whoever gets the last ones ends soon after the others."""
+    """Mark what is `long` (`long.toml`). Long files first: whoever gets the last ones ends soon after the others."""
+    for item in items:
+        if is_long(item.path.relative_to(config.rootpath / "tests").as_posix(), {*map(_name, item.iter_markers())}):
+            item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+def _name(mark: pytest.Mark) -> str:
+    return mark.name
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

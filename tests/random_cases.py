@@ -7,7 +7,7 @@ whole, too.
 
 from hypothesis import settings
 
-SHARE = 3
+SHARE = 6
 """`make test` tries one of so many cases, the first ones."""
 
 

@@ -3,6 +3,7 @@
 SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
     "services/realizer/perform/control_link.py",  # asks the body
+    "services/realizer/perform/presence.py",  # wakes who waits for a service
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/behavior_task.py",  # breaks off what a body does not end
@@ -12,7 +13,6 @@ SHELLS = {
     "services/control/serving/fault_switch.py",  # publishes the faults that are on
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report/feedback.py",  # publishes feedback
-    "services/realizer/together/shared_context.py",  # what performances share: the bus, too
     "services/realizer/perform/behavior_run.py",  # awaits sync points
     "services/realizer/perform/futures.py",  # resolves them
     "services/realizer/together/planning.py",  # asks the body

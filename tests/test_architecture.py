@@ -293,6 +293,72 @@ def test_no_module_imports_itself_through_others() -> None:
     assert not circle, f"these import one another, or what does: {', '.join(sorted(circle))}"
 
 
+SEAMS = {
+    "services/recording: Records": "a list fulfils it, too",
+    "services/control/torso: Parts": "known: the torso is still cut in slices",
+}
+"""Protocols of which there is one class in their folder, and why they stand all the same."""
+
+
+def slices(trees: dict[str, ast.Module]) -> list[str]:
+    """Protocols that describe one class of their own folder, by its path: a class that was cut in slices.
+
+    A seam has several classes behind it, or one that stands elsewhere; then a Protocol is right. trees: by path.
+    """
+    classes = [(PurePosixPath(path).parent, each) for path, tree in trees.items() for each in _classes(tree)]
+    found = []
+    for folder, protocol in classes:
+        if not any("Protocol" in ast.unparse(base) for base in protocol.bases):
+            continue
+        names = _members(protocol)
+        described = [
+            (place, each.name)
+            for place, each in classes
+            if names and names <= _members(each) and not any("Protocol" in ast.unparse(base) for base in each.bases)
+        ]
+        if [place for place, _ in described] == [folder]:
+            found.append(f"{folder}: {protocol.name} describes {described[0][1]} and nothing else: name the class")
+    return found
+
+
+def _classes(tree: ast.Module) -> Iterator[ast.ClassDef]:
+    yield from (each for each in _nodes(tree) if isinstance(each, ast.ClassDef))
+
+
+def _members(of: ast.ClassDef) -> set[str]:
+    """Names of its methods and fields, those that its methods set too."""
+    named = {each.name for each in of.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
+    named |= {ast.unparse(each.target) for each in of.body if isinstance(each, ast.AnnAssign)}
+    for each in ast.walk(of):
+        if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store) and ast.unparse(each.value) == "self":
+            named.add(each.attr)
+    return named - {"__init__"}
+
+
+def test_no_protocol_describes_one_class_of_its_own_folder() -> None:
+    code = [name for name in tracked() if name.split("/")[0] in CODE and name.endswith(".py")]
+    found = slices({name: ast.parse((ROOT / name).read_text()) for name in code})
+
+    assert {each.split(" describes ")[0] for each in found} == SEAMS.keys(), "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("others", "is_slice"),
+    [
+        ({"services/x/a.py": "class A:\n    def f(self): ...\n    def g(self): ..."}, True),
+        ({"services/x/a.py": "class A:\n    def __init__(self): self.x = 1\n    def f(self): ..."}, True),
+        ({"services/y/a.py": "class A:\n    def f(self): ..."}, False),
+        ({"services/x/a.py": "class A:\n    def f(self): ...\nclass B:\n    def f(self): ..."}, False),
+        ({"services/x/a.py": "class A:\n    def g(self): ..."}, False),
+    ],
+)
+def test_a_slice_of_a_class_is_told_from_a_seam(others: dict[str, str], is_slice: bool) -> None:
+    protocol = {"services/x/p.py": "class P(Protocol):\n    def f(self): ..."}
+    trees = {path: ast.parse(text) for path, text in {**protocol, **others}.items()}
+
+    assert bool(slices(trees)) == is_slice
+
+
 def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
     for name in SHELLS:
         path = ROOT / name

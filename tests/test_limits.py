@@ -14,7 +14,8 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
-from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation import fragment_runner
+from engage_hri.services.generation.service import WORLD_PATIENCE
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.service import running
@@ -51,8 +52,11 @@ async def test_a_speech_too_long_is_refused_in_a_block_and_in_a_fragment(hub: Me
         assert (await robot.realize("c", [Wait(id="w")])).status == "done"
 
 
-async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(hub: MemoryHub) -> None:
-    async with whole_robot(hub, "generation.fragments=5") as robot:
+async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fragment_runner, "FRAGMENTS", 5)
+    async with whole_robot(hub) as robot:
         asked = [
             asyncio.create_task(
                 robot.perform(TurnFragment(id=f"f{n}", turn_status="full", behaviors=(Speech(id="s", text="one"),)))
@@ -62,7 +66,7 @@ async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(hub
         outcomes = await asyncio.gather(*asked, return_exceptions=True)
 
     assert [each.status for each in outcomes if isinstance(each, FragmentOutcome)] == ["done"] * 5
-    assert all("`generation.fragments` is the limit" in str(each) for each in outcomes[5:])
+    assert all("5 fragments are waiting or performed, which is the limit" in str(each) for each in outcomes[5:])
 
 
 async def test_a_world_whose_publisher_has_crashed_is_waited_for_as_at_start(hub: MemoryHub) -> None:
@@ -70,7 +74,7 @@ async def test_a_world_whose_publisher_has_crashed_is_waited_for_as_at_start(hub
     config, world = load(), World(entities=(ann,))
     services = {name: roster.service(name, config) for name in roster.ROBOT}
     fragments = [TurnFragment(id=id, turn_status="full", behaviors=(Speech(id="s", text="hello"),)) for id in "abc"]
-    patience = GenerationConfig().world_patience
+    patience = WORLD_PATIENCE
     async with running(hub, services), connect(hub=hub) as robot:
         async with running(hub, {"camera": partial(show_world, world=world)}):
             assert (await robot.perform(fragments[0])).status == "done"
@@ -105,4 +109,4 @@ async def test_a_fragment_waits_for_the_first_person(hub: MemoryHub, comes: bool
         else:
             with pytest.raises(InputRefused, match=r"the world knows no(body| people)"):
                 await asking
-            assert robot.now() == pytest.approx(GenerationConfig().world_patience, abs=0.1)
+            assert robot.now() == pytest.approx(WORLD_PATIENCE, abs=0.1)

@@ -20,13 +20,13 @@ from engage_hri.services.client.results import PerformFailed
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
-from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.config import LEASE, RealizerConfig
 from engage_hri.services.requests.serving import GRACE
 from engage_hri.services.runtime.service import serve
 
 WORDS = " ".join(f"word{number}" for number in range(40))
 LONGEST_WORD = 1.0
-HELD_AFTER, LEASE = RealizerConfig().held_after, RealizerConfig().lease
+HELD_AFTER = RealizerConfig().held_after
 BOTH = (Speech(id="s", text=WORDS), Pointing(id="p", target="blue-square", timing=()))
 BEGUN = 2.0
 """Time at which something happens to whoever performs these."""

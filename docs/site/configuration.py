@@ -99,7 +99,8 @@ def _named(names: str, fields: Sequence[str]) -> list[str]:
 
 def _keys(node: ast.ClassDef, module: ast.Module) -> tuple[str, list[Key]]:
     """What the class says in general, and its fields: documented below them or in the class's docstring."""
-    fields = [s for s in node.body if isinstance(s, ast.AnnAssign) and isinstance(s.target, ast.Name)]
+    assigned = [s for s in node.body if isinstance(s, ast.AnnAssign) and isinstance(s.target, ast.Name)]
+    fields = [field for field in assigned if "ClassVar" not in ast.unparse(field.annotation)]
     names = [ast.unparse(field.target) for field in fields]
     general, documented = _docstring(ast.get_docstring(node) or "", names)
     keys = []

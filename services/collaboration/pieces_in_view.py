@@ -16,6 +16,8 @@ from engage_hri.schemas.units import Meters, Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.collaboration.placement import TRUSTED, is_moving
 
+STEADY: Seconds = 0.5
+"""Time that a piece must rest in view, with no hand over it, before its place is believed. Ours."""
 HAND_OVER: Meters = 0.08
 """Distance of their centers, seen from above, below which a hand covers a piece: half a hand and half a piece."""
 WINDOW: Seconds = 1.0
@@ -49,10 +51,9 @@ class _View(Struct):
 
 
 class PiecesInView:
-    """The pieces and people seen so far. steady: seconds in view before the place of a piece is believed."""
+    """The pieces and people seen so far."""
 
-    def __init__(self, steady: Seconds) -> None:
-        self._steady = steady
+    def __init__(self) -> None:
         self._views: dict[str, _View] = {}
         self._known: dict[str, Entity] = {}
         self._people: dict[str, Seconds] = {}
@@ -87,17 +88,17 @@ class PiecesInView:
 
     def person(self, now: Seconds, known: str = "") -> str | None:
         """Id of a person who is there, or was a moment ago, of `known` rather than of another; None: nobody."""
-        there = [*self._present, *(id for id, at in self._people.items() if now < at + self._steady)]
+        there = [*self._present, *(id for id, at in self._people.items() if now < at + STEADY)]
         return known if known in there else next(iter(there), None)
 
     def deadline(self, now: Seconds) -> Seconds | None:
         """Next time at which any of this changes by itself, without another frame; None: never."""
-        times = [*(view.since + self._steady for view in self._views.values()), self._last + WINDOW / 2]
-        times += [at + self._steady for at in self._people.values()]
+        times = [*(view.since + STEADY for view in self._views.values()), self._last + WINDOW / 2]
+        times += [at + STEADY for at in self._people.values()]
         return min((at for at in times if at > now), default=None)
 
     def _is_steady(self, id: str, now: Seconds) -> bool:
-        return id in self._views and now >= self._views[id].since + self._steady
+        return id in self._views and now >= self._views[id].since + STEADY
 
 
 def _is_clear(piece: Entity, hands: Iterable[Entity]) -> bool:

@@ -9,12 +9,31 @@ from typing import TypeVar
 from msgspec import Struct
 
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.collaboration.fragments import MANIPULATION, PieceMention, Sentence, fragment, request
 from engage_hri.services.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import TangramTable
+
+ATTEMPTS = 3
+"""Number of times that the robot asks for one placement before it goes on without. Ours."""
+ARRIVAL: Seconds = 4.0
+"""Time from when a person is seen until the robot greets them, so that they can sit down. Ours."""
+FAREWELL: Seconds = 15.0
+"""Time that the robot waits for the person to leave after its goodbye. Ours."""
+PATIENCE: Seconds = 2.0
+"""Time that the robot waits for a hand to go away before it judges what lies where. Ours."""
+SETTLE: Seconds = 0.75
+"""Time from when a placement is seen until the robot speaks: the person looks up, and the robot looks back. Ours."""
+PAUSE: Seconds = 0.4
+"""Time between two turns of the robot. Ours."""
+THINKING: Seconds = 1.0
+"""Time between "Ummmm," and "good.". Ours."""
+PIECE_RELIABILITY: Probability = 0.95
+"""Least reliability of a reference to the piece to move, and to the trapezoid when introduced. Scenario page."""
+LANDMARK_RELIABILITY: Probability = 0.85
+"""Least reliability of a reference to a landmark, and to the rectangle when introduced. Scenario page."""
 
 # -- what a plan may wish for -----------------------------------------------------------------------------------
 
@@ -88,13 +107,13 @@ class Manager:
         assert isinstance(person, str)
         if person != self._person:
             self._person = person
-            yield Pause(self.config.arrival)
+            yield Pause(ARRIVAL)
 
     def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
         """Say a full turn that asks for nothing."""
         yield from self._meet()
         yield Perform(fragment(id, sentence, addressee=self._person, universe=self._universe, look=look))
-        yield Pause(self.config.pause)
+        yield Pause(PAUSE)
 
     def approve(self, id: str) -> Plan[None]:
         """Say "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
@@ -105,11 +124,11 @@ class Manager:
                 status="beginning", delay_target=self.table.surface.id,
             )
         )  # fmt: skip
-        yield Pause(self.config.thinking)
+        yield Pause(THINKING)
         yield Perform(
             fragment(f"{id}-b", ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
         )
-        yield Pause(self.config.pause)
+        yield Pause(PAUSE)
 
     def instruct(self, id: str, instruction: Instruction) -> Plan[bool]:
         """Ask for a placement until it is right: again if nothing happens, for a fix if it is wrong.
@@ -118,11 +137,11 @@ class Manager:
         """
         request_id, fix = id, False
         pieces = yield from self.observe()
-        for attempt in range(1, self.config.attempts + 1):
+        for attempt in range(1, ATTEMPTS + 1):
             yield from self._meet()
             yield Perform(self._request(request_id, instruction, fix=fix))
             placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)
-            yield Pause(self.config.settle)
+            yield Pause(SETTLE)
             pieces = yield from self.observe()
             verdict = check(instruction, pieces)
             if verdict.right:
@@ -134,12 +153,12 @@ class Manager:
 
     def observe(self) -> Plan[tuple[Entity, ...]]:
         """Look at the pieces as they lie."""
-        pieces = yield Observe(self.config.patience)
+        pieces = yield Observe(PATIENCE)
         assert isinstance(pieces, tuple)
         return pieces
 
     def farewell(self) -> Plan[None]:
-        yield AwaitDeparture(self.config.farewell)
+        yield AwaitDeparture(FAREWELL)
 
     def _request(self, id: str, instruction: Instruction, *, fix: bool = False) -> TurnFragment:
         sentence = request(
@@ -147,8 +166,8 @@ class Manager:
             self.table,
             verb="fix" if fix else "move",
             deictic="" if fix else instruction.deictic,
-            piece_reliability=self.config.piece_reliability,
-            landmark_reliability=self.config.landmark_reliability,
+            piece_reliability=PIECE_RELIABILITY,
+            landmark_reliability=LANDMARK_RELIABILITY,
         )
         return fragment(id, sentence, addressee=self._person, universe=self._universe, accept=MANIPULATION)
 
@@ -157,9 +176,9 @@ class Manager:
         return (
             "We are going to use the pieces on the table to make a picture together. "
             "As you can see, on the table we have: squares, triangles,",
-            PieceMention(piece="rectangle", phrase="a rectangle", reliability=self.config.landmark_reliability),
+            PieceMention(piece="rectangle", phrase="a rectangle", reliability=LANDMARK_RELIABILITY),
             "and",
-            PieceMention(piece="trapezoid", phrase="a trapezoid", reliability=self.config.piece_reliability),
+            PieceMention(piece="trapezoid", phrase="a trapezoid", reliability=PIECE_RELIABILITY),
             "of different colors.",
         )
 

@@ -28,7 +28,7 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
-        engine = _Engine(robot, bus, PiecesInView(config.steady))
+        engine = _Engine(robot, bus, PiecesInView())
         with robot.worlds() as worlds:
             watching = tasks.create_task(engine.watch(worlds), name="watch the table")
             tell_settings(bus, "collaboration", config)

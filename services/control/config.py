@@ -1,7 +1,7 @@
 """Configuration of control: how it reports, zones that are never pointed into, and faults of the simulated body."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from msgspec import Struct
 
@@ -93,8 +93,6 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     voice: the driver of its voice; empty: the one that the body has.
     drivers: the settings of drivers, a table for each, by the name of its class or entry point.
     state_rate: looks at the body per second while anything moves, and `RobotState` messages for who asks for all.
-    dead_man: seconds without a message of the requester after which its behaviors end, unless the request names a
-        lease (`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s.
     no_point_zones: spheres that no body ever points into.
     variability: deviations of the simulated body.
     calibration: file with the offsets of joints, and how well looks and points are known, as `engage calibrate body`
@@ -105,7 +103,6 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """
 
     state_rate: float = 20.0
-    dead_man: Seconds = 5.0
     no_point_zones: tuple[NoPointZone, ...] = ()
     variability: Variability = Variability()
     calibration: str = ""
@@ -114,6 +111,9 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     body: str | tuple[str, ...] = "simulated"
     voice: str = ""
     drivers: Mapping[str, Mapping[str, Any]] = {}
+
+    FIXED: ClassVar[Mapping[str, Any]] = {"dead_man": 5.0}
+    """Former keys, and the value of the constant that has taken the place of each."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -133,5 +133,3 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     def __post_init__(self) -> None:
         if not 1.0 <= self.state_rate <= 200.0:
             raise ValueError(f"state_rate is {self.state_rate}: expected 1..200 per second")
-        if self.dead_man < 4.5:
-            raise ValueError(f"dead_man is {self.dead_man} s: expected >= 4.5, requests are repeated every 2 s")

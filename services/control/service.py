@@ -59,6 +59,10 @@ from engage_hri.services.requests.serving_effects import Hold
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
+DEAD_MAN: Seconds = 5.0
+"""Time without a message of the requester after which its behaviors end, unless the request names a lease
+(`Request.lease`). After the last one the body goes home. Longer than two repetitions, one every 2 s. Ours."""
+
 
 async def embody(
     bus: Bus,
@@ -111,7 +115,7 @@ class _Control:
         self._live: dict[str, LiveBehavior] = {}
         self._unheard = Unheard()
         self.desk = RequestDesk(
-            bus, "control", self._requester_lost, on_extend=self.serve, on_hold=self._hold, term=config.dead_man
+            bus, "control", self._requester_lost, on_extend=self.serve, on_hold=self._hold, term=DEAD_MAN
         )
         self._bus = bus
         self._config = config

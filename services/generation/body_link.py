@@ -22,17 +22,17 @@ from engage_hri.services.generation.references.motions import (
 )
 from engage_hri.services.runtime.unhurried import SLICE
 
+BODY_PATIENCE: Seconds = 5.0
+"""Time that a reference waits for a body to say what motions cost: a body that has just been started needs it.
+Ours."""
+
 
 class BodyLink:
-    """Generation's connection to the body.
+    """Generation's connection to the body. capabilities: what the body last said of itself; None: not asked yet."""
 
-    capabilities: what the body last said of itself; None: not asked yet. patience: how long it may take to come up.
-    """
-
-    def __init__(self, bus: Bus, patience: Seconds) -> None:
+    def __init__(self, bus: Bus) -> None:
         self.capabilities: Capabilities | None = None
         self._bus = bus
-        self._patience = patience
 
     def forget(self) -> None:
         """Drop the capabilities of a body that is gone: another one may come."""
@@ -88,4 +88,4 @@ class BodyLink:
 
     async def _ask(self, key: str, question: Message) -> Message:
         """The body's answer; the question waits while a body may still come up."""
-        return await self._bus.query(key, question, self._patience)
+        return await self._bus.query(key, question, BODY_PATIENCE)

@@ -52,6 +52,9 @@ from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import Pending, RequestDesk, Requester, RequestRefused
 from engage_hri.services.requests.serving import GRACE
 
+FRAGMENTS = 200
+"""Number of fragments that may be waiting or performed at once; one more is refused, so that a task that never waits
+is told so. Ours."""
 _RECOGNITION_AWAY = ("away", "recognition")
 
 
@@ -81,7 +84,7 @@ class FragmentRunner:
         self._heard = HeardWords()
         self._outcomes = TurnOutcomes(self._events, self._heard, config, bus.sight)
         self._gazes = GazesOfFragments()
-        self._body = BodyLink(bus, config.body_patience)
+        self._body = BodyLink(bus)
         self._world: World | None = None
         self._discourse = NO_DISCOURSE
         self._live: dict[str, FragmentPerformance] = {}
@@ -101,10 +104,10 @@ class FragmentRunner:
 
     def full(self, waiting: int, id: str) -> Fault | None:
         """A fault if fragment `id` is one too many; else None. waiting: those that wait to be admitted."""
-        if (number := len(self._live) + waiting) < self._config.fragments:
+        if (number := len(self._live) + waiting) < FRAGMENTS:
             return None
         reason = f"{number} fragments are waiting or performed, which is the limit"
-        return Fault(reason=reason, where=id, advice="wait until one has ended; `generation.fragments` is the limit")
+        return Fault(reason=reason, where=id, advice="wait until one has ended")
 
     def admit(self, request: PerformFragment, world: World) -> None:
         """Queue a fragment. Raises InputRefused where it is illegal, and changes nothing that goes on."""

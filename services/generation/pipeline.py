@@ -23,6 +23,9 @@ from engage_hri.services.generation.references.sequence import unasked
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, in_vain
 
+WORDS_BETWEEN = 3.0
+"""Words of plain speech between two references over which head and arm stay at the first one's target; after more
+they have gone home. Decision 0024; the number is ours."""
 ELEMENTS = 512
 """Elements that the making of phrases counts for, and that of a block (see `runtime.steps`)."""
 Planning = Generator[int | tuple[EstimateItem, ...], Sequence[Estimate] | None, FragmentPlan]
@@ -63,8 +66,8 @@ def planning(
     """
     chosen = Choices()
     order = ordered(fragment.behaviors, fragment.constraints, fragment.id)
-    apart = references_apart(order, fragment.constraints, config.words_between)
-    made = proposed([each for each in order if isinstance(each, Reference)], world, config, discourse)
+    apart = references_apart(order, fragment.constraints, WORDS_BETWEEN)
+    made = proposed([each for each in order if isinstance(each, Reference)], world, discourse)
     if made.references:
         yield ELEMENTS
         motions = replace(motions, looks_last=config.profile == "figure-3.3")

@@ -37,6 +37,9 @@ from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
+WORLD_PATIENCE: Seconds = 5.0
+"""Time that a fragment waits for a first report of the world, or for a person to speak to: cameras start as the robot
+does. Ours."""
 NAME = "generation"
 PATTERNS = (
     *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD,
@@ -164,7 +167,7 @@ class _Generation:
             case PerformFragment():
                 self._admit(request, now)
                 if request.id in self._early:
-                    self._patience.set(request.id, now + self._config.world_patience)
+                    self._patience.set(request.id, now + WORLD_PATIENCE)
             case Inhibit():
                 self._grant(request, now)
             case SetCondition():
@@ -274,7 +277,7 @@ class _Generation:
             if self._world(now) is not None:
                 self._admit(request, now, may_wait=False)  # refuses it for the missing person
                 continue
-            since, name = now - self._config.world_patience, self._perception.name or "perception"
+            since, name = now - WORLD_PATIENCE, self._perception.name or "perception"
             fault = self._bus.sight.misses(name, id, since, now).following("the world is unknown", id)
             self._refuse(id, replace(fault, advice="is perception running?"))
             self._runner.refused(request, fault, now)

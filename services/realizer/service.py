@@ -26,11 +26,14 @@ from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.references import disambiguated
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.config import LEASE, RealizerConfig
 from engage_hri.services.realizer.perform.control_link import LONGEST_WAY
+from engage_hri.services.realizer.perform.ends_of_runs import ABORT
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
-from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.realizer.perform.performance import BlockPerformance, SharedContext
+from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
 from engage_hri.services.realizer.plan.past import LASTING, Past
@@ -39,13 +42,15 @@ from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.together.live import Ending, Live, absence, told
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.realizer.together.planning import Planning
-from engage_hri.services.realizer.together.shared_context import Moving, Presence, SharedContext
 from engage_hri.services.realizer.together.waiting_block import WaitingBlock
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.requests.silence import unfinished
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
+PULSE: Seconds = 1.0
+"""Time between two renewals of the requests to the body and to recognition: two may be lost within a
+`LEASE`. Ours."""
 Result = TypeVar("Result")
 
 
@@ -53,19 +58,19 @@ class _Realizer:
     def __init__(self, bus: Bus, config: RealizerConfig) -> None:
         self.bus = bus
         self.config = config
-        self.requests = Requester(bus, Patience(pulse=config.pulse, lease=config.lease, cancel=config.abort))
+        self.requests = Requester(bus, Patience(pulse=PULSE, lease=LEASE, cancel=ABORT))
         self.desk = RequestDesk(bus, "realizer", self.cancel)
         self.live: dict[str, Live] = {}
         self.performances: dict[str, BlockPerformance] = {}
         """Blocks of `live` that are being performed, by the id of the request."""
-        self.routes: dict[str, Moving] = {}
+        self.routes: dict[str, BlockPerformance] = {}
         self.peers = Presence()
         self.live_blocks = LiveBlocks(bus.now)
         self.endings = Past[Ending](bus.now)
         """How the blocks have ended that are over, by id."""
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
-        self.planning = Planning(bus, config, self.live_blocks, self.performing)
+        self.planning = Planning(bus, config, self.live_blocks, lambda: self.shared.performed())
         self.steering = Steering(bus, self.desk, config, self.live, self.performances, self.live_blocks)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,
@@ -146,7 +151,7 @@ class _Realizer:
                 performance.spoken.hear(word.behavior, word.position)
                 if performance.decisions.say(word.behavior, word.position, self.bus.local(word.at), self.bus.now()):
                     performance.take_in()
-                performance.held.tell()  # A voice that is held may stand now.
+                performance.tell_stuck()  # A voice that is held may stand now.
 
     async def _perform(self, live: Live) -> None:
         """Perform a block; an exception that nothing else catches ends this block only, and takes its parts home."""
@@ -229,7 +234,7 @@ class _Realizer:
             self._send_home(live, replaced)
             if self.homing:
                 # Among them are parts sent home by a block that was itself replaced before it began.
-                self.homing -= await unfinished(self.homing, self.config.abort, self.bus)
+                self.homing -= await unfinished(self.homing, ABORT, self.bus)
         await self.planning.planned(live.block, self.live.values())
         try:
             live.unsettle()

@@ -1,65 +1,41 @@
 """Settings of recognition: time limits, resolution, windows. Defaults: design page and Table 2.1."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import Action
-from engage_hri.schemas.ranges import not_negative, positive
-from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, Vector
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
+from engage_hri.schemas.ranges import positive
+from engage_hri.schemas.units import Degrees, Probability, Seconds
 
 GazeResolution = Literal["object", "table"]
 
 
+GAZE_MARGIN: Degrees = 1.0
+"""Angle by which another target must be nearer to the direction of a gaze than the present one before it takes over:
+without it a look between two things would flutter. Ours."""
+HYSTERESIS: Probability = 0.05
+"""Distance by which the estimate of engagement passes a threshold before the level changes. Ours."""
+
+
 class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings for making looks, speech and manipulations of raw perception. Raises ValueError if out of range."""
+    """Settings for making looks of raw perception. Raises ValueError if out of range."""
 
     gaze_half_angle: Degrees = 5.0
     """Half angle of the gaze cone: what is farther off the head's direction is not looked at. Right for eye trackers;
     where only the nose is seen take 10, and `gaze_resolution` `table`."""
-    gaze_margin: Degrees = 1.0
-    """Angle by which another target must be nearer to the direction than the present one before it takes over."""
-    dwell: Seconds = 0.15
-    """Time for which the gaze stays on a target before that is a look, and off it before the look is over."""
-    face_radius: Meters = 0.12
-    """Radius of the faces of people and of the robot, around the point between the eyes."""
-    robot_face: Vector = (0.05, 0.0, 1.17)
-    """Place of the robot's eyes as long as its `RobotState` does not say it."""
-    memory: Seconds = 10.0
-    """Time in which the confidence in the place of a covered thing halves."""
-    voice_onset: Seconds = 0.1
-    """Shortest sound that counts as speech."""
-    voice_pause: Seconds = 0.25
-    """Shortest silence that ends speech."""
-    voice_lost: Seconds = 0.5
-    """Time without a voice level after which speech has ended, at the time of the last level."""
-    hand_reach: Meters = 0.1
-    """Greatest distance from the center of a hand to that of a piece that it moves."""
-    moved: Meters = 0.025
-    """Distance that a piece goes from its place, with a hand, before it counts as manipulated."""
-    tremor: Meters = 0.01
-    """Distance from its place within which a piece rests: the noise of vision."""
-    smoothing: Seconds = 0.15
-    """Time over which places of pieces are averaged."""
-    rest: Seconds = 0.3
-    """Time for which a piece rests before its manipulation is over."""
-    oldest: Seconds = 0.5
-    """Greatest age at which a head pose or a voice level that arrives still counts."""
-    settling: Seconds = 0.35
-    """Longest time for which events wait for raw perception that is undecided. Shorter than the realizer's
-    grace (0.5 s)."""
+
+    FIXED: ClassVar[Mapping[str, Any]] = {
+        "gaze_margin": 1.0, "dwell": 0.15, "face_radius": 0.12, "robot_face": (0.05, 0.0, 1.17), "memory": 10.0,
+        "voice_onset": 0.1, "voice_pause": 0.25, "voice_lost": 0.5, "hand_reach": 0.1, "moved": 0.025,
+        "tremor": 0.01, "smoothing": 0.15, "rest": 0.3, "oldest": 0.5, "settling": 0.35,
+    }  # fmt: skip
+    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
-        place = "sensing."
-        positive(
-            self, ("gaze_half_angle", "face_radius", "memory", "voice_lost", "hand_reach", "rest", "oldest"), place
-        )
-        not_negative(self, ("gaze_margin", "dwell", "voice_onset", "voice_pause", "smoothing", "settling"), place)
-        if not self.gaze_half_angle + self.gaze_margin < 90:
-            raise ValueError("sensing.gaze_half_angle and gaze_margin must be less than 90 degrees together")
-        if not 0 <= self.tremor < self.moved:
-            raise ValueError("sensing.tremor must be less than sensing.moved, and not negative")
+        positive(self, ("gaze_half_angle",), "sensing.")
+        if not self.gaze_half_angle + GAZE_MARGIN < 90:
+            raise ValueError(f"sensing.gaze_half_angle must be less than {90 - GAZE_MARGIN:g} degrees")
 
 
 class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -78,68 +54,33 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Time after an answer of the robot in which the person may close the exchange; later is a new turn."""
     manipulation_limit: Seconds = 8.0
     """Time limit from the end of the turn, when the manipulation of an object is accepted as the answer."""
-    accept: tuple[Action, ...] = ("speak", "nod", "shake", "point")
-    """Actions that answer an adjacency pair of the robot, unless its request names others."""
-    turn_patience: Seconds = 12.0
-    """Time after the robot's last word for which its unfinished turn still counts; longer than generation's 10 s.
-    Also the time, after the limit, for which an anchor that does not come is waited for."""
     backchannel_limit: Seconds = 0.8
     """Longest speech that is still a backchannel."""
-    direct_by_look: Seconds = 0.6
-    """Time for which a person looks at an object before that directs the robot's gaze."""
-    after_robot_directed: Seconds = 2.0
-    """Time after a robot's directed gaze in which a look at the same object is no direction of its own."""
     least_confidence: Probability = 0.4
     """Least confidence of an observation: a beginning below is ignored, a thing below counts as covered. Ours."""
-    words_margin: Seconds = 0.5
-    """Time by which spoken words may miss the speech that they belong to: recognizers and voice detectors disagree
-    about where speech begins and ends. Ours."""
-    words_patience: Seconds = 10.0
-    """Time after the end of an event for which it is told again, should its words become known or be corrected."""
     sensing: Sensing = Sensing()
     """Settings for raw perception."""
-    look_break: Seconds = 0.15
-    """Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
-    meanwhile waits for the decision."""
-    longest_speech: Seconds = 60.0
-    """Time after which speech is over if no report of its end has come. The next beginning ends it, too."""
-    longest_gesture: Seconds = 10.0
-    """The same for a nod, a shake or a point."""
-    longest_manipulation: Seconds = 120.0
-    """The same for a manipulation."""
     window: Seconds = 30.0
     """Length of the window of the recent statistics."""
     reference_mtbce: Seconds = 5.7
-    """Pace to compare with until `enough_events` have been seen: mean time between connection events, Table 2.1."""
-    enough_events: int = 5
-    """Number of connection events from which a person's own mean counts; at least 2. Ours."""
+    """Pace to compare with until a person has shown five events: mean time between connection events, Table 2.1."""
     engaged_from: Probability = 0.5
     """Estimate from which a person is engaged: for example all events good, but half as fast as usual. Ours."""
     disengaged_below: Probability = 0.25
     """Estimate below which a person is disengaged; between the two, weakening. Ours."""
-    hysteresis: Probability = 0.05
-    """Distance by which the estimate passes a threshold before the level changes."""
+
+    FIXED: ClassVar[Mapping[str, Any]] = {
+        "accept": ("speak", "nod", "shake", "point"), "turn_patience": 12.0, "direct_by_look": 0.6,
+        "after_robot_directed": 2.0, "words_margin": 0.5, "words_patience": 10.0, "look_break": 0.15,
+        "longest_speech": 60.0, "longest_gesture": 10.0, "longest_manipulation": 120.0, "enough_events": 5,
+        "hysteresis": 0.05,
+    }  # fmt: skip
+    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         positive(self, (
             "directed_gaze_limit", "mutual_facial_gaze_limit", "adjacency_pair_limit", "third_turn_limit",
-            "manipulation_limit",
-            "turn_patience", "backchannel_limit", "direct_by_look", "window", "reference_mtbce",
-            "longest_speech", "longest_gesture", "longest_manipulation",
+            "manipulation_limit", "backchannel_limit", "window", "reference_mtbce",
         ))  # fmt: skip
-        not_negative(self, (
-            "after_robot_directed", "hysteresis", "words_margin", "words_patience",
-        ))  # fmt: skip
-        if not 0 <= self.disengaged_below + self.hysteresis <= self.engaged_from - self.hysteresis <= 1:
-            raise ValueError("thresholds overlap: disengaged_below + hysteresis <= engaged_from - hysteresis")
-        if not 0 <= self.look_break <= self.sensing.settling:
-            raise ValueError("look_break must not be negative, nor longer than sensing.settling")
-        if max(self.after_robot_directed, self.direct_by_look) >= FORGOTTEN_AFTER:
-            raise ValueError(
-                f"after_robot_directed and direct_by_look must be less than {FORGOTTEN_AFTER:g} s: "
-                "who has gone is then forgotten"
-            )
-        if self.enough_events < 2:
-            raise ValueError("enough_events must be at least 2: one event has no time between events")
-        if not self.accept:
-            raise ValueError("accept must name at least one action")
+        if not 0 <= self.disengaged_below + HYSTERESIS <= self.engaged_from - HYSTERESIS <= 1:
+            raise ValueError(f"engaged_from must be at least {2 * HYSTERESIS:g} above disengaged_below")

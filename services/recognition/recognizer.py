@@ -20,11 +20,14 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import InterruptedLooks, Symbolic
 from engage_hri.services.recognition.events.machine import Effect, Forgotten, Mishap
 from engage_hri.services.recognition.events.scene import Covered
-from engage_hri.services.recognition.events.session import Observation, Session
+from engage_hri.services.recognition.events.session import SETTLING, Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
 from engage_hri.services.recognition.perceive.words import HeardWords, Words
 from engage_hri.services.reports.reports import GoesOn
 
+OLDEST: Seconds = 0.5
+"""Greatest age at which a head pose or a voice level that arrives still counts: an older one tells of what has been
+decided. Ours."""
 Perceived = Observation | HeadPose | VoiceActivity | RobotState | HeardWords
 Result = Effect | Symbolic
 """The actions among them were derived from raw perception; the session gets them without another call."""
@@ -41,8 +44,8 @@ class Recognizer:
         self._config = config
         self._new_attention = partial(Attention, robot, config, clock)
         self._attention = self._new_attention()
-        self._interrupted = InterruptedLooks(config.look_break)
-        self._words = Words(config.words_margin, clock)
+        self._interrupted = InterruptedLooks()
+        self._words = Words(clock)
         self._waiting: list[tuple[Seconds, int, Observation | Covered]] = []
         self._numbers = count()
         self._mishaps: list[Mishap] = []
@@ -54,7 +57,7 @@ class Recognizer:
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
         settled, due = self._settled, self.session.deadline
-        more = settled + self._config.sensing.settling  # by then at the latest more is settled
+        more = settled + SETTLING  # by then at the latest more is settled
         times = [self._attention.deadline, self._interrupted.deadline]
         if self._waiting:
             times.append(more)
@@ -69,7 +72,7 @@ class Recognizer:
         derived: list[Symbolic] = []
         match observation:
             case HeadPose() | VoiceActivity():
-                if now - at <= self._config.sensing.oldest:
+                if now - at <= OLDEST:
                     derived = self._attend(lambda attention: attention.feed(observation, at), at)
             case RobotState():
                 derived = self._attend(lambda attention: attention.feed(observation, at), at)
@@ -175,6 +178,6 @@ class Recognizer:
     @property
     def _settled(self) -> Seconds:
         """Time before which nothing more can become known, except what takes longer than the time to settle."""
-        longest = self._config.sensing.settling
+        longest = SETTLING
         undecided = (*self._attention.undecided, *self._interrupted.undecided)
         return min((since for since in undecided if self._now < since + longest), default=math.inf)

@@ -1,6 +1,20 @@
 """The states of a request at its requester: each has a row for each event. Data, drawn in docs/bus.md.
 
-Nothing that a caller, a server, the bus or the clock does at any moment is undefined. asking.py follows this table.
+The aim: a request is performed at most once, and its requester is told what came of it, whatever dies meanwhile.
+Zenoh delivers a message, or loses it with a link, and tells neither side. So four things could go wrong:
+
+1. The request is lost. It is sent again until the server has answered (`SENT`). The server knows it by its id.
+2. An answer is lost. The server keeps its last answer, and gives it again to each request that comes again.
+3. The server dies and comes back. What it had accepted, its new life knows nothing of. To send it again could move
+   the robot twice. So the requester is told that it is unknown what came of it (`TELL_REBORN`). A request that no
+   life had heard of is sent to the new one.
+4. The requester gives up while the request still is on its way. Then the server might begin it after that. So a
+   cancellation follows it, and is sent until it is answered (`GIVEN_UP`): a cancellation that comes first refuses
+   the request that comes after it.
+
+Decision 0010 says how a request is known, 0087 why "unknown" is an answer of its own. Nothing that a caller, a
+server, the bus or the clock does at any moment is undefined: `asking.py` follows this table, and a model in the
+tests plays both tables against each other with losses and deaths.
 """
 
 from collections.abc import Mapping

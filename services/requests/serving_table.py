@@ -1,7 +1,17 @@
 """The states of a request at its server: each has a row for each event. Data, drawn in docs/bus.md.
 
-Nothing that a requester, the service itself, the bus or the clock does at any moment is undefined. serving.py follows
-this table.
+The counterpart of `asking_table.py`, which tells the theory. Three rules follow from it for a server:
+
+1. The service gets a request once (`HAND`), however often it comes. What comes again is answered with the last
+   answer, also long after the end (`ENDED`), since the first answer may have been lost.
+2. A cancellation may come before its request. It is remembered, and refuses the request when that comes
+   (`REFUSE_UNHEARD`).
+3. A requester may die while its request moves the robot. So a request is renewed, and not only at its end: without
+   news it is held, then ended (`HOLD`, `HAND_LAPSED`; decisions 0001 and 0037). If the requester is back in another
+   life, nobody is there any more who wants it (`HAND_REBORN`).
+
+Nothing that a requester, the service itself, the bus or the clock does at any moment is undefined. `serving.py`
+follows this table.
 """
 
 from collections.abc import Mapping

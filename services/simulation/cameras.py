@@ -33,7 +33,7 @@ class Cameras:
         self._dropped = faults.dropped_frames
         self._chance = chances("frames")
         self._person: Reports = (
-            RawReports(sightlines, faults, chances, head_turn=config.head_turn)
+            RawReports(sightlines, faults, chances)
             if config.perception == "raw"
             else SymbolicReports(sightlines, faults, chances)
         )

@@ -17,6 +17,9 @@ from engage_hri.services.simulation.config import PerceptionFaults
 from engage_hri.services.simulation.faults import Chances, deviated
 from engage_hri.services.simulation.head import Sightlines, SimulatedHead
 
+HEAD_TURN: Seconds = 0.2
+"""Time that the person's head takes to face another target. Ours."""
+
 
 class Reports(Protocol):
     """Perception of one person."""
@@ -135,14 +138,12 @@ class SymbolicReports:
 class RawReports:
     """Reports for `raw`: the head's pose and the voice. Manipulations show in the world; nods and points as such."""
 
-    def __init__(
-        self, sightlines: Sightlines, faults: PerceptionFaults, chances: Chances, *, head_turn: Seconds
-    ) -> None:
+    def __init__(self, sightlines: Sightlines, faults: PerceptionFaults, chances: Chances) -> None:
         self._sightlines = sightlines
         self._deviation = math.radians(faults.gaze)
         self._chance = chances("gaze")
         self._ear = Ear(faults, chances)
-        self._head = SimulatedHead(head_turn)
+        self._head = SimulatedHead(HEAD_TURN)
         self._target = ""
 
     def happened(self, message: Message, now: Seconds) -> Iterator[Message]:

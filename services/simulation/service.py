@@ -1,6 +1,7 @@
 """The simulated human at the tangram table, instead of cameras: publishes the world and what the person does."""
 
 import random
+from collections.abc import Collection
 from functools import partial
 
 from engage_hri.schemas import keys
@@ -18,6 +19,7 @@ from engage_hri.services.simulation.appendix_b import misplacing_rules, rules
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.cameras import Cameras
 from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.habits import Habits
 from engage_hri.services.simulation.head import Sightlines
 from engage_hri.services.simulation.human import Human
 from engage_hri.services.simulation.listening import ListeningHuman
@@ -26,11 +28,25 @@ from engage_hri.services.simulation.stochastic import StochasticHuman
 from engage_hri.services.simulation.table import Table
 from engage_hri.services.tangram.table import tangram_table
 
+AWAIT_PARTICIPANTS = ("control", "generation", "realizer", "recognition")
+"""Participants that must be on the bus before the person comes: the first words are lost on whoever is not there.
+They may start in any order, hours apart."""
 
-async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
-    """Serve until cancelled. The person comes when all participants that the configuration names are on the bus."""
-    table = Table(tangram_table(), hand_speed=config.hand_speed, shortest_movement=config.shortest_movement)
-    human = _human(config, bus.robot, random.Random(config.seed))
+
+async def simulate(
+    bus: Bus,
+    ready: Ready,
+    config: SimulationConfig,
+    *,
+    awaited: Collection[str] = AWAIT_PARTICIPANTS,
+    habits: Habits = Habits(),  # noqa: B008
+) -> None:
+    """Serve until cancelled. The person comes when all that are `awaited` are on the bus.
+
+    habits: of the `stochastic` person.
+    """
+    table = Table(tangram_table())
+    human = _human(config, habits, bus.robot, random.Random(config.seed))
     person = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp, life=bus.run)
     cameras = Cameras(person, Sightlines(table, bus.robot), config, bus.stamp, partial(_chance, config.seed))
     perceived, shared = PerceivedActions(bus), SharedWorld(bus.name)
@@ -42,7 +58,7 @@ async def simulate(bus: Bus, ready: Ready, config: SimulationConfig) -> None:
         bus.publish(keys.WORLD, _whole(cameras.world(bus.now()), shared, bus.now()))
         tell_settings(bus, "simulation", config)
         ready()
-        await _wait_for(set(config.await_participants), inbox)
+        await _wait_for(set(awaited), inbox)
         if config.human != "none":
             cameras.enter(bus.now() + config.entrance)
         while not inbox.is_over:
@@ -84,7 +100,7 @@ def _chance(seed: int, name: str) -> random.Random:
     return random.Random(f"{seed} {name}")
 
 
-def _human(config: SimulationConfig, robot: str, chance: random.Random) -> Human:
+def _human(config: SimulationConfig, habits: Habits, robot: str, chance: random.Random) -> Human:
     def vary() -> Seconds:
         return chance.uniform(-config.jitter, config.jitter)
 
@@ -96,7 +112,7 @@ def _human(config: SimulationConfig, robot: str, chance: random.Random) -> Human
         case "listening":
             return ListeningHuman(tangram_table(), robot, vary)
         case "stochastic":
-            return StochasticHuman(tangram_table(), config.stochastic, chance, robot)
+            return StochasticHuman(tangram_table(), habits, config.reciprocity, chance, robot)
         case "attentive":
             table = tangram_table()
             pieces = frozenset(piece.id for piece in table.pieces)

@@ -21,7 +21,6 @@ from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.simulation.attentive import AttentiveHuman
-from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import FACE, Act, Human, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.speaking import SpokenWords
@@ -105,8 +104,7 @@ class Bystander:
 
 def tangram_world() -> World:
     """The tangram table as it is at the start, with the person sitting at it."""
-    defaults = SimulationConfig()
-    table = Table(tangram_table(), hand_speed=defaults.hand_speed, shortest_movement=defaults.shortest_movement)
+    table = Table(tangram_table())
     table.seated = True
     return World(entities=table.entities(0.0))
 

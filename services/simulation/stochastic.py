@@ -16,7 +16,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
-from engage_hri.services.simulation.config import Habits
+from engage_hri.services.simulation.habits import Habits
 from engage_hri.services.simulation.hearing import THINKING, HeardSpeech, Hearing, requested_placement
 from engage_hri.services.simulation.human import (
     FACE,
@@ -56,10 +56,13 @@ class _Thought(Struct, order=True):
 class StochasticHuman(Human):
     """The stochastic person: does what the robot asks for, at a varying pace and with some mistakes."""
 
-    def __init__(self, table: TangramTable, habits: Habits, chance: Chance, robot: str = "robot") -> None:
+    def __init__(
+        self, table: TangramTable, habits: Habits, reciprocity: Probability, chance: Chance, robot: str = "robot"
+    ) -> None:
         super().__init__((), robot)
         self._table = table
         self._habits = habits
+        self._reciprocity = reciprocity
         self._chance = chance
         self._pieces = frozenset(piece.id for piece in table.pieces)
         self._hearing = Hearing(robot)
@@ -205,7 +208,7 @@ class StochasticHuman(Human):
 
     def _learn(self, *, answered: bool) -> None:
         self._awaits_eyes = False
-        self.propensity += self._habits.reciprocity * ((2.0 if answered else 0.0) - self.propensity)
+        self.propensity += self._reciprocity * ((2.0 if answered else 0.0) - self.propensity)
 
     # -- unasked acts --------------------------------------------------------------------------------------------
 

@@ -14,6 +14,10 @@ from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.table import PiecePose, TangramTable
 
+HAND_SPEED: float = 0.45
+"""Mean speed of a hand over a movement, in m/s. Unhurried reaching at a table is about 0.4..0.8 m/s."""
+SHORTEST_MOVEMENT: Seconds = 0.6
+"""Least time of a hand's movement: a short one is not quicker. Ours."""
 HandSide = Literal["left", "right"]
 LIFT: Meters = 0.03
 """Height above the table's top of a hand that holds a piece."""
@@ -57,11 +61,13 @@ class PieceRested(Struct, frozen=True):
 class Table:
     """The pieces and a person's hands. Each hand makes one movement at a time; the next begins when it has ended."""
 
-    def __init__(self, layout: TangramTable, *, hand_speed: float, shortest_movement: Seconds) -> None:
-        self.layout = layout
-        self.seated = False
+    def __init__(
+        self, layout: TangramTable, *, hand_speed: float = HAND_SPEED, shortest_movement: Seconds = SHORTEST_MOVEMENT
+    ) -> None:
         self._hand_speed = hand_speed
         self._shortest = shortest_movement
+        self.layout = layout
+        self.seated = False
         self._poses: dict[str, PiecePose] = {piece.id: piece.start for piece in layout.pieces}
         self._rest: dict[HandSide, Vector] = {"left": layout.person.left_hand, "right": layout.person.right_hand}
         self._hands: dict[HandSide, Vector] = dict(self._rest)

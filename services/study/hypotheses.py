@@ -14,7 +14,7 @@ Measure = Callable[[SessionRecord], float | None]
 CAVEAT = (
     "The person is a model. The sessions show what the robot's behavior does to an interaction with somebody who "
     "reacts in just this way, not how people would react. That a look that is not returned makes the next one rarer "
-    "is built into the stochastic person (`simulation.stochastic.reciprocity`): 11 shows how strong the effect of "
+    "is built into the stochastic person (`simulation.reciprocity`): 11 shows how strong the effect of "
     "that would be, not that there is one. All is counted through the perception of the condition: in degraded "
     "recognition a part of 6 and 7, and most of 11, is what is not seen. With enough sessions any difference, "
     "however small, gets a small p: read the difference and its interval first."

@@ -32,8 +32,8 @@ def moved(piece: Entity, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> En
     return replace(piece, position=(px + x, py + y, pz), yaw=piece.yaw + math.radians(yaw))
 
 
-def seeing(*frames: tuple[float, tuple[Entity, ...]], steady: float = 0.5) -> PiecesInView:
-    sight = PiecesInView(steady)
+def seeing(*frames: tuple[float, tuple[Entity, ...]]) -> PiecesInView:
+    sight = PiecesInView()
     for at, entities in frames:
         sight.see(World(entities=entities), at)
     return sight
@@ -139,7 +139,7 @@ def test_noise_of_many_frames_gives_the_relation_that_single_frames_often_miss(s
         return moved(entity, chance.gauss(0, 0.006), chance.gauss(0, 0.006), chance.gauss(0, 5.0))
 
     frames = [(FRAME * n, (seen(BLUE), seen(BASE))) for n in range(320)]
-    sight, missed, wrong = PiecesInView(0.5), 0, 0
+    sight, missed, wrong = PiecesInView(), 0, 0
     for at, entities in frames:
         sight.see(World(entities=entities), at)
         missed += not check(WANTED, entities).right
@@ -164,7 +164,7 @@ def test_noise_of_many_frames_gives_the_relation_that_single_frames_often_miss(s
 def test_whatever_is_seen_every_piece_ever_seen_lies_within_what_was_seen(
     frames: list[tuple[float, Entity | None, bool]],
 ) -> None:
-    sight, now, places = PiecesInView(0.5), 0.0, []
+    sight, now, places = PiecesInView(), 0.0, []
     for pause, blue, covered in frames:
         now += pause
         places += [blue.position] if blue else []
@@ -181,7 +181,7 @@ def test_whatever_is_seen_every_piece_ever_seen_lies_within_what_was_seen(
 
 
 def test_the_person_who_is_known_counts_before_others_while_they_are_there() -> None:
-    view = PiecesInView(steady=0.5)
+    view = PiecesInView()
     ann, ben = (Entity(id=id, kind="person", position=(1.2, 0.0, 1.2)) for id in ("ann", "ben"))
     view.see(World(entities=(ann, ben)), 1.0)
     both = view.person(1.0, "ben")

@@ -145,7 +145,7 @@ def test_the_robot_says_what_it_says_in_appendix_b(step: str, words: str) -> Non
 
 @pytest.mark.parametrize("mode", ["scripted", "task"])
 def test_when_somebody_leaves_the_robot_goes_on_with_who_is_there_then(mode: str) -> None:
-    player, the_manager = Player(people=("ann", "ben")), manager(arrival=4.0)
+    player, the_manager = Player(people=("ann", "ben")), manager()
     plan = script(the_manager, appendix_b.turns(the_manager)) if mode == "scripted" else task(the_manager)
     performed = player.play(plan)
     spoken_to = [fragment.addressee for fragment in performed]
@@ -256,7 +256,7 @@ def test_the_task_makes_the_figure_by_itself() -> None:
 def test_the_task_gives_a_piece_up_after_its_attempts_and_says_so() -> None:
     player = Player(idle=1000)
 
-    performed = player.play(task(manager(attempts=2)))
+    performed = player.play(task(manager()))
 
     assert spoken(performed[-2]) == "Look, we almost made an anchor."
     assert {it.id.partition("-again")[0] for it in performed if "again" in it.id} == {"move-1", "move-2"}

@@ -6,9 +6,9 @@ from random import Random
 import numpy as np
 import pytest
 
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics, tracks
 from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim, Trunk
-from engage_hri.services.control.figure.course import Impossible
 from engage_hri.services.control.figure.kinematics import (
     CLEARANCE,
     REACH,

@@ -277,7 +277,7 @@ async def test_it_goes_home_by_itself_when_the_realizer_dies(hub: MemoryHub):
 
 
 async def test_it_goes_home_by_itself_when_commands_stop_in_mid_behavior(hub: MemoryHub):
-    async with robot(hub, dead_man=5.0) as client:
+    async with robot(hub) as client:
         request = PerformBehavior(id="once", requester="stranger", block="b", behavior=POINT, through="stroke")
         command(client.bus, keys.BEHAVIOR, request)
         await asyncio.sleep(4.9)
@@ -290,7 +290,7 @@ async def test_it_goes_home_by_itself_when_commands_stop_in_mid_behavior(hub: Me
 
 
 async def test_repeated_requests_keep_a_held_behavior_alive(hub: MemoryHub):
-    async with robot(hub, dead_man=5.0) as client:
+    async with robot(hub) as client:
         client.perform(POINT, "stroke")
         await asyncio.sleep(60.0)
 

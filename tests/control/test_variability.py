@@ -144,7 +144,6 @@ def test_lost_messages_are_lost_at_their_rate():
     ("settings", "reason"),
     [
         ({"state_rate": 0.0}, "state_rate"),
-        ({"dead_man": 1.0}, "repeated every 2 s"),
     ],
 )
 def test_a_bad_configuration_says_what_is_wrong(settings: dict[str, float], reason: str):

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 TICK = 0.125
 TIMES = {
-    "dwell": 0.25, "hand_onset": 0.25, "hand_stillness": 0.75, "response_hold": 0.75, "glance_duration": 1.0,
-    "mtbce_prior": 5.75,
+    "DWELL": 0.25, "HAND_ONSET": 0.25, "HAND_STILLNESS": 0.75, "RESPONSE_HOLD": 0.75, "GLANCE_DURATION": 1.0,
+    "MTBCE_PRIOR": 5.75,
 }  # fmt: skip
-"""The configuration of both sides."""
+"""Times of both sides, in place of those of the arbiter."""
 FACE_LOST = 2.0
 """Seconds for which the head stays with a face that is out of sight."""
 ROWS = ("inhibition", "fragment", "glance", "response", "hands", "face")
@@ -42,7 +42,7 @@ class HeadTable:
     still_since: float = float("-inf")
     seen: bool = True
     seen_until: float = 0.0
-    pace: float = TIMES["mtbce_prior"]
+    pace: float = TIMES["MTBCE_PRIOR"]
     quiet_since: float = 0.0
     on_face: bool = False
     glance_until: float | None = None
@@ -61,7 +61,7 @@ class HeadTable:
 
     def decide(self, event: int, succeeded: bool) -> None:
         if event in self.answers and succeeded:
-            self.answers[event].until = self.now + TIMES["response_hold"]
+            self.answers[event].until = self.now + TIMES["RESPONSE_HOLD"]
         else:
             self.answers.pop(event, None)
 
@@ -108,9 +108,9 @@ class HeadTable:
         self.answers = {event: answer for event, answer in self.answers.items() if self.now < answer.until}
         if self.answers:
             wants["response"] = self.answers[max(self.answers)].target
-        if self.acting or (self.fast and self.now - self.fast_since >= TIMES["hand_onset"]):
+        if self.acting or (self.fast and self.now - self.fast_since >= TIMES["HAND_ONSET"]):
             self.followed = True
-        elif not self.fast and self.now - self.still_since >= TIMES["hand_stillness"]:
+        elif not self.fast and self.now - self.still_since >= TIMES["HAND_STILLNESS"]:
             self.followed = False
         if self.followed:
             wants["hands"] = "hand"
@@ -127,13 +127,13 @@ class HeadTable:
             self.let_go, next_owner = None, kind
         else:
             self.let_go = self.now if self.let_go is None else self.let_go
-            next_owner = best if self.now - self.let_go >= TIMES["dwell"] else kind
+            next_owner = best if self.now - self.let_go >= TIMES["DWELL"] else kind
         if next_owner != kind:
             self.let_go = None
             if kind == "glance":
                 self.glance_until, self.quiet_since = None, self.now
             elif next_owner == "glance":
-                self.glance_until = self.now + TIMES["glance_duration"]
+                self.glance_until = self.now + TIMES["GLANCE_DURATION"]
         owner = (next_owner, wants.get(next_owner, self.owner[1]))
         if next_owner == "inhibition" != kind and self.inhibited is not None and self.inhibited[0] == "hold":
             self.held = self.fragment or ""

@@ -21,6 +21,7 @@ from engage_hri.services.generation.references.motions import AT_REST, CURRENT_P
 from engage_hri.services.generation.references.pairs import ReferenceScene
 from engage_hri.services.generation.references.policy import Choices, Unreferable
 from engage_hri.services.generation.references.reliability import channel_reliability, reliability
+from engage_hri.services.generation.references.sequence import EXPECTED_DELAY
 from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
@@ -196,7 +197,7 @@ def cost(pair: Pair, target: str, posture: HeadAndArms, motions: Motions, config
     if pair.gesture != "none":
         seconds += config.head_cost(motions.gaze(posture.head, target).head_degrees)
     if pair.gesture in ("directed_gaze", "directed_gaze_with_pointing"):
-        seconds += config.wait_weight * config.expected_delay
+        seconds += config.wait_weight * EXPECTED_DELAY
     if pair.gesture == "directed_gaze_with_pointing":
         arm = arm_of(motions.point(CURRENT_POSE, target))
         seconds += config.arm_cost(motions.point(posture.arm(arm), target).arm_degrees)

@@ -151,7 +151,6 @@ def config(chance: random.Random) -> GenerationConfig:
         profile=chance.choice(("check-back", "check-back", "figure-3.3")),
         channel=chance.choice(("sum", "independent")),
         minimum_reliability=chance.choice((0.5, 0.85)),
-        words_between=chance.choice((0.0, 3.0, 9.0)),
     )
 
 

@@ -1,8 +1,12 @@
 """Random streams of what happens: the arbiter, which keeps deadlines, against the table asked at every tick."""
 
+from contextlib import ExitStack
+from unittest import mock
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.services.generation.head import arbiter, maintenance_policy, response_policy
 from tests.generation.head_table import TICK, TIMES, HeadTable
 from tests.generation.heads import Stage, act, event, inhibition, statistics, world
 
@@ -11,7 +15,7 @@ class Both:
     """One story told to the arbiter and to the table."""
 
     def __init__(self) -> None:
-        self.stage = Stage(**TIMES)
+        self.stage = Stage()
         self.table = HeadTable()
         self.events: list[str] = []
         self.see()
@@ -100,11 +104,15 @@ STORIES = st.lists(st.tuples(HAPPENINGS, st.sampled_from([0, 1, 2, 3, 5, 8, 16, 
 def test_whatever_happens_the_owner_and_the_shifts_are_those_of_the_table(
     story: list[tuple[tuple[object, ...], int]],
 ) -> None:
-    both = Both()
-    for (what, *how), pause in story:
-        getattr(both, what)(*how)
-        both.later(pause)
-    both.later(80)
+    with ExitStack() as changed:
+        for module in (arbiter, maintenance_policy, response_policy):
+            times = {name: seconds for name, seconds in TIMES.items() if hasattr(module, name)}
+            changed.enter_context(mock.patch.multiple(module, **times))
+        both = Both()
+        for (what, *how), pause in story:
+            getattr(both, what)(*how)
+            both.later(pause)
+        both.later(80)
 
     assert both.stage.owners == both.table.changes
     assert [(at, target) for at, _, target in both.stage.shifts] == both.table.shifts

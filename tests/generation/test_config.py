@@ -18,10 +18,8 @@ class Bad:
 
 BAD = [
     Bad("pointing_reliability = nan", "nan is not a number, in `generation.pointing_reliability`"),
-    Bad("dwell = nan", "nan is not a number, in `generation.dwell`"),
-    Bad("retry = inf", "retry must be a finite number, not inf"),
-    Bad("dwell = -0.1", "dwell must not be negative, not -0.1"),
-    Bad("body_patience = -1", "body_patience must not be negative"),
+    Bad("barge_in = inf", "barge_in must be a finite number, not inf"),
+    Bad("wait_weight = -0.1", "wait_weight must not be negative, not -0.1"),
     Bad("glance_factor = 0", "glance_factor must be positive, not 0.0"),
     Bad("gaze_reliability = 0", "0 < gaze_reliability < directed_gaze_reliability"),
     Bad("gaze_reliability = 0.2", "does not hold: 0.2, 0.2, 0.28"),
@@ -33,12 +31,9 @@ BAD = [
     Bad("gaze_half_angle = 5.7", "gaze_half_angle must be between 0 and pi/2 radians, not 5.7"),
     Bad("gaze_half_angle = 0", "gaze_half_angle must be between 0 and pi/2 radians"),
     Bad("pointing_radius = -0.1", "pointing_radius must be positive"),
-    Bad("mtbce_low = 16", "mtbce_low 16.0 is above mtbce_high 15.0"),
-    Bad("mtbce_events = 2.5", "Expected `int`, got `float`, in `generation.mtbce_events`"),
-    Bad("mtbce_events = -1", "mtbce_events must not be negative"),
-    Bad("hand_speed = true", "Expected `float`, got `bool`, in `generation.hand_speed`"),
-    Bad("dwell = 'long'", "Expected `float`, got `str`, in `generation.dwell`"),
-    Bad("dwel = 0.3", "unknown key `dwel`; do you mean `dwell`?, in `generation`"),
+    Bad("barge_in = true", "Expected `float`, got `bool`, in `generation.barge_in`"),
+    Bad("barge_in = 'long'", "Expected `float`, got `str`, in `generation.barge_in`"),
+    Bad("bargein = 0.3", "unknown key `bargein`; do you mean `barge_in`?, in `generation`"),
     Bad("zzz = 1", "unknown key `zzz`; known are condition, profile, channel"),
     Bad("channel = 'max'", "'max' is none of 'sum', 'independent', in `generation.channel`"),
     Bad(
@@ -65,14 +60,14 @@ def test_a_bad_value_is_refused_by_file_and_key_with_what_is_allowed(tmp_path: P
 @pytest.mark.parametrize(
     ("toml", "says"),
     [
-        ("[gneration]\ndwell = 1", "unknown key `gneration`; do you mean `generation`?"),
+        ("[gneration]\nbarge_in = 1", "unknown key `gneration`; do you mean `generation`?"),
         ("generation = 3", "Expected `object`, got `int`, in `generation`"),
         (
             "[control.variability]\nslow = [{part = 3}]",
             "Expected `str`, got `int`, in `control.variability.slow[0].part`",
         ),
         ("[control.variability]\nstall = [{pat = 'head'}]", "unknown key `pat`; do you mean `part`?"),
-        ("[recognition]\naccept = ['sing']", "'sing' is none of 'look', 'point', 'nod'"),
+        ("[recognition]\ngaze_resolution = 'eye'", "'eye' is none of 'object', 'table'"),
         ("[generation\n", "not TOML"),
     ],
 )
@@ -102,7 +97,7 @@ def test_every_number_has_a_range() -> None:
             continue
         unchecked.append(name)
 
-    assert len(numbers) > 20
+    assert len(numbers) > 10
     assert unchecked == []
 
 

@@ -4,16 +4,15 @@ import pytest
 
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.head.maintenance_policy import GlanceWatch
+from engage_hri.services.generation.head.maintenance_policy import MTBCE_PRIOR, GlanceWatch
 from tests.generation.heads import AT, event
 
 RECENT = 4.0
-CONFIG = GenerationConfig(mtbce_events=5)
 
 
 @pytest.fixture
 def watch() -> GlanceWatch:
-    watch = GlanceWatch(CONFIG)
+    watch = GlanceWatch(GenerationConfig())
     watch.face = "human"
     return watch
 
@@ -29,7 +28,7 @@ def glances(watch: GlanceWatch, count: int, person: str = "human", session: str 
         watch.feed(event(f"{session}-{person}{number}", "started", **fields), 0.0)
 
 
-@pytest.mark.parametrize(("events", "pace"), [(7, CONFIG.mtbce_prior), (8, RECENT)])
+@pytest.mark.parametrize(("events", "pace"), [(7, MTBCE_PRIOR), (8, RECENT)])
 def test_the_glances_of_the_robot_do_not_count(watch: GlanceWatch, events: int, pace: float) -> None:
     glances(watch, 3)
     counted(watch, events)
@@ -48,7 +47,7 @@ def test_without_statistics_of_the_person_the_glances_at_all_count(watch: Glance
     glances(watch, 3, person="other")
     counted(watch, 7, actor="")
 
-    assert watch.pace == CONFIG.mtbce_prior
+    assert watch.pace == MTBCE_PRIOR
 
 
 def test_glances_of_a_former_life_of_recognition_are_not_taken_from_the_counts_of_the_next(

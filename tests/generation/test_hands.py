@@ -4,11 +4,8 @@ import pytest
 
 from engage_hri.schemas.actions import ActorLost
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.head.maintenance_policy import HandWatch
+from engage_hri.services.generation.head.maintenance_policy import HAND_ONSET, HAND_STILLNESS, HandWatch
 from tests.generation.heads import AT
-
-CONFIG = GenerationConfig()
 
 
 def hand(owner: str, speed: float) -> Entity:
@@ -19,13 +16,13 @@ def hand(owner: str, speed: float) -> Entity:
 def test_of_two_moving_hands_the_one_whose_owner_is_lost_is_let_go_and_the_other_is_watched(
     lost: str, watched: str
 ) -> None:
-    watch = HandWatch("robot", CONFIG)
+    watch = HandWatch("robot")
     both = World(entities=(hand("ann", 1.0), hand("bob", 1.0)))
     watch.feed(both, 0.0)
-    moving = CONFIG.hand_onset
+    moving = HAND_ONSET
     assert watch.claim(moving) is not None
     watch.feed(ActorLost(actor=lost, at=AT), moving)
 
-    claims = [watch.claim(moving + CONFIG.hand_stillness + later) for later in (0.01, 5.0)]
+    claims = [watch.claim(moving + HAND_STILLNESS + later) for later in (0.01, 5.0)]
 
     assert [claim and claim.target for claim in claims] == [watched, watched]

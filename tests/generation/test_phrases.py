@@ -12,6 +12,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.references import phrases
 from engage_hri.services.generation.references.phrases import Proposals, proposed
 from engage_hri.services.generation.turns.policy import plan_turn
 from engage_hri.services.tangram.table import tangram_table
@@ -42,17 +43,17 @@ def refer(id: str, target: str, *options: SpeechOption) -> Reference:
     return Reference(id=id, target=target, minimum_reliability=0.85, options=options or None)
 
 
-def offered(around: World, *targets: str, config: GenerationConfig = CONFIG) -> Proposals:
-    return proposed([refer(f"ref-{index}", target) for index, target in enumerate(targets, 1)], around, config)
+def offered(around: World, *targets: str) -> Proposals:
+    return proposed([refer(f"ref-{index}", target) for index, target in enumerate(targets, 1)], around)
 
 
-def options(around: World, *targets: str, config: GenerationConfig = CONFIG) -> tuple[SpeechOption, ...]:
+def options(around: World, *targets: str) -> tuple[SpeechOption, ...]:
     """Of the last of these references."""
-    return offered(around, *targets, config=config).references[-1].options or ()
+    return offered(around, *targets).references[-1].options or ()
 
 
-def table(around: World, *targets: str, config: GenerationConfig = CONFIG) -> dict[str, set[str]]:
-    return {option.text: set(option.distractors) for option in options(around, *targets, config=config)}
+def table(around: World, *targets: str) -> dict[str, set[str]]:
+    return {option.text: set(option.distractors) for option in options(around, *targets)}
 
 
 def test_phrases_go_from_short_to_long_each_with_its_words_and_what_else_they_may_mean() -> None:
@@ -80,15 +81,16 @@ def test_words_that_rule_nothing_out_are_not_said() -> None:
     assert table(SQUARES, "d") == {"this": set(), "the disc": set()}
 
 
-def test_the_preferred_attribute_wins_among_equals() -> None:
+def test_the_preferred_attribute_wins_among_equals(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = world(
         thing("a", shape="square", color="red", size="big"), thing("b", shape="square", color="blue", size="small")
     )
-    by_size = GenerationConfig(phrase_attributes=("size", "color"))
 
     assert list(table(pair, "a")) == ["this", "the square", "the red square"]
-    assert list(table(pair, "a", config=by_size)) == ["this", "the square", "the big square"]
-    assert list(table(pair, "a", config=GenerationConfig(phrase_attributes=()))) == ["this", "the square"]
+    monkeypatch.setattr(phrases, "PHRASE_ATTRIBUTES", ("size", "color"))
+    assert list(table(pair, "a")) == ["this", "the square", "the big square"]
+    monkeypatch.setattr(phrases, "PHRASE_ATTRIBUTES", ())
+    assert list(table(pair, "a")) == ["this", "the square"]
 
 
 def test_what_is_not_known_of_an_object_does_not_rule_it_out() -> None:
@@ -153,7 +155,7 @@ def test_it_is_offered_only_where_nothing_else_was_mentioned() -> None:
 def test_phrases_of_the_authors_own_count_as_mentioned_and_stay_as_they_are() -> None:
     own = refer("ref-1", "a", SpeechOption(text="the left one", cost=3))
 
-    made = proposed([own, refer("ref-2", "a")], SQUARES, CONFIG).references
+    made = proposed([own, refer("ref-2", "a")], SQUARES).references
 
     assert made[0] is own
     assert made[1].options is not None
@@ -281,8 +283,3 @@ def test_where_no_words_tell_it_apart_a_warning_says_that_the_look_does_the_rest
 
 def test_with_a_point_one_word_is_enough() -> None:
     assert chosen(in_a_row(RED, RED, BLUE), 0.95) == ("directed_gaze_with_pointing", "this", ())
-
-
-def test_an_attribute_cannot_be_preferred_twice() -> None:
-    with pytest.raises(ValueError, match="phrase_attributes names one twice: color, color"):
-        GenerationConfig(phrase_attributes=("color", "color"))

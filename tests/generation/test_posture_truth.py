@@ -15,6 +15,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.references.sequence import EXPECTED_DELAY
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.generation.robots import Robot, robot
 from tests.generation.tables import option, refer
@@ -89,7 +90,7 @@ def compare(seed: int, config: GenerationConfig) -> list[tuple[float, float]]:
             id, points = choice.reference, choice.gesture == "directed_gaze_with_pointing"
             if choice.gesture == "none" or (config is ARMS and not points):
                 continue
-            waits = WAIT * config.expected_delay if choice.gesture != "gaze" else 0.0
+            waits = WAIT * EXPECTED_DELAY if choice.gesture != "gaze" else 0.0
             expected = choice.cost - waits
             behavior, part = (
                 (f"f:{id}-gaze", "neck") if config is HEADS else (f"f:{id}-point", part_of(choice, stage))

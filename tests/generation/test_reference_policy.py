@@ -195,7 +195,7 @@ def test_distractors_are_those_that_every_channel_leaves() -> None:
 def test_ties_are_broken_as_decided(options: list[SpeechOption], expected: tuple[str, str]) -> None:
     world = flat_world({"rectangle": (0.0, 0.0), "trapezoid": (0.05, 0.0), "far": (5.0, 0.0)})
     reference = refer("r", "rectangle", 0.3, *options)
-    free = GenerationConfig(seconds_per_head_degree=0, seconds_per_arm_degree=0, expected_delay=0)
+    free = GenerationConfig(seconds_per_head_degree=0, seconds_per_arm_degree=0, wait_weight=0)
 
     choice = choose([reference], scene(world), body(world, ["rectangle"]), free).choices[0]
 

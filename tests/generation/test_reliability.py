@@ -59,12 +59,11 @@ def test_fewer_distractors_and_a_better_channel_are_more_reliable(count: int, on
         ({"phrase_reliability": 1.0}, "phrase_reliability"),
         ({"phrase_reliability": 0.0, "channel": "independent"}, "phrase_reliability"),
         ({"seconds_per_word": -0.1}, "seconds_per_word"),
-        ({"turn_silence": 0.0}, "turn_silence"),
-        ({"mtbce_low": 20.0}, "mtbce_low"),
+        ({"barge_in": 0.0}, "barge_in"),
         ({"gaze_half_angle": 0.0}, "gaze_half_angle"),
         ({"gaze_half_angle": float("nan")}, "gaze_half_angle must be between 0 and pi"),
         ({"seconds_per_head_degree": float("nan")}, "seconds_per_head_degree must be a finite number"),
-        ({"expected_delay": float("inf")}, "expected_delay must be a finite number"),
+        ({"wait_weight": float("inf")}, "wait_weight must be a finite number"),
     ],
 )
 def test_a_bad_configuration_is_refused_by_name(values: dict[str, float], named: str) -> None:

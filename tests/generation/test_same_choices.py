@@ -23,7 +23,15 @@ from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.block.ordering import ordered
-from engage_hri.services.generation.pipeline import _scene, glance, planned, planning, references, targets
+from engage_hri.services.generation.pipeline import (
+    WORDS_BETWEEN,
+    _scene,
+    glance,
+    planned,
+    planning,
+    references,
+    targets,
+)
 from engage_hri.services.generation.references.motions import (
     NotAsked,
     distinct,
@@ -58,8 +66,8 @@ def as_it_was(it: Scenario, body: Capabilities, ask: Ask) -> FragmentPlan:
     glanced = glance(it.fragment, turn, it.config)
     motions = all_motions(targets(it.fragment), ask, it.permits.only_hand, pose, glanced)
     order = ordered(it.fragment.behaviors, it.fragment.constraints, it.fragment.id)
-    apart = references_apart(order, it.fragment.constraints, it.config.words_between)
-    made = proposed(references(it.fragment), it.world, it.config)
+    apart = references_apart(order, it.fragment.constraints, WORDS_BETWEEN)
+    made = proposed(references(it.fragment), it.world)
     chosen = Choices()
     if made.references:
         motions = replace(motions, looks_last=it.config.profile == "figure-3.3")

@@ -13,6 +13,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import encode
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.generation import fragment_runner
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.requests.ends import Patience, RequestRefused
 from engage_hri.services.requests.serving import GRACE
@@ -230,7 +231,7 @@ async def test_a_fragment_in_line_that_the_realizer_refuses_has_failed(hub: Memo
 
 
 async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -> None:
-    async with stage(hub, GenerationConfig(world_patience=5.0), world=None) as partners:
+    async with stage(hub, world=None) as partners:
         lost = partners.send(says("lost"))
         with pytest.raises(RequestRefused, match="world is unknown"):
             await lost.outcome
@@ -244,11 +245,14 @@ async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -
         assert now() == 6.0
 
 
-async def test_fragments_that_wait_for_the_world_count_among_those_that_may_wait(hub: MemoryHub) -> None:
-    async with stage(hub, GenerationConfig(fragments=2), world=None) as partners:
+async def test_fragments_that_wait_for_the_world_count_among_those_that_may_wait(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fragment_runner, "FRAGMENTS", 2)
+    async with stage(hub, world=None) as partners:
         for id in "ab":
             partners.send(says(id))
-        with pytest.raises(RequestRefused, match=r"2 fragments are waiting.*`generation.fragments` is the limit"):
+        with pytest.raises(RequestRefused, match="2 fragments are waiting or performed, which is the limit"):
             await partners.send(says("c")).outcome
         assert now() == 0.0
         partners.see(TABLE)

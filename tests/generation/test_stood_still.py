@@ -12,6 +12,7 @@ from engage_hri.schemas.recognition import session_of
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns import policy
 from engage_hri.services.generation.turns.policy import TurnPolicy
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.requests.serving import GRACE
@@ -199,9 +200,11 @@ async def test_a_rest_that_is_refused_since_the_body_is_gone_ends_its_turn_and_i
     assert (refused.value.fault.cause, refused.value.fault.whose) == ("gone", "control")
 
 
-async def test_a_rest_that_waits_in_vain_for_the_world_ends_its_turn(hub: MemoryHub) -> None:
-    config = GenerationConfig(turn_silence=100.0)
-    async with stage(hub, config) as partners:
+async def test_a_rest_that_waits_in_vain_for_the_world_ends_its_turn(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(policy, "TURN_SILENCE", 100.0)
+    async with stage(hub) as partners:
         first = partners.send(says("a", "beginning"))
         await partners.fragment_block("a")
         partners.end(partners.request("a"))

@@ -13,8 +13,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.figure.course import Impossible
-from engage_hri.services.control.figure.estimates import infeasible
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import RequestRefused
 from tests.generation.partners import Partners, stage
@@ -28,7 +27,7 @@ class Voiceless(SimulatedBody):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if isinstance(behavior, Speech):
-            return infeasible(behavior, Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", NO_VOICE))
+            return Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", NO_VOICE).estimate(behavior)
         return super().estimate(behavior, pose, world)
 
 

@@ -13,7 +13,7 @@ EXACT = 0.0101
 STANDING = 0.5
 """Seconds in which a body comes to stand once it is held, and gets under way again."""
 PROMISED = 0.1001
-"""Seconds by which an instant may be missed untold: what people notice (`realizer.skew`)."""
+"""Seconds by which an instant may be missed untold: what people notice (`SKEW` of the realizer)."""
 NOTICEABLE = 0.12
 """The same with a body that has faults, which does not always say when it was where."""
 

@@ -49,7 +49,7 @@ ENDS_WITHIN = 8.0
 """Seconds after everything is back in which an end still comes of the fault: the longest grace, and another."""
 SETTINGS = (
     "--set", "recognition.gaze_resolution=table", "--set", "simulation.human=appendix-b",
-    "--set", "collaboration.placement=4", "--set", "collaboration.arrival=1",
+    "--set", "collaboration.placement=4",
 )  # fmt: skip
 """More words in less time than with people: the manager soon asks again."""
 

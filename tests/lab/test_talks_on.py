@@ -11,16 +11,11 @@ from tests.lab.test_reach import LONG, engage, until
 
 pytestmark = [pytest.mark.real_time, pytest.mark.skipif(bool(missing()), reason=missing())]
 SPREAD = {1: ("control", "realizer", "generation"), 2: ("recognition",), 3: ("simulation",)}
-WORDS = " ".join(f"word number {number}" for number in range(9))
-"""Eight seconds of speech."""
+WORDS = " ".join(f"word number {number}" for number in range(16))
+"""Fourteen seconds of speech: more than the 12 s after a word for which a turn without an end counts."""
 FRAGMENT = f"""<ebml:ebml xmlns="org.mindmakers.bml" xmlns:ebml="edu.wpi.ebml" id="ask" turnStatus="full"
   addressee="human"><speech id="s"><text>{WORDS}</text></speech></ebml:ebml>"""
-PATIENCE = 2.0
-"""Seconds after the last word for which a turn without an end counts: so short that the words outlast it."""
-SETTINGS = {
-    "recognition": ("--set", f"recognition.turn_patience={PATIENCE}"),
-    "simulation": ("--set", "simulation.human=attentive", "--set", "simulation.entrance=0"),
-}
+SETTINGS = {"simulation": ("--set", "simulation.human=attentive", "--set", "simulation.entrance=0")}
 
 
 @pytest.mark.parametrize("fault", ["router", "cut"])

@@ -8,7 +8,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body import Estimate, Estimates, HomeReached, Phase, SyncPointReached, WordSpoken
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.perform.ends_of_runs import ABORT
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.puppet import BML_1_0, Puppet, bml, puppet
 
@@ -71,7 +71,7 @@ async def test_when_it_came_to_where_it_waited_is_told_though_only_the_report_of
 
 
 async def test_what_is_reached_while_the_body_is_being_stopped_is_told() -> None:
-    async with puppet(config=RealizerConfig(abort=5.0)) as body:
+    async with puppet() as body:
         body.aborts = False
         pending = body.ask(bml(POINT))
         await body.told("p")
@@ -285,7 +285,7 @@ async def test_names_of_behaviors_are_nobodys_business() -> None:
 
 
 async def test_a_body_that_never_estimates_or_goes_home_or_aborts_keeps_nobody_for_ever() -> None:
-    async with puppet(config=RealizerConfig(abort=1.0)) as body:
+    async with puppet() as body:
         body.goes_home = body.aborts = False
         first = body.ask(bml(SPEECH))
         await body.told("s")
@@ -294,5 +294,5 @@ async def test_a_body_that_never_estimates_or_goes_home_or_aborts_keeps_nobody_f
         await asyncio.gather(first.outcome, body.perform(bml("", id="b2", composition="REPLACE")))
         now = body.client.now()
 
-    assert now == 0.5 + 1.0 + 1.0
+    assert now == 0.5 + ABORT + ABORT
     assert [(each.text, each.complete) for each in body.outcomes["b"].spoken] == [("one ", False)]

@@ -8,6 +8,7 @@ from engage_hri.schemas.behaviors import Gesture, Speech
 from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.decide.lateness import STALL_FACTOR
 from tests.realizer.planning import timed
 from tests.realizer.stage import block, together
 from tests.realizer.test_simulated_body import robot
@@ -15,7 +16,7 @@ from tests.realizer.test_simulated_body import robot
 RIGHT = Gesture(id="r", lexeme="BEAT", mode="RIGHT_HAND")
 LEFT = Gesture(id="l", lexeme="BEAT", mode="LEFT_HAND")
 CONFIG = RealizerConfig()
-LIMIT = CONFIG.stall + (CONFIG.stall_factor + 2.0) * 0.6
+LIMIT = CONFIG.stall + (STALL_FACTOR + 2.0) * 0.6
 """Most seconds after the time it was to come until an arm is given up.
 
 No phase of a beat takes 0.6 s, nor is it asked to take more than twice as long.

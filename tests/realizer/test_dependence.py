@@ -4,7 +4,7 @@ The oracle plans all blocks twice, one after the other: as expected, and with on
 later. What comes later by that waits for it. It knows nothing of nets.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from random import Random
 
@@ -19,6 +19,7 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.dependence import needed_by, waiting_for
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.waiting_block import WaitingBlock
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block
@@ -27,23 +28,14 @@ LATE: Seconds = 100.0
 BODY = FakeBody()
 
 
-class Performed:
-    """A block that others may be tied to, as `LiveBlocks` sees it."""
+class Performed(WaitingBlock):
+    """A block that others may be tied to, as `LiveBlocks` sees it; it tells no times."""
 
-    def __init__(self, plan: Plan, leaders: Collection[str] = ()) -> None:
-        self.newest_plan, self.leaders = plan, leaders
-        self.held = self
+    def __init__(self, plan: Plan, live: LiveBlocks, leaders: Collection[str] = ()) -> None:
+        super().__init__(plan, live, lambda: 0.0, leaders)
 
-    def follow(self, points: Iterable[Point]) -> None: ...
     def times(self) -> Mapping[Point, Seconds]:
         return {}
-
-    def stuck(self, elsewhere: object, standing: object) -> frozenset[Point]:
-        return frozenset()
-
-    running = stuck
-
-    def stick(self, elsewhere: object, standing: object) -> None: ...
 
 
 class World:
@@ -69,7 +61,7 @@ class World:
             name = qualified(block.id, point)
             self.times[name] = since + at + (LATE if name == self.late else 0.0)
         self._opened.enter_context(self.live.opened(block))
-        self.live.perform(block.id, Performed(plan, behind), self.blocks)
+        self.live.perform(block.id, Performed(plan, self.live, behind), self.blocks)
 
     def reach(self, name: str, *points: str) -> None:
         for each in points:

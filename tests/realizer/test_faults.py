@@ -8,7 +8,6 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
 from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import performance as executor
 from engage_hri.services.realizer.plan.again import planned_again
 from engage_hri.services.realizer.plan.plan import Plan
@@ -109,7 +108,7 @@ async def test_a_body_that_dies_fails_the_block() -> None:
 
 async def test_a_body_that_never_ends_what_is_aborted_does_not_keep_the_block() -> None:
     deaf = FakeBody({"point-1": Script(stall="stroke_start", deaf=True)})
-    async with stage(deaf, config=RealizerConfig(abort=2.0)) as seen:
+    async with stage(deaf) as seen:
         outcome = await seen.perform(POINT_REQUIRED)
 
     assert outcome.status == "failed"

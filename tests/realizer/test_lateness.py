@@ -7,13 +7,13 @@ from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Extend
-from engage_hri.services.realizer.decide.lateness import Late, LatenessWatch, Stalled, event_deadline
+from engage_hri.services.realizer.decide.lateness import STALL_FACTOR, Late, LatenessWatch, Stalled, event_deadline
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import block
 
-CONFIG = RealizerConfig(late=0.5, late_factor=1.0, stall=3.0, stall_factor=5.0)
+CONFIG = RealizerConfig(stall=3.0)
 
 
 def test_what_does_not_come_is_late_once_and_given_up_once() -> None:
@@ -80,7 +80,7 @@ def test_who_holds_where_it_may_pass_is_late_from_when_it_was_told_that() -> Non
     assert authority.advance(2.0) == []
     authority.arrive(Point("g", "stroke_start"), 2.1)
 
-    stalled = 1.2 + CONFIG.stall + CONFIG.stall_factor * 0.25
+    stalled = 1.2 + CONFIG.stall + STALL_FACTOR * 0.25
     assert authority.advance(stalled - 0.01) == []
     assert [type(each) for each in authority.advance(stalled)] == [Stalled]
 

@@ -4,7 +4,10 @@ import pytest
 from msgspec.structs import fields
 
 from engage_hri.schemas.behaviors import Wait
-from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.config import LATE, LEASE, RealizerConfig
+from engage_hri.services.realizer.decide.lateness import LATE_FACTOR, STALL_FACTOR
+from engage_hri.services.realizer.report.feedback import SKEW
+from engage_hri.services.realizer.service import PULSE
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.stage import block, stage
 
@@ -18,42 +21,27 @@ def test_no_limit_is_negative_or_no_number(name: str, value: float) -> None:
         RealizerConfig(**{name: value})
 
 
-@pytest.mark.parametrize("name", [each for each in NAMES if each not in ("pulse", "lease", "stall", "stall_factor")])
+@pytest.mark.parametrize("name", [each for each in NAMES if each != "stall"])
 def test_a_limit_may_be_nothing(name: str) -> None:
     assert getattr(RealizerConfig(**{name: 0.0}), name) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("late", "late_factor", "stall", "stall_factor", "is_good"),
-    [
-        (0.5, 1.0, 0.5, 1.0, True),
-        (0.5, 1.0, 0.49, 5.0, False),
-        (0.5, 1.0, 3.0, 0.99, False),
-        (3.1, 1.0, 3.0, 5.0, False),
-        (3.0, 5.1, 3.0, 5.0, False),
-        (0.0, 0.0, 0.0, 0.0, True),
-    ],
-)
-def test_nobody_has_stalled_who_is_not_even_late(
-    late: float, late_factor: float, stall: float, stall_factor: float, *, is_good: bool
-) -> None:
-    limits = {"late": late, "late_factor": late_factor, "stall": stall, "stall_factor": stall_factor}
+@pytest.mark.parametrize(("stall", "is_good"), [(LATE, True), (LATE - 0.01, False)])
+def test_nobody_has_stalled_who_is_not_even_late(stall: float, *, is_good: bool) -> None:
     if is_good:
-        assert RealizerConfig(**limits).stall == stall
+        assert RealizerConfig(stall=stall).stall == stall
     else:
-        with pytest.raises(ValueError, match="stall and stall_factor must not be below late and late_factor"):
-            RealizerConfig(**limits)
+        with pytest.raises(ValueError, match=rf"^stall {stall} s must not be below 0.5 s"):
+            RealizerConfig(stall=stall)
 
 
-@pytest.mark.parametrize(
-    ("pulse", "lease", "is_good"), [(1.0, 3.0, True), (1.0, 2.99, False), (0.0, 5.0, False), (0.001, 5.0, True)]
-)
-def test_movement_authority_outlives_two_pulses_that_are_lost(pulse: float, lease: float, *, is_good: bool) -> None:
+@pytest.mark.parametrize(("held_after", "is_good"), [(LEASE - 0.01, True), (LEASE, False)])
+def test_a_body_that_hears_nothing_holds_before_it_goes_home(held_after: float, *, is_good: bool) -> None:
     if is_good:
-        assert RealizerConfig(pulse=pulse, lease=lease).lease == lease
+        assert RealizerConfig(held_after=held_after).held_after == held_after
     else:
-        with pytest.raises(ValueError, match=rf"^lease {lease} s must be at least three times pulse {pulse} s"):
-            RealizerConfig(pulse=pulse, lease=lease)
+        with pytest.raises(ValueError, match=r"^held_after 4.0 s must be below 4 s"):
+            RealizerConfig(held_after=held_after)
 
 
 def test_what_is_documented_as_noticed_late_or_stalled_holds_of_the_defaults() -> None:
@@ -61,10 +49,10 @@ def test_what_is_documented_as_noticed_late_or_stalled_holds_of_the_defaults() -
     limits = RealizerConfig()
 
     for natural in (0.05, 0.5, 2.0, 10.0):
-        assert 4 * natural <= natural + limits.stall + limits.stall_factor * natural
-        assert limits.late + limits.late_factor * natural < limits.stall + limits.stall_factor * natural
-    assert limits.skew == 0.1
-    assert limits.pulse * 3 <= limits.lease < limits.longest_hold
+        assert 4 * natural <= natural + limits.stall + STALL_FACTOR * natural
+        assert LATE + LATE_FACTOR * natural < limits.stall + STALL_FACTOR * natural
+    assert SKEW == 0.1
+    assert PULSE * 3 <= LEASE < limits.longest_hold
 
 
 @pytest.mark.parametrize("behaviors", [3, 4])

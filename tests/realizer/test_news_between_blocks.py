@@ -9,7 +9,6 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Head, Speech
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.schemas.nets import NetPlanned
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import Pending
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
@@ -91,7 +90,7 @@ async def second_while_first_is_being_ended(body: Puppet, first: Pending, second
 )
 async def test_what_a_block_that_is_being_ended_had_planned_counts_no_more(document: str) -> None:
     """It was cancelled, but the body is slow to say that it has ended. Who comes now takes the part from the body."""
-    async with puppet(config=RealizerConfig(abort=10.0)) as body:
+    async with puppet() as body:
         body.aborts = False
         first = body.ask(bml(document, id="one"))
         await body.told("q", block="one")
@@ -107,7 +106,7 @@ async def test_what_a_block_that_is_being_ended_had_planned_counts_no_more(docum
 
 async def test_who_is_to_begin_while_another_block_is_being_ended_is_not_planned_again_for_that() -> None:
     """By plan the arm is free by then: it is not, but the other is to end anyway."""
-    async with puppet(config=RealizerConfig(abort=10.0)) as body:
+    async with puppet() as body:
         body.aborts = False
         first = body.ask(bml(ARM, id="one"))
         await body.told("q", block="one")

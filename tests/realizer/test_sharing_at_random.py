@@ -56,7 +56,7 @@ Times = dict[tuple[str, str, str], float]
 EXACT = 1e-4
 """Seconds by which times may differ."""
 NOTICED = 0.1 + EXACT
-"""Seconds by which a tie may be missed without a word (`realizer.skew`)."""
+"""Seconds by which a tie may be missed without a word (`SKEW`)."""
 
 
 class Sent(Struct, frozen=True):

@@ -10,10 +10,11 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig, Sensing
 from engage_hri.services.recognition.events.interrupted_looks import Symbolic
 from engage_hri.services.recognition.perceive.attention import Attention
+from engage_hri.services.recognition.perceive.gaze_targets import ROBOT_FACE
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 
 EYES: Vector = (1.3, 0.0, 1.2)
-ROBOT_EYES = Sensing().robot_face
+ROBOT_EYES = ROBOT_FACE
 SQUARE = ((0.035, 0.035), (-0.035, 0.035), (-0.035, -0.035), (0.035, -0.035))
 TABLE = Entity(
     id="table",

@@ -13,6 +13,7 @@ import msgspec
 from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.statistics.engagement import ENOUGH_EVENTS
 from engage_hri.services.recognition.statistics.tally import KINDS
 
 Life = list[ConnectionEvent]
@@ -75,7 +76,7 @@ def engagement(lives: list[Life], now: Seconds, busy_until: Seconds, config: Rec
     starts = sorted(map(started, lives))
     recent = sorted(map(started, of_window(lives, now, config.window)))
     usual = config.reference_mtbce
-    if len(starts) >= config.enough_events and starts[-1] > starts[0]:
+    if len(starts) >= ENOUGH_EVENTS and starts[-1] > starts[0]:
         usual = (starts[-1] - starts[0]) / (len(starts) - 1)
     longest = max(0.0, now - max(starts[-1], busy_until))
     if len(recent) > 1 and now >= busy_until + config.window:

@@ -12,6 +12,7 @@ from engage_hri.schemas.perception import HeadPose
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.attention import Attention
+from engage_hri.services.recognition.perceive.looks import DWELL
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 from tests.recognition.raw import EMPTY, EYES, PLACES, Watch, face, frames, piece, pose, table, turned
 
@@ -354,7 +355,7 @@ def test_looks_of_any_stream_alternate_and_never_flicker_faster_than_the_dwell(s
             case ActionEnded():
                 assert present is not None
                 assert action.targets == present[0]
-                assert at - present[1] >= config.sensing.dwell - 1e-6
+                assert at - present[1] >= DWELL - 1e-6
                 present = None
         before = at
     assert not there

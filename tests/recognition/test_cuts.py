@@ -6,7 +6,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActorFound, ActorLost
-from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from tests.bus.cuttable import CuttableHub
 from tests.recognition.observations import ROBOT
 from tests.recognition.reporting import GRACE, SPEECH, Belief, Running, all_of, ask, turn_ends
@@ -52,7 +52,7 @@ async def test_words_that_end_during_a_cut_have_ended_when_they_did(monkeypatch:
         stage.hub.join_up("recognition", "control")
         outcome = await pair
 
-    assert (outcome.state, outcome.at.seconds) == ("withdrawn", last_word + RecognitionConfig().turn_patience)
+    assert (outcome.state, outcome.at.seconds) == ("withdrawn", last_word + TURN_PATIENCE)
 
 
 async def test_a_body_that_stays_away_has_fallen_silent_when_it_went(monkeypatch: pytest.MonkeyPatch):
@@ -64,7 +64,7 @@ async def test_a_body_that_stays_away_has_fallen_silent_when_it_went(monkeypatch
         await stage.kill("control")
         outcome = await pair
 
-    assert (outcome.state, outcome.at.seconds) == ("withdrawn", gone + RecognitionConfig().turn_patience)
+    assert (outcome.state, outcome.at.seconds) == ("withdrawn", gone + TURN_PATIENCE)
 
 
 async def test_what_the_former_life_of_a_body_did_has_ended_when_it_went(monkeypatch: pytest.MonkeyPatch):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.services.recognition.events import person
 from tests.bus.cuttable import CuttableHub
 from tests.conftest import virtual_loop
 from tests.random_cases import share_of
@@ -88,7 +89,9 @@ def believed_wrongly(seed: int, steps: int, **faults: Any) -> list[str]:
     async def play() -> list[str]:
         with pytest.MonkeyPatch.context() as monkeypatch:
             hub = CuttableHub(seed=seed, **faults)
-            async with Running(monkeypatch, hub=hub, longest_speech=1e6, longest_manipulation=1e6) as stage:
+            for name in ("LONGEST_SPEECH", "LONGEST_MANIPULATION"):
+                monkeypatch.setattr(person, name, 1e6)
+            async with Running(monkeypatch, hub=hub) as stage:
                 play = Play(stage, random.Random(seed))
                 for _ in range(steps):
                     await play.step()

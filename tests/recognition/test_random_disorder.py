@@ -2,6 +2,8 @@
 
 import random
 from collections import Counter
+from contextlib import ExitStack
+from types import ModuleType
 from unittest import mock
 
 from hypothesis import given, settings
@@ -11,7 +13,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events import presence
+from engage_hri.services.recognition.events import conversation, person, presence, session
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
 from tests.recognition.observations import ROBOT, world
@@ -20,20 +22,26 @@ from tests.recognition.test_random_streams import Chance, Stream, streams
 PEOPLE = ("ann", "bob")
 CELL = 0.04
 """Within this from each full second things happen, and come in whatever order."""
-CONFIG = RecognitionConfig(
-    manipulation_limit=8.3, adjacency_pair_limit=4.3,
-    turn_patience=12.3, third_turn_limit=1.83, after_robot_directed=2.3,
-    longest_speech=60.3, longest_gesture=10.3, longest_manipulation=120.3,
-)  # fmt: skip
+CONFIG = RecognitionConfig(manipulation_limit=8.3, adjacency_pair_limit=4.3, third_turn_limit=1.83)
+TIMES: dict[ModuleType, dict[str, float]] = {
+    presence: {"FACE_GRACE": 2.3},
+    conversation: {"TURN_PATIENCE": 12.3},
+    session: {"TURN_PATIENCE": 12.3},
+    person: {
+        "AFTER_ROBOT_DIRECTED": 2.3, "LONGEST_SPEECH": 60.3, "LONGEST_GESTURE": 10.3, "LONGEST_MANIPULATION": 120.3,
+    },
+}  # fmt: skip
 """No limit, nor the time of a lost face, is a number of full seconds: none passes between observations of a cell."""
 
 
 def effects_of(stream: Stream) -> list[Effect]:
-    session = Session(ROBOT, CONFIG)
-    session.feed(world(*PEOPLE), 0.0)
-    with mock.patch.object(presence, "FACE_GRACE", 2.3):
-        effects = [effect for at, observation in stream for effect in session.feed(observation, at)]
-        return effects + session.advance(1e6)
+    with ExitStack() as changed:
+        for module, times in TIMES.items():
+            changed.enter_context(mock.patch.multiple(module, **times))
+        played = Session(ROBOT, CONFIG)
+        played.feed(world(*PEOPLE), 0.0)
+        effects = [effect for at, observation in stream for effect in played.feed(observation, at)]
+        return effects + played.advance(1e6)
 
 
 def by_content(effects: list[Effect]) -> Counter[ConnectionEvent]:

@@ -8,6 +8,7 @@ import random
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
+from unittest import mock
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,13 +18,14 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Event, TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.perceive.words import HeardWords
+from engage_hri.services.recognition.events import session
+from engage_hri.services.recognition.perceive.words import WORDS_MARGIN, HeardWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer
 from tests.recognition.observations import ROBOT, stamp, world
 
 PEOPLE = ("ann", "bob", "carl")
-MARGIN = 5
-CONFIG = RecognitionConfig(words_margin=MARGIN / 10, words_patience=1e6)
+MARGIN = round(10 * WORDS_MARGIN)
+CONFIG = RecognitionConfig()
 LENGTH = 300
 """Tenths of a second of a talk."""
 
@@ -128,7 +130,8 @@ def recognized(story: Talk, *, with_words: bool = True) -> list[ConnectionEvent]
             actor=each.who, id=each.id, text=each.text, began=each.began / 10, ended=each.ended / 10, final=each.final
         )
         steps.append((each.arrives, 4, heard, each.known))
-    recognizer = Recognizer(ROBOT, CONFIG)
+    with mock.patch.object(session, "WORDS_PATIENCE", 1e6):
+        recognizer = Recognizer(ROBOT, CONFIG)
     told = recognizer.feed(world(*PEOPLE), 0.0, 0.0)
     for now, _, observation, at in sorted(steps, key=lambda step: step[:2]):
         while (due := recognizer.deadline) is not None and due < now / 10:

@@ -113,11 +113,11 @@ def test_a_correction_is_told_again_and_a_repetition_is_not() -> None:
 
 
 def test_words_that_come_too_late_are_not_told_any_more() -> None:
-    talk = Talk(words_patience=3.0)
+    talk = Talk()
     talk.asks(1.0, 2.0)
     talk.turn_ends()
     talk.speaks(2.5, 3.5)
-    talk.hears("yes", 2.5, 3.5, 6.6)
+    talk.hears("yes", 2.5, 3.5, 13.6)
 
     assert not any(retold for *_, retold in talk.told())
 
@@ -244,7 +244,7 @@ def test_what_is_no_speech_by_itself(text: str, final: bool, confidence: float) 
 
 
 def test_words_may_miss_their_speech_by_the_margin() -> None:
-    talk = Talk(words_margin=0.5)
+    talk = Talk()
     talk.asks(1.0, 2.0)
     talk.turn_ends()
     talk.speaks(2.5, 3.0)
@@ -254,7 +254,7 @@ def test_words_may_miss_their_speech_by_the_margin() -> None:
 
 
 def test_a_typed_line_belongs_only_to_speech_that_goes_on() -> None:
-    talk = Talk(words_margin=0.5)
+    talk = Talk()
     talk.asks(1.0, 2.0)
     talk.turn_ends()
     talk.speaks(2.5, 3.0)

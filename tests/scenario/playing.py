@@ -22,7 +22,8 @@ from engage_hri.services.realizer.service import realize
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.runtime.service import Ready, Service, running
-from engage_hri.services.simulation.config import Habits, SimulationConfig
+from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.simulation.habits import Habits
 from engage_hri.services.simulation.service import simulate
 from tests.bus.faulty import Faults, FaultyHub
 
@@ -79,7 +80,7 @@ async def play(
     """
     received: list[Received] = []
     finished = asyncio.Event()
-    person = replace(sensors or SimulationConfig(), human=human, seed=seed, stochastic=habits or Habits())
+    person = replace(sensors or SimulationConfig(), human=human, seed=seed)
 
     async def collaboration(bus: Bus, ready: Ready) -> None:
         await collaborate(bus, ready, CollaborationConfig(**manager))
@@ -90,7 +91,7 @@ async def play(
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
         "generation": partial(generate, config=GenerationConfig(condition=condition)),
-        "simulation": partial(simulate, config=person),
+        "simulation": partial(simulate, config=person, habits=habits or Habits()),
         "collaboration": collaboration,
     }
     async with MemoryHub() if faults is None else FaultyHub(faults, seed) as hub:

@@ -60,7 +60,7 @@ class Filmed:
 
     def __init__(self, *acts: Act, until: Seconds, robot_state: bool = True, seed: int = 0, **config: Any) -> None:
         whole = SimulationConfig(**config)
-        table = Table(tangram_table(), hand_speed=whole.hand_speed, shortest_movement=whole.shortest_movement)
+        table = Table(tangram_table())
         human = Human((Rule("step-1", Entrance(), (Sit(), *acts)),))
         scene = PersonAtTable(human, table, robot="robot", frame=whole.frame, stamp=stamp)
         cameras = Cameras(
@@ -91,9 +91,7 @@ def to(place: Vector) -> Vector:
 
 
 def raw(*acts: Act, until: Seconds, **faults: Any) -> Filmed:
-    return Filmed(
-        *acts, until=until, perception="raw", frame=FRAME, head_turn=0.25, faults=PerceptionFaults(**faults)
-    )
+    return Filmed(*acts, until=until, perception="raw", frame=FRAME, faults=PerceptionFaults(**faults))
 
 
 def symbolic(*acts: Act, until: Seconds, seed: int = 0, **faults: Any) -> Filmed:
@@ -169,7 +167,7 @@ def test_a_head_that_turns_passes_what_lies_between_within_the_turning_time() ->
         angle(film.facing(1.0 + part * 0.25), purple) / angle(green, purple) for part in (0.0, 0.25, 0.5, 0.75, 1.0)
     ]
 
-    assert way == pytest.approx([0.0, 0.1035, 0.5, 0.8965, 1.0], abs=1e-3)
+    assert way == pytest.approx([0.0, 0.1800, 0.7248, 0.9978, 1.0], abs=1e-3)
 
 
 def test_a_manipulation_shows_in_the_world_alone() -> None:
@@ -328,7 +326,7 @@ def test_a_missed_look_is_told_neither_when_it_begins_nor_when_it_ends() -> None
 
 def test_without_faults_actions_pass_as_they_are() -> None:
     acts = (LookAt(FACE), *MOVES_BLUE, LookAt(TABLE), Pause(0.5), Leave())
-    table = Table(tangram_table(), hand_speed=0.45, shortest_movement=0.6)
+    table = Table(tangram_table())
     scene = PersonAtTable(
         Human((Rule("step-1", Entrance(), (Sit(), *acts)),)), table, robot="robot", frame=FRAME, stamp=stamp
     )

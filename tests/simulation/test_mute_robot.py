@@ -21,7 +21,7 @@ from engage_hri.services.simulation.service import simulate
 from engage_hri.services.simulation.still import show_world, tangram_world
 
 PEOPLE: dict[str, Service] = {
-    "at the table": partial(simulate, config=SimulationConfig(human="attentive", await_participants=())),
+    "at the table": partial(simulate, config=SimulationConfig(human="attentive"), awaited=()),
     "who just sits": partial(show_world, world=tangram_world(), is_attentive=True),
 }
 

@@ -82,7 +82,7 @@ async def looked_at(off: float) -> list[str]:
 
     async with MemoryHub() as hub:
         services = {
-            "simulation": partial(simulate, config=SimulationConfig(human="attentive", await_participants=())),
+            "simulation": partial(simulate, config=SimulationConfig(human="attentive"), awaited=()),
             "control": partial(embody, config=config),
             "realizer": partial(realize, config=RealizerConfig()),
         }

@@ -50,7 +50,7 @@ def test_people_look_to_where_its_eyes_are_and_not_where_it_measures_them(
     told: tuple[RobotSeen | RobotState, ...], expected: Vector
 ) -> None:
     config = SimulationConfig()
-    table = Table(tangram_table(), hand_speed=config.hand_speed, shortest_movement=config.shortest_movement)
+    table = Table(tangram_table())
     lines = Sightlines(table, "robot")
     scene = PersonAtTable(Human(()), table, robot="robot", frame=config.frame, stamp=stamp)
     cameras = Cameras(scene, lines, config, stamp, random.Random)

@@ -21,7 +21,7 @@ from engage_hri.services.simulation.config import PerceptionFaults, SimulationCo
 from engage_hri.services.simulation.service import simulate
 from tests.ongoing import going_on, is_seen
 
-QUICK = SimulationConfig(await_participants=(), entrance=1.0, jitter=0.0)
+QUICK = SimulationConfig(entrance=1.0, jitter=0.0)
 
 
 async def perceived(bus: Bus, until: float) -> list[tuple[float, str, str]]:
@@ -36,7 +36,7 @@ async def perceived(bus: Bus, until: float) -> list[tuple[float, str, str]]:
 
 
 async def test_step_1_is_seen_from_when_the_person_sits_down(hub: MemoryHub) -> None:
-    async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+    async with running(hub, {"simulation": partial(simulate, config=QUICK, awaited=())}):
         seen = await perceived(hub.join("test"), until=10.0)
 
     assert seen == [
@@ -52,9 +52,8 @@ async def test_step_1_is_seen_from_when_the_person_sits_down(hub: MemoryHub) -> 
 
 
 async def test_the_person_waits_for_the_robot_to_be_there(hub: MemoryHub) -> None:
-    config = SimulationConfig(await_participants=("control",), entrance=1.0, jitter=0.0)
     bus = hub.join("test")
-    async with running(hub, {"simulation": partial(simulate, config=config)}):
+    async with running(hub, {"simulation": partial(simulate, config=QUICK, awaited=("control",))}):
         assert await perceived(bus, until=60.0) == []
 
         hub.join("control").declare_alive()
@@ -64,7 +63,7 @@ async def test_the_person_waits_for_the_robot_to_be_there(hub: MemoryHub) -> Non
 
 
 async def test_a_late_subscriber_gets_the_whole_world_at_once(hub: MemoryHub) -> None:
-    async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+    async with running(hub, {"simulation": partial(simulate, config=QUICK, awaited=())}):
         with hub.join("test").subscribe(keys.WORLD, keep=Keep.LATEST) as inbox:
             received = await inbox.next(0.0)
 
@@ -76,7 +75,7 @@ async def test_a_late_subscriber_gets_the_whole_world_at_once(hub: MemoryHub) ->
 
 async def test_the_person_moves_the_blue_square_to_the_top_of_the_rectangle(hub: MemoryHub) -> None:
     bus = hub.join("test")
-    async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+    async with running(hub, {"simulation": partial(simulate, config=QUICK, awaited=())}):
         await perceived(bus, until=6.0)
         bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="start", at=bus.stamp()))
         word = WordSpoken(block="step-5", behavior="speech-2", word="so", position=2, at=bus.stamp())
@@ -102,7 +101,7 @@ async def test_the_person_moves_the_blue_square_to_the_top_of_the_rectangle(hub:
 async def test_the_world_is_reported_often_while_something_moves_and_not_at_all_otherwise(hub: MemoryHub) -> None:
     bus = hub.join("test")
     with bus.subscribe(keys.WORLD) as inbox:
-        async with running(hub, {"simulation": partial(simulate, config=QUICK)}):
+        async with running(hub, {"simulation": partial(simulate, config=QUICK, awaited=())}):
             await perceived(bus, until=20.0)
             at_rest = len(inbox)
             bus.publish(keys.FEEDBACK, BlockProgress(block="step-5", progress="end", status="done", at=bus.stamp()))
@@ -114,23 +113,23 @@ async def test_the_world_is_reported_often_while_something_moves_and_not_at_all_
 
 
 async def test_who_does_not_come_is_never_found(hub: MemoryHub) -> None:
-    config = SimulationConfig(await_participants=(), human="none")
-    async with running(hub, {"simulation": partial(simulate, config=config)}):
+    config = SimulationConfig(human="none")
+    async with running(hub, {"simulation": partial(simulate, config=config, awaited=())}):
         assert await perceived(hub.join("test"), until=60.0) == []
 
 
-@pytest.mark.parametrize("wrong", [{"frame": 0.0}, {"hand_speed": math.inf}, {"entrance": -0.1}, {"jitter": -0.1}])
+@pytest.mark.parametrize("wrong", [{"frame": 0.0}, {"jitter": math.inf}, {"entrance": -0.1}, {"reciprocity": 1.1}])
 def test_a_wrong_number_in_the_configuration_is_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         SimulationConfig(**wrong)  # type: ignore[arg-type]
 
 
 async def test_raw_perception_comes_on_its_own_keys_in_place_of_actions(hub: MemoryHub) -> None:
-    config = SimulationConfig(await_participants=(), entrance=1.0, jitter=0.0, perception="raw")
+    config = SimulationConfig(entrance=1.0, jitter=0.0, perception="raw")
     bus = hub.join("test")
     seen = Counter[str]()
     with bus.subscribe(keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.PERCEIVED_ACTION) as inbox:
-        async with running(hub, {"simulation": partial(simulate, config=config)}):
+        async with running(hub, {"simulation": partial(simulate, config=config, awaited=())}):
             while (received := await inbox.next(10.0)) is not None:
                 seen[received.key] += 1
 
@@ -145,7 +144,7 @@ async def test_what_the_person_does_is_told_as_a_state_after_each_event(
     config = msgspec.structs.replace(QUICK, human="stochastic", faults=PerceptionFaults(**faults))
     state_key = keys.perceived_ongoing("simulation", "human")
     bus, told = hub.join("test"), []
-    async with running(hub, {"simulation": partial(simulate, config=config)}):
+    async with running(hub, {"simulation": partial(simulate, config=config, awaited=())}):
         with bus.subscribe(keys.PERCEIVED_ACTION, state_key) as inbox:
             while (received := await inbox.next(120.0)) is not None:
                 told.append(received.message)

@@ -4,7 +4,7 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.world import World
 from engage_hri.services.collaboration.task import Goal
 from engage_hri.services.generation.config import Condition
-from engage_hri.services.simulation.config import Habits
+from engage_hri.services.simulation.habits import Habits
 from engage_hri.services.tangram.table import tangram_table
 from tests.scenario.playing import Record, play
 

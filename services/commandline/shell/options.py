@@ -55,7 +55,7 @@ class Configured:
     ] = None
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.late=1."),
+        typer.Option("--set", metavar="KEY=VALUE", help="One setting, stronger than the file: realizer.stall=1."),
     ] = None
     log: Annotated[
         Path | None,

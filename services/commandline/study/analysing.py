@@ -11,6 +11,7 @@ from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.explained import explained, without_former
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
@@ -269,9 +270,12 @@ def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
         if life.told.participant != "recognition" or life.unread:
             continue
         try:
-            config = msgspec.convert(life.sections.get("recognition"), RecognitionConfig)
+            config = msgspec.convert(
+                without_former(life.sections.get("recognition"), RecognitionConfig), RecognitionConfig
+            )
         except msgspec.ValidationError as error:
-            reason = f"recognition of Engage {life.told.version} had settings that this one does not know: {error}"
+            had, _ = explained(error, RecognitionConfig)
+            reason = f"recognition of Engage {life.told.version} had other settings: {had}"
             fault = Fault(reason=reason, where=recording.name, advice=f"use Engage {life.told.version}")
             raise InputRefused(fault) from error
         found[session_of(life.told.run)] = config

@@ -35,6 +35,7 @@ from engage_hri.services.commandline.talk.prose import Prose, Warnings, strict_r
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal.live import Log
 from engage_hri.services.console.terminal.log import Telling
+from engage_hri.services.generation.service import WORLD_PATIENCE
 
 NOTHING = World(entities=())
 PATIENCE: Seconds = 5.0
@@ -175,7 +176,7 @@ async def _remote(job: Job, config: Config) -> int:
     async with await job.options.open(config.bus, "manager", patience=PATIENCE) as hub:
         await _somebody_there(hub, job.servers, config)
         async with connect(hub=hub) as robot:
-            world = await world_with_people(robot, job.things, config.robot, config.generation.world_patience)
+            world = await world_with_people(robot, job.things, config.robot, WORLD_PATIENCE)
         if job.has_fragments:
             # Without perception generation itself waits or refuses.
             input_check.check(job.sources, world, config.robot, job.outputs)

@@ -13,9 +13,8 @@ from rich.text import Text
 from engage_hri.schemas.nets import NetPlace, NetTransition
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
-from engage_hri.services.console.nets import NetInView
-from engage_hri.services.console.terminal import net_rows
-from engage_hri.services.console.terminal.net_rows import (
+from engage_hri.services.console import net_rows
+from engage_hri.services.console.net_rows import (
     BLOCK,
     LETTERS,
     MARK,
@@ -24,6 +23,7 @@ from engage_hri.services.console.terminal.net_rows import (
     ordered,
     without_number,
 )
+from engage_hri.services.console.nets import NetInView
 from engage_hri.services.console.view import OWN_BLOCKS
 from engage_hri.services.console.wording import number
 

@@ -1,8 +1,8 @@
 """Layout of a net for the page: which instant in which column, which behavior in which row. Pure."""
 
 from engage_hri.schemas.nets import NetTransition
+from engage_hri.services.console.net_rows import BLOCK, Row, behaviors, ordered, ties
 from engage_hri.services.console.nets import NetInView, where
-from engage_hri.services.console.terminal.net_rows import BLOCK, Row, behaviors, ordered, ties
 from engage_hri.services.console.view import OWN_BLOCKS
 from engage_hri.services.console.web.lanes import Zero
 from engage_hri.services.console.web.sections import NetInstant, NetRow, NetShown, NetSpot, Tokens

@@ -116,7 +116,7 @@ class SimulatedServos:
         self._speed = np.zeros(len(self._names))
 
     def send(self, angles: Angles) -> None:
-        """Take a set point for each joint, radians."""
+        """Take set points. angles: one for each joint, radians."""
         self._go_on()
         self._wanted = np.array([angles[name] for name in self._names])
 

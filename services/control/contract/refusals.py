@@ -7,10 +7,29 @@ from engage_hri.schemas.behaviors import BlockBehavior, Pointing
 from engage_hri.schemas.body import Capabilities, Estimate, NoPointZone
 from engage_hri.schemas.check import check_behavior
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
 
 VOICE_ADVICE = "--voice espeak to be heard, --voice silent to take the time of words alone"
+
+
+class Impossible(Exception):
+    """The body cannot do a behavior. kind: of the warning that says so. reason, advice: in words."""
+
+    def __init__(self, kind: WarningKind, reason: str, advice: str = "") -> None:
+        super().__init__(reason)
+        self.kind = kind
+        self.reason = reason
+        self.advice = advice
+
+    def fault(self, behavior: BlockBehavior) -> Fault:
+        """Describe it as a fault of the behavior that was asked for."""
+        return Fault(reason=self.reason, where=behavior.id, advice=self.advice, service="control")
+
+    def estimate(self, behavior: BlockBehavior) -> Estimate:
+        """The estimate of the behavior that was asked for: it cannot be done."""
+        return infeasible(behavior.id, self.kind, self.fault(behavior))
 
 
 def refusal(

@@ -1,39 +1,16 @@
 """A behavior worked out for the simulated torso: where its joints go, and its sync points on the way."""
 
 from collections.abc import Mapping
-from functools import cache
 
 import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.body import NoPointZone, Ray
-from engage_hri.schemas.feedback import WarningKind
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.world import World
 from engage_hri.services.control.figure.aiming import UPRIGHT, Aim, Trunk
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
-
-
-class Impossible(Exception):
-    """The body cannot do a behavior. kind: of the warning that says so. reason, advice: in words."""
-
-    def __init__(self, kind: WarningKind, reason: str, advice: str = "") -> None:
-        super().__init__(reason)
-        self.kind = kind
-        self.reason = reason
-        self.advice = advice
-
-
-class CoursePoint(Struct, frozen=True):
-    """A sync point of a course. held_with: the hold point at which it waits; its own name if it is one itself.
-
-    stands_at: the later point up to which the motion may go while it waits here: it is on target at both.
-    """
-
-    sync: str
-    held_with: str = ""
-    stands_at: str = ""
+from engage_hri.services.control.motion.points import Point
 
 
 class Course(Struct, frozen=True, kw_only=True):
@@ -42,7 +19,7 @@ class Course(Struct, frozen=True, kw_only=True):
     parts: tuple[str, ...]
     joints: tuple[str, ...]
     legs: tuple[Leg, ...]
-    points: tuple[CoursePoint, ...]
+    points: tuple[Point, ...]
     on_target: Mapping[str, float] = {}
     """Joint angles at the stroke, or at the end of a shift."""
     ray: Ray | None = None
@@ -84,7 +61,7 @@ class Situation(Struct, frozen=True):
 
 
 def course(
-    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[CoursePoint, ...],
+    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[Point, ...],
     goal: tuple[float, ...], ray: Ray | None = None, note: str = "", aim: Aim | None = None,
 ) -> Course:  # fmt: skip
     """Make the course of a motion to `goal`."""
@@ -92,22 +69,6 @@ def course(
         parts=parts, joints=joints, legs=legs, points=points, on_target=dict(zip(joints, goal, strict=True)), ray=ray,
         note=note, aim=aim,
     )  # fmt: skip
-
-
-@cache
-def held_on_target(*arrival: str) -> tuple[CoursePoint, ...]:
-    """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
-    before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
-    points = [CoursePoint(sync, "stroke", "relax") if sync in arrival else CoursePoint(sync) for sync in before]
-    return (*points, CoursePoint("stroke_end", "relax"), CoursePoint("relax", "relax"), CoursePoint("end"))
-
-
-@cache
-def held_around_stroke(strokes: tuple[str, ...] = ()) -> tuple[CoursePoint, ...]:
-    """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
-    number = SYNC_POINTS.index("stroke_end")
-    syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
-    return tuple(CoursePoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
 
 
 def marks(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:

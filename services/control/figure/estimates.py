@@ -10,25 +10,20 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.course import Course, CoursePoint, Impossible
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.sizing import quickest
 from engage_hri.services.control.motion.motion import SLOWEST
 from engage_hri.services.control.motion.path import Array, Path
+from engage_hri.services.control.motion.points import Point
 
 Added = Callable[[Seconds], Array]
 """What the trunk adds to the joints of a path so many seconds after it began."""
 
 
-def infeasible(behavior: BlockBehavior, impossible: Impossible) -> Estimate:
-    fault = Fault(reason=impossible.reason, where=behavior.id, advice=impossible.advice, service="control")
-    return Estimate(behavior=behavior.id, feasible=False, fault=fault, warning=impossible.kind)
-
-
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
-    phases = _phases((CoursePoint("start"), CoursePoint("end", "end")), {"start": 0.0, "end": duration})
+    phases = _phases((Point("start"), Point("end", "end")), {"start": 0.0, "end": duration})
     return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
 
 
@@ -116,7 +111,7 @@ def _travel(path: Path, until: Seconds, added: Added) -> float:
 
 
 def _phases(
-    points: Sequence[CoursePoint],
+    points: Sequence[Point],
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,

@@ -19,23 +19,15 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.course import (
-    Course,
-    CoursePoint,
-    Impossible,
-    Situation,
-    angles,
-    course,
-    held_around_stroke,
-    held_on_target,
-    marks,
-)
+from engage_hri.services.control.figure.course import Course, Situation, angles, course, marks
 from engage_hri.services.control.figure.kinematics import Side
 from engage_hri.services.control.figure.pace import arm_time, moving_time, return_time
 from engage_hri.services.control.figure.repertoire import Absent, Found, GesturePath, HeadPath, Table
 from engage_hri.services.control.figure.table_lift import clear_of_table
 from engage_hri.services.control.motion.path import Leg
+from engage_hri.services.control.motion.points import Point, held_around_stroke, held_on_target
 
 SETTLE: Seconds = 0.08
 DRIFT = radians(0.3)
@@ -221,7 +213,7 @@ def shift(goals: Mapping[str, Mapping[str, float]], situation: Situation, note: 
     seconds = moving_time(joints, here, goal)
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
-    points = (CoursePoint("start"), CoursePoint("end"))
+    points = (Point("start"), Point("end"))
     return course(tuple(goals), joints, legs, points, goal, note=note)
 
 

@@ -10,9 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import tracks
 from engage_hri.services.control.figure.aiming import Trunk
-from engage_hri.services.control.figure.course import Course, Impossible
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path
 
 KEPT = 128

@@ -6,9 +6,9 @@ from math import radians
 import numpy as np
 
 from engage_hri.schemas.units import Meters, Radians
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics, tracks
 from engage_hri.services.control.figure.aiming import UPRIGHT, Trunk
-from engage_hri.services.control.figure.course import Impossible
 
 Pose = tuple[float, ...]
 """Angles of the joints of one arm, or of both."""

@@ -34,8 +34,8 @@ from engage_hri.services.control.contract.body import (
     TakenOver,
 )
 from engage_hri.services.control.contract.extras import Idle
-from engage_hri.services.control.figure.course import Impossible
-from engage_hri.services.control.figure.estimates import infeasible, wait_estimate
+from engage_hri.services.control.contract.refusals import Impossible
+from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
 from engage_hri.services.control.reachy_mini.courses import Instant
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
@@ -193,7 +193,7 @@ class ReachyMini(Body):
             path = self._moves.path(course, now, start)
             return motion_estimate(behavior, course, path, around, self._moves, self._settings.lag)
         except Impossible as impossible:
-            return infeasible(behavior, impossible)
+            return impossible.estimate(behavior)
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self._move(behavior, authority)
@@ -246,7 +246,7 @@ class ReachyMini(Body):
             else:
                 self._moves.take_over(run, now)
         except Impossible as impossible:
-            raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
+            raise BehaviorRefused(impossible.fault(behavior)) from impossible
         unwatch = authority.watch(run.bell.ring)
         self._bells.add(run.bell)
         try:

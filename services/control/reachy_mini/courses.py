@@ -31,9 +31,10 @@ from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.vocabulary import normal
 from engage_hri.schemas.world import World
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import expressions
 from engage_hri.services.control.figure.choreography import OFFSETS
-from engage_hri.services.control.figure.course import Impossible, Situation
+from engage_hri.services.control.figure.course import Situation
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
 from engage_hri.services.control.reachy_mini import geometry, joints

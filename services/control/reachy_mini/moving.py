@@ -14,7 +14,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDir
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import MovementAuthority
-from engage_hri.services.control.figure.course import Impossible
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
 from engage_hri.services.control.reachy_mini import courses, geometry, joints

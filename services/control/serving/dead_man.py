@@ -1,4 +1,11 @@
-"""Behaviors that wait since nobody renews their authority. The pulse of a requester is the lease of its movements."""
+"""Behaviors that wait since nobody renews their authority.
+
+A realizer may die, or be cut off, while an arm is on its way. The arm must not go on by a plan that nobody watches,
+nor fall: a cut of half a second is common, and no reason to give up a gesture. So the pulse of a requester is the
+lease of its movements (decision 0037). Whoever is not heard has its behaviors held where they can wait. They go on
+when it is heard again, and end when their lease is over. Here is the list of those that wait, as it is told on the
+bus.
+"""
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.holds import Hold

@@ -31,13 +31,14 @@ from engage_hri.services.control.contract.body import (
     Reached,
 )
 from engage_hri.services.control.contract.extras import Idle, Seen
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.alive import Alive
-from engage_hri.services.control.figure.course import CoursePoint, Impossible
-from engage_hri.services.control.figure.estimates import beneath_a_look, infeasible, wait_estimate
+from engage_hri.services.control.figure.estimates import beneath_a_look, wait_estimate
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.motion.points import Point
 from engage_hri.services.control.torso import displaced_joints, head, homing, truth
 from engage_hri.services.control.torso.beneath import pass_end
 from engage_hri.services.control.torso.copy_for_rehearsal import Clock, beside
@@ -112,7 +113,7 @@ class SimulatedBody(Body):
     def _estimate(self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         match behavior:
             case Speech() if self._deviations.of("voiceless"):
-                return infeasible(behavior, Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak"))
+                return Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak").estimate(behavior)
             case Speech():
                 return speech_estimate(behavior, uttered(behavior), torso.pose(world, pose))
             case Wait(duration=duration):
@@ -242,7 +243,7 @@ class SimulatedBody(Body):
             run = Run(behavior, course, authority, self._deviations, self._occasions)
             path = self._torso.path(run.course)
         except Impossible as impossible:
-            raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
+            raise BehaviorRefused(impossible.fault(behavior)) from impossible
         unwatch = authority.watch(run.bell.ring)
         self._torso.take_over(run, path)
         try:
@@ -315,21 +316,21 @@ class SimulatedBody(Body):
                 run.pending.pop(0)
                 yield Reached(sync, at := max(due, since), at)
 
-    async def _come(self, run: Run, point: CoursePoint, due: Seconds) -> Seconds | None:
+    async def _come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
         """Wait until the joints have come to a point that the plan has passed at `due`. Returns when they had.
 
         None: something else has changed; look again. Raises BodyFailed. These joints are where the plan has them.
         """
         return due
 
-    def _has_come(self, run: Run, point: CoursePoint) -> bool:
+    def _has_come(self, run: Run, point: Point) -> bool:
         """True if the joints have come to a point that the plan has passed."""
         return True
 
     def _check_joints(self, run: Run) -> None:
         """Raise BodyFailed if the joints do not come along any more."""
 
-    async def _fail_or_stall(self, run: Run, point: CoursePoint) -> None:
+    async def _fail_or_stall(self, run: Run, point: Point) -> None:
         if point.sync == OVERHEAT:
             raise BodyFailed(_fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
         stall = run.faults[STALL]
@@ -354,7 +355,7 @@ class SimulatedBody(Body):
         try:
             course = choreography.plan(behavior, self._torso.situation(self._torso.world))
         except Impossible as impossible:
-            raise BehaviorRefused(_fault(behavior, impossible.reason, impossible.advice)) from impossible
+            raise BehaviorRefused(impossible.fault(behavior)) from impossible
         self._torso.set_base(behavior, course, authority)
         follow(self._torso)
         now = self._loop.time()

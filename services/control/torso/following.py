@@ -7,8 +7,9 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Hand, Pointing
 from engage_hri.schemas.units import Meters, Radians, Seconds
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, kinematics, tracks
-from engage_hri.services.control.figure.course import Course, Impossible, Situation
+from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.pace import arm_time
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.torso import head

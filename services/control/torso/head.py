@@ -8,9 +8,10 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, tracks
 from engage_hri.services.control.figure.aiming import NECK, Aim
-from engage_hri.services.control.figure.course import Course, Impossible, Situation
+from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.pace import turning_time
 from engage_hri.services.control.figure.tracks import Track
 from engage_hri.services.control.motion.motion import Motion

@@ -7,9 +7,10 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import Gaze, Pointing
 from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.world import World
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography
-from engage_hri.services.control.figure.course import Course, Impossible, Situation, angles
-from engage_hri.services.control.figure.estimates import infeasible, is_arm, is_gaze, poses, posture_estimate
+from engage_hri.services.control.figure.course import Course, Situation, angles
+from engage_hri.services.control.figure.estimates import is_arm, is_gaze, poses, posture_estimate
 from engage_hri.services.control.torso.outlines import Asked, outlines
 from engage_hri.services.control.torso.torso import Torso
 from engage_hri.services.runtime.steps import Steps, portions
@@ -51,7 +52,7 @@ def postures(torso: Torso, items: Sequence[EstimateItem], world: World) -> Steps
         try:
             made = questions.opened(number, item)
         except Impossible as impossible:
-            told[number] = infeasible(item.behavior, impossible)
+            told[number] = impossible.estimate(item.behavior)
         else:
             opened += [made] if made is not None else []
         yield ELEMENTS

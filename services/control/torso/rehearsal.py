@@ -17,10 +17,10 @@ from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.bell import EARLY
 from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, tracks
-from engage_hri.services.control.figure.course import Impossible
-from engage_hri.services.control.figure.estimates import beneath_a_look, infeasible
+from engage_hri.services.control.figure.estimates import beneath_a_look
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path, resting
 from engage_hri.services.control.torso import following, head
@@ -319,7 +319,7 @@ def _begin(
         estimate = torso.told(behavior, course, path, situation)
         yield TELLING
     except Impossible as impossible:
-        return infeasible(behavior, impossible)
+        return impossible.estimate(behavior)
     waits, forced = told_apart(course, path, times, passing)
     paced = paced_by(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)

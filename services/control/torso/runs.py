@@ -12,10 +12,11 @@ from engage_hri.services.control.contract import variability
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.variability import Deviations
-from engage_hri.services.control.figure.course import Course, CoursePoint
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.sizing import hurried
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path, unmarked
+from engage_hri.services.control.motion.points import Point
 from engage_hri.services.runtime.steps import Steps
 
 STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")
@@ -42,7 +43,7 @@ class Run:
         self.authority = authority
         self.bell = Bell()
         self.began: Seconds = inf
-        self.pending: list[CoursePoint] = list(course.points)
+        self.pending: list[Point] = list(course.points)
         self.holding = False
         self.is_beneath = False
         """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
@@ -136,7 +137,7 @@ class Run:
         coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
         return [(sync, planned[sync]) for sync in coming if sync in planned]
 
-    def due(self, point: CoursePoint) -> Seconds | None:
+    def due(self, point: Point) -> Seconds | None:
         """Instant at which it reports `point`; None if it may not go so far.
 
         A point at which the joints rest is reported at the instant asked for, if that is later than its arrival.
@@ -255,7 +256,7 @@ class Run:
             return
         legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
         self.course = replace(self.course, legs=legs)
-        self.pending.insert(index, CoursePoint(fault))
+        self.pending.insert(index, Point(fault))
 
     def _mark_faults(self, motion: Motion, now: Seconds) -> None:
         """Mark the faults that are due on the path of a motion, half-way from here. One that comes too late to stop

@@ -13,9 +13,10 @@ import numpy as np
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Meters, Radians, Seconds
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import tracks
 from engage_hri.services.control.figure.aiming import SAME, TRUNK, UPRIGHT, Aim, Trunk
-from engage_hri.services.control.figure.course import Course, Impossible
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import is_arm
 from engage_hri.services.control.figure.table_lift import LIFTS, are_clear, lifted
 from engage_hri.services.control.figure.tracks import Track

@@ -14,11 +14,12 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
-from engage_hri.services.control.figure.course import Course, Impossible, Situation
-from engage_hri.services.control.figure.estimates import Added, going_home, infeasible, motion_estimate, poses
+from engage_hri.services.control.figure.course import Course, Situation
+from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate, poses
 from engage_hri.services.control.figure.laid_paths import laid_path
 from engage_hri.services.control.figure.repertoire import Repertoire
 from engage_hri.services.control.figure.tracks import Track
@@ -66,7 +67,7 @@ class Torso:
             path = self.path(course, None if is_moving else situation)
             return self.told(behavior, course, path, situation, moving=is_moving)
         except Impossible as impossible:
-            return infeasible(behavior, impossible)
+            return impossible.estimate(behavior)
 
     def pose(self, world: World, pose: BodyPose | None) -> BodyPose:
         """Pose of all joints: those of `pose`, and where the others are."""

@@ -43,6 +43,9 @@ from engage_hri.services.generation.permits import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
 from engage_hri.services.generation.turns.policy import TurnPlan
 
+FIGURE_LEAD: Seconds = 2.0
+"""Time from gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
+
 
 class FragmentPlan(Struct, frozen=True, kw_only=True):
     """The block of a fragment and what is known of it before it is sent.
@@ -127,7 +130,7 @@ class Emission:
         self._time_speeches_and_references()
         opening, closing = self._opening(), self._closing()
         behaviors = (*opening, *self._in_document_order(), *closing)
-        if self.turn.closes and self.config.low_end and self.speeches:
+        if self.turn.closes and self.speeches:
             behaviors = lowered(behaviors, self.speeches[-1])
         return FragmentPlan(
             block=Block(
@@ -227,7 +230,7 @@ class Emission:
                     self.strokes.append(Stroke(parts.point, hand))
                 is_timed = self.rewriting.is_timed(behavior.id, self.named)
                 if self.figure:
-                    lines = as_in_the_figure(parts, preceding, self.before.speech, is_timed, self.config.figure_lead)
+                    lines = as_in_the_figure(parts, preceding, self.before.speech, is_timed, FIGURE_LEAD)
                     operators += [each for each in lines if not self._is_said(each, operators)]
                 else:
                     operators += checking_back(parts, preceding, self.before.speech, is_timed, glance)

@@ -24,6 +24,12 @@ from engage_hri.services.generation.head.maintenance_policy import FaceWatch, Gl
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
 from engage_hri.services.runtime.absent import Acquaintances
 
+DWELL: Seconds = 0.3
+"""Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
+finds it there. Ours."""
+RETRY: Seconds = 1.0
+"""Pause before a gaze shift that failed is tried again, so that a body that cannot is not asked
+all the time. Ours."""
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
@@ -86,9 +92,9 @@ class Arbiter:
 
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._config = config
-        self._responses = ResponsePolicy(robot, config)
-        self._hands = HandWatch(robot, config)
-        self._faces = FaceWatch(robot, config)
+        self._responses = ResponsePolicy(robot)
+        self._hands = HandWatch(robot)
+        self._faces = FaceWatch(robot)
         self._glances = GlanceWatch(config)
         self._people = Acquaintances()
         self._inhibition: Inhibition | None = None
@@ -184,7 +190,7 @@ class Arbiter:
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""
         if id.rpartition("-")[2] == str(self._shifts):
-            self._failed = self._base, now + self._config.retry
+            self._failed = self._base, now + RETRY
             self._base = NOWHERE
 
     def body_lost(self) -> None:
@@ -202,7 +208,7 @@ class Arbiter:
         due = [self._hands.deadline, self._faces.deadline, self._glances.deadline, self._responses.deadline]
         due.append(self._failed[1] if self._failed else None)
         if self._lapsed is not None:
-            due.append(self._lapsed + self._config.dwell)
+            due.append(self._lapsed + DWELL)
         return min((each for each in due if each is not None), default=None)
 
     def rule(self, now: Seconds) -> Ruling:
@@ -254,7 +260,7 @@ class Arbiter:
             return own
         if self._lapsed is None:
             self._lapsed = now
-        return best if now >= self._lapsed + self._config.dwell else self._owner
+        return best if now >= self._lapsed + DWELL else self._owner
 
     def _shift(self, now: Seconds) -> Shift | None:
         """The shift to send; None while the base gaze is where it belongs, or a fragment's gaze has the head."""

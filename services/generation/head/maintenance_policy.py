@@ -18,6 +18,23 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.absent import Absent
 
+HAND_SPEED = 0.05
+"""Speed in m/s above which a hand counts as moving: below it is the noise of vision. Ours."""
+HAND_ONSET: Seconds = 0.2
+"""Time that a hand moves before the head tracks it. Thesis 3.3.4 tracks hands; the number is ours."""
+HAND_STILLNESS: Seconds = 0.8
+"""Time that a hand is still before the head leaves it. Ours."""
+GLANCE_DURATION: Seconds = 0.9
+"""Time that a glance at the face lasts before the head goes back. Ours."""
+MTBCE_PRIOR: Seconds = 5.7
+"""Mean time between connection events that is assumed until `MTBCE_EVENTS` of them were seen. Table 2.1."""
+MTBCE_LOW: Seconds = 3.0
+"""Least value that the recent mean counts as: a burst of events is no reason to glance all the time. Ours."""
+MTBCE_HIGH: Seconds = 15.0
+"""Greatest value that the recent mean counts as: silence is no reason to glance no more. Ours."""
+MTBCE_EVENTS = 5
+"""Number of connection events, without the robot's glances, from which on the mean is believed. Ours."""
+
 
 class _Hand(Struct):
     """A hand that has moved. active: it is tracked, for it has moved for long, and has not been still for long."""
@@ -30,9 +47,8 @@ class _Hand(Struct):
 class HandWatch:
     """Claim 5: a hand that moves, or with which its owner manipulates something, until it has been still."""
 
-    def __init__(self, robot: str, config: GenerationConfig) -> None:
+    def __init__(self, robot: str) -> None:
         self._robot = robot
-        self._config = config
         self._hands: dict[str, _Hand] = {}
         """Hands that move, or are tracked."""
         self._places: dict[str, Entity] = {}
@@ -72,9 +88,7 @@ class HandWatch:
         fast = {
             entity.id
             for entity in world.entities
-            if entity.kind == "hand"
-            and entity.owner != self._robot
-            and math.hypot(*entity.velocity) > self._config.hand_speed
+            if entity.kind == "hand" and entity.owner != self._robot and math.hypot(*entity.velocity) > HAND_SPEED
         }
         for id in sorted(fast):
             hand = self._hands.setdefault(id, _Hand())
@@ -105,20 +119,16 @@ class HandWatch:
         due = []
         for id, hand in self._hands.items():
             if hand.moving_since is not None and not hand.active:
-                due.append(hand.moving_since + self._config.hand_onset)
+                due.append(hand.moving_since + HAND_ONSET)
             elif hand.still_since is not None and hand.active and not self._acting(id):
-                due.append(hand.still_since + self._config.hand_stillness)
+                due.append(hand.still_since + HAND_STILLNESS)
         return min(due, default=None)
 
     def claim(self, now: Seconds) -> Claim | None:
         for id, hand in self._hands.items():
-            if hand.moving_since is not None and now >= hand.moving_since + self._config.hand_onset:
+            if hand.moving_since is not None and now >= hand.moving_since + HAND_ONSET:
                 hand.active = True
-            elif (
-                hand.still_since is not None
-                and not self._acting(id)
-                and now >= hand.still_since + self._config.hand_stillness
-            ):
+            elif hand.still_since is not None and not self._acting(id) and now >= hand.still_since + HAND_STILLNESS:
                 hand.active = False
         self._hands = {id: hand for id, hand in self._hands.items() if hand.active or hand.moving_since is not None}
         active = [id for id, hand in self._hands.items() if hand.active]
@@ -134,9 +144,8 @@ class HandWatch:
 class FaceWatch:
     """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction."""
 
-    def __init__(self, robot: str, config: GenerationConfig) -> None:
+    def __init__(self, robot: str) -> None:
         self._robot = robot
-        self._config = config
         self._people: dict[str, Entity] = {}
         self._here: set[str] = set()
         """Those with a face who have not been lost; the world may still tell of one who has."""
@@ -253,7 +262,7 @@ class GlanceWatch:
 
     def began(self, now: Seconds) -> None:
         """Note that the arbiter gives the head to the glance."""
-        self._until = now + self._config.glance_duration
+        self._until = now + GLANCE_DURATION
 
     def ended(self, now: Seconds) -> None:
         """Note that the arbiter has taken the head from the glance."""
@@ -265,12 +274,12 @@ class GlanceWatch:
         """Mean time between connection events, without the robot's glances, within its limits."""
         actor = self.face if self.face in self._statistics else ""
         seen = self._statistics.get(actor)
-        if seen is None or seen.session.events - self._own[actor] < self._config.mtbce_events:
-            return self._config.mtbce_prior
+        if seen is None or seen.session.events - self._own[actor] < MTBCE_EVENTS:
+            return MTBCE_PRIOR
         recent = seen.recent.mtbce_without_maintenance
         if recent is None:
-            return self._config.mtbce_high  # nothing in the window: slower than it can show
-        return min(max(recent, self._config.mtbce_low), self._config.mtbce_high)
+            return MTBCE_HIGH  # nothing in the window: slower than it can show
+        return min(max(recent, MTBCE_LOW), MTBCE_HIGH)
 
     @property
     def _due(self) -> Seconds | None:

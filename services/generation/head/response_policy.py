@@ -10,9 +10,10 @@ from engage_hri.schemas.body import Ray
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.distractors import TOLERANCE, angle_off_axis
 
+RESPONSE_HOLD: Seconds = 0.8
+"""Time that shared gaze lasts before the response lets go. Thesis 3.3.3 names no time; ours."""
 ANSWERED = ("directed_gaze", "mutual_facial_gaze")
 """Kinds of event that this policy answers. Adjacency pairs and backchannels belong to the collaboration manager."""
 
@@ -32,9 +33,8 @@ class _Answer(Struct):
 class ResponsePolicy:
     """The human-initiated events that are open, newest last."""
 
-    def __init__(self, robot: str, config: GenerationConfig) -> None:
+    def __init__(self, robot: str) -> None:
         self._robot = robot
-        self._config = config
         self._open: dict[str, _Answer] = {}
         self._seen: Seconds = float("-inf")
 
@@ -58,7 +58,7 @@ class ResponsePolicy:
             if targets and fragment_target in ("", *targets):
                 self._open[event.id] = _Answer(event, targets, now)
         elif event.state == "succeeded" and event.id in self._open:
-            self._open[event.id].until = now + self._config.response_hold
+            self._open[event.id].until = now + RESPONSE_HOLD
         else:
             self._open.pop(event.id, None)
 
@@ -90,7 +90,7 @@ class ResponsePolicy:
 
     def _turns(self, answer: _Answer) -> list[Seconds]:
         """Times at which the gaze goes on from one of several objects to the next."""
-        return [answer.since + index * self._config.response_hold for index in range(1, len(answer.targets))]
+        return [answer.since + index * RESPONSE_HOLD for index in range(1, len(answer.targets))]
 
 
 def viewing_order(

@@ -18,11 +18,18 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.speakable import word_count
+from engage_hri.schemas.units import Meters
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.config import GenerationConfig, PhraseAttribute
+from engage_hri.services.generation.config import PhraseAttribute
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.distractors import extent
 
+PHRASE_ATTRIBUTES: tuple[PhraseAttribute, ...] = ("color", "shape", "feature", "size")
+"""Attributes that proposed phrases may say beside the noun, the most preferred first: absolute before relative, as
+people do (Dale and Reiter 1995, after Pechmann 1989). `shape` only where the noun is something else."""
+THIS_WITHIN: Meters = 0.65
+"""Distance from the robot up to which "this" is proposed; beyond: "that". About the reach of an arm; ours, since
+Appendix B says both."""
 SPOKEN: tuple[PhraseAttribute, ...] = get_args(PhraseAttribute)
 """Attributes in the order in which English says modifiers, whatever the order of preference."""
 MOST_MODIFIERS = 3
@@ -51,9 +58,7 @@ class Proposals(Struct, frozen=True):
     warnings: tuple[str, ...] = ()
 
 
-def proposed(
-    references: Sequence[Reference], world: World, config: GenerationConfig, discourse: Discourse = NO_DISCOURSE
-) -> Proposals:
+def proposed(references: Sequence[Reference], world: World, discourse: Discourse = NO_DISCOURSE) -> Proposals:
     """Give phrases to those references that came without any. discourse: what was referred to before them."""
     objects = _Objects(world)
     made: list[Reference] = []
@@ -61,7 +66,7 @@ def proposed(
     for reference in references:
         if reference.options is None:
             is_the_topic = discourse.topic == reference.target
-            options = phrases(reference.target, objects, config, is_the_topic=is_the_topic)
+            options = phrases(reference.target, objects, is_the_topic=is_the_topic)
             if not objects.describes(reference.target):
                 called = _phrase(objects.noun(reference.target), ())
                 warnings.append(
@@ -74,27 +79,25 @@ def proposed(
     return Proposals(tuple(made), tuple(warnings))
 
 
-def phrases(
-    target: str, objects: "_Objects", config: GenerationConfig, *, is_the_topic: bool = False
-) -> tuple[SpeechOption, ...]:
+def phrases(target: str, objects: "_Objects", *, is_the_topic: bool = False) -> tuple[SpeechOption, ...]:
     """Phrases for `target`, from short to long, each with its cost in words and its distractors.
 
     is_the_topic: the target alone was mentioned before, so that "it" can mean nothing else.
     """
     options = [_option("it", frozenset())] if is_the_topic else []
-    demonstrative = "this" if objects.distance(target) <= config.this_within else "that"
+    demonstrative = "this" if objects.distance(target) <= THIS_WITHIN else "that"
     if not objects.describes(target) and not objects.noun(target).word:
         demonstrative += " one"
     # The distractors of a deictic phrase are those of pointing: the reference policy computes them.
     options.append(SpeechOption(text=demonstrative, cost=word_count(demonstrative), deictic=True))
-    return (*options, *_descriptions(target, objects, config))
+    return (*options, *_descriptions(target, objects))
 
 
-def _descriptions(target: str, objects: "_Objects", config: GenerationConfig) -> Iterator[SpeechOption]:
+def _descriptions(target: str, objects: "_Objects") -> Iterator[SpeechOption]:
     """Descriptions such as "the big square", without those that another one of as few words beats."""
     noun = objects.noun(target)
     others = objects.ids - {target}
-    modifiers = [known for attribute in config.phrase_attributes for known in objects.properties(target, attribute)]
+    modifiers = [known for attribute in PHRASE_ATTRIBUTES for known in objects.properties(target, attribute)]
     candidates = []
     for count in range(min(len(modifiers), MOST_MODIFIERS) + 1):
         for chosen in combinations(modifiers, count):

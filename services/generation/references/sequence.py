@@ -18,6 +18,9 @@ from engage_hri.services.generation.references.pairs import POINT, ROUNDING, Pai
 from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.runtime.steps import Steps
 
+EXPECTED_DELAY: Seconds = 0.3
+"""Expected delay of directed gaze, E[delay]: the mean of Table 2.1. Its cost is set by `generation.wait_weight`.
+Decision B7."""
 Rank = tuple[float, tuple[tuple[bool, float, int, int], ...]]
 """Sort key of a sequence: the rounded cost and then the preferences."""
 
@@ -82,7 +85,7 @@ class Movements:
         config = self._config
         gaze, point = self._motions.gaze(head, self._target), self._motions.point(arm, self._target)
         no_gaze = refusal("look from there", gaze)
-        look, wait = config.head_cost(gaze.head_degrees), config.wait_weight * config.expected_delay
+        look, wait = config.head_cost(gaze.head_degrees), config.wait_weight * EXPECTED_DELAY
         return {
             "none": Made("", ()),
             "gaze": Made(no_gaze, (look,)),

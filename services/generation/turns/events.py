@@ -16,6 +16,12 @@ from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
 from engage_hri.services.requests.deadlines import Silences
 
+WORDS_PATIENCE: Seconds = 2.0
+"""Time after the end of a spoken answer for which the outcome of the turn waits for its words, if somebody tells the
+words of that person: recognizers know them 0.3 to 2 s after they were said. Decision 0065."""
+LONGEST_ANSWER: Seconds = 15.0
+"""Time after the beginning of such an answer for which the outcome waits for its end. Ours."""
+
 
 class TurnEvents:
     """The connection events of the robot's turns in their last known state."""
@@ -152,12 +158,12 @@ class TurnOutcomes:
         person = pair.responder
         if pair.response == "speak" and self._heard.expects(person):
             if pair.state == "succeeded":
-                return self._events.changed(pair) + self._config.longest_answer
+                return self._events.changed(pair) + LONGEST_ANSWER
             ended = self._events.changed(pair)
             if pair.state == "completed" and (
-                not pair.words or self._heard.is_saying(person, ended - self._config.longest_answer)
+                not pair.words or self._heard.is_saying(person, ended - LONGEST_ANSWER)
             ):
-                return ended + self._config.words_patience
+                return ended + WORDS_PATIENCE
         return float("-inf")
 
     def _close(self, turn: str) -> TurnClosed:

@@ -22,6 +22,8 @@ from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.text.listening import is_listening
 
+TURN_SILENCE: Seconds = 10.0
+"""Silence after which an open turn closes as aborted. Recognition waits for its end for longer. Ours."""
 LONGEST_LISTENING: Seconds = 3.0
 """Seconds of nothing but a listener's words, such as "yes, yes, okay", after which their speaker takes the floor."""
 
@@ -293,7 +295,7 @@ class TurnPolicy:
         """Times until which others may go on as they do: be away or talk, by person, and be silent, by turn."""
         limits = {("talks", each): self._takes_floor_at(each, began) for each, began in self._talked_into.items()}
         if self._silent_since is not None:
-            limits["silent", self.open_turn] = self._silent_since + self._config.turn_silence
+            limits["silent", self.open_turn] = self._silent_since + TURN_SILENCE
         people = {plan.addressee for plan in self._turns_under_way}
         return limits | {("away", each): at + FACE_GRACE for each, at in self._away.items() if each in people}
 
@@ -325,7 +327,7 @@ class TurnPolicy:
         if why == "silent":
             assert self._open is not None
             assert self._silent_since is not None
-            silence = f"silence for {self._config.turn_silence:g} s"
+            silence = f"silence for {TURN_SILENCE:g} s"
             since, speaker = self._silent_since, self._speaker
             return self._abort(self._open, self._sight.fault(silence, "", "late", speaker, "", since))
         if actor := self._taken_by or (who if why == "talks" else ""):

@@ -32,7 +32,7 @@ class Decisions:
 
     began: loop time of the block's start; all times are of that clock. observers: told what happens in the net, but
     not again what had happened before another plan. is_free: False for a behavior that is not to begin before
-    there is another plan. sight: what this process knows of its own standstills.
+    there is another plan. sight: what this process knows of its own standstills. is_ending: see the property.
     """
 
     def __init__(
@@ -43,11 +43,13 @@ class Decisions:
         observers: Callable[[Plan, RunningNet, Seconds], Sequence[Observer]] = lambda plan, net, began: (),
         is_free: Callable[[str], bool] = lambda behavior: True,
         sight: Sight | None = None,
+        is_ending: Callable[[], bool] = lambda: False,
     ) -> None:
+        self._is_ending = is_ending
         self.began = began
         self.facts = Facts(began)
         self.foresight = Foresight(plan, self.facts)
-        self.grants = Grants(self.facts, self.foresight, config, is_free)
+        self.grants = Grants(self.facts, self.foresight, is_free)
         self.lateness_watch = LatenessWatch(config, sight or Sight("realizer"))
         self._unwatched: set[str] = set()
         """Behaviors about which there is news, so that another report of theirs is to be expected than before."""
@@ -183,6 +185,11 @@ class Decisions:
         for transition in range(len(self.plan.members)):
             self.grants.on_opened(transition)
         return effects
+
+    @property
+    def is_ending(self) -> bool:
+        """True if the behaviors of the block are being ended, whatever was planned."""
+        return self._is_ending()
 
     @property
     def is_over(self) -> bool:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Set
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.stuck import Stuck, fixed_times
 from engage_hri.services.realizer.foresee.expected_times import Foresight
 from engage_hri.services.realizer.net.facts import Facts
@@ -18,6 +17,12 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.slack import BRAKING, UNNOTICED, slack
 from engage_hri.services.realizer.points import EPSILON, WITH_STROKE, Member, Point, frozen
+
+LEAD: Seconds = 0.3
+"""How long before an instant a behavior that comes just in time is told to pass it; more than braking takes. Ours."""
+GAP: Seconds = 0.05
+"""How long before a word gap an utterance is told to go on; more than a message takes. Later is better, since more is
+known of the others then. Ours."""
 
 
 class Grants(Observer):
@@ -31,7 +36,6 @@ class Grants(Observer):
         self,
         facts: Facts,
         foresight: Foresight,
-        config: RealizerConfig,
         is_free: Callable[[str], bool] = lambda behavior: True,
     ) -> None:
         """is_free: False for a behavior that is not to begin now, since another block has a part of it."""
@@ -39,7 +43,6 @@ class Grants(Observer):
         self.granted_at: dict[str, Seconds] = {}
         self._facts = facts
         self._foresight = foresight
-        self._config = config
         self._is_free = is_free
         self._through: dict[str, int] = {}
         """For each behavior, the number of the last point that it may go through."""
@@ -134,8 +137,8 @@ class Grants(Observer):
             early = slack(self._plan, may_pass.point) if may_pass is not None and is_foreseen else 0.0
             if may_pass is not None and arrival is not None and arrival >= due - early - EPSILON:
                 # Not told earlier than necessary: if the behavior is faster than expected, it must wait after all.
-                if ripe - self._config.lead > now + EPSILON:
-                    self._wake(transition, ripe - self._config.lead)
+                if ripe - LEAD > now + EPSILON:
+                    self._wake(transition, ripe - LEAD)
                 else:
                     self._foresight.may_be_slower.add(may_pass.behavior)
                     self._grant(transition, may_pass)
@@ -201,8 +204,8 @@ class Grants(Observer):
         arrival = self._foresight.arrival(member)
         if arrival is None or (transition, member.behavior) in self._granted:
             return
-        if arrival - self._config.gap > now + EPSILON:
-            self._wake(transition, arrival - self._config.gap)
+        if arrival - GAP > now + EPSILON:
+            self._wake(transition, arrival - GAP)
         elif due <= arrival + UNNOTICED:
             self._grant(transition, member)
 

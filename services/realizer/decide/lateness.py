@@ -11,9 +11,15 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
-from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.config import LATE, RealizerConfig
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.deadlines import Silences
+
+LATE_FACTOR = 1.0
+"""Share of its natural time by which a phase may take longer besides: a long one misses by more. Ours."""
+STALL_FACTOR = 5.0
+"""The same for a phase whose behavior counts as failed (`realizer.stall`): motors that take four times as long pass.
+Ours."""
 
 
 class Late(Struct, frozen=True):
@@ -40,7 +46,7 @@ class LatenessWatch:
     """The next report of each behavior under way, and when it becomes too late."""
 
     def __init__(self, config: RealizerConfig, sight: Sight) -> None:
-        self._config = config
+        self._stall = config.stall
         self._awaited: dict[str, tuple[str, Seconds, Seconds]] = {}
         """Next report of each behavior, when it is expected, and how long the phase before it lasts."""
         self._warned: set[str] = set()
@@ -49,11 +55,11 @@ class LatenessWatch:
 
     def expect(self, behavior: str, sync: str, expected: Seconds, natural: Seconds, now: Seconds) -> None:
         """Expect `sync` as the next report, about at `expected`. natural: the duration of the phase before it."""
-        limits, awaited = self._config, (sync, expected, natural)
+        awaited = (sync, expected, natural)
         if awaited != self._awaited.get(behavior):
             self._awaited[behavior] = awaited
-            late = expected + limits.late + limits.late_factor * natural
-            stalled = expected + limits.stall + limits.stall_factor * natural
+            late = expected + LATE + LATE_FACTOR * natural
+            stalled = expected + self._stall + STALL_FACTOR * natural
             if behavior not in self._warned:
                 self._alarms.set((behavior, False), max(now, late))
             self._alarms.set((behavior, True), max(now, stalled))

@@ -1,11 +1,11 @@
 """One behavior of a live block: an asyncio task that awaits its sync points, and talks to what performs it."""
 
 import asyncio
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import EngageError, Fault
@@ -15,7 +15,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.futures import Reached, SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.phases import with_planned_hand
@@ -26,8 +26,37 @@ from engage_hri.services.realizer.report.spoken import Spoken
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
 
 
-class Performing(Protocol):
-    """The block, as the runs of its behaviors see it."""
+class Arrived(NamedTuple):
+    """A behavior holds at `point`."""
+
+    point: Point
+    at: Seconds
+
+
+class Lost(NamedTuple):
+    """A behavior cannot be finished. at_rest: its parts rest."""
+
+    behavior: str
+    fault: Fault
+    kind: WarningKind = "EXECUTION_FAILURE"
+    at_rest: bool = False
+
+
+class BodyLost(NamedTuple):
+    """The end of what performs the block."""
+
+    fault: Fault
+
+
+RunNews = Arrived | Reached | Lost | BodyLost
+"""What becomes of a behavior, as its run tells it."""
+
+
+class Stage(NamedTuple):
+    """Values that the runs of one block share.
+
+    id, plan: of the block, as it began. tell: takes what becomes of a behavior.
+    """
 
     id: str
     plan: Plan
@@ -37,21 +66,7 @@ class Performing(Protocol):
     recognition: RecognitionLink
     futures: SyncPointFutures
     spoken: Spoken
-
-    def route(self, id: str) -> None:
-        """Send reports about this request here."""
-
-    def arrive(self, point: Point, at: Seconds) -> None:
-        """Take the news that a behavior holds at `point`."""
-
-    def reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
-        """Take the news that a behavior has passed `point`."""
-
-    def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
-        """Drop a behavior that cannot be finished. at_rest: its parts rest."""
-
-    def lose_body(self, fault: Fault) -> None:
-        """End the block: what performs it is gone."""
+    tell: Callable[[RunNews], None]
 
 
 class BehaviorRun:
@@ -61,15 +76,16 @@ class BehaviorRun:
     pending: the request to what performs it.
     """
 
-    __slots__ = ("_asked", "_block", "_hold_changed", "behavior", "id", "pending")
+    __slots__ = ("_asked", "_block", "_hold_changed", "_points", "behavior", "id", "pending")
 
-    def __init__(self, block: Performing, id: str) -> None:
+    def __init__(self, block: Stage, id: str) -> None:
         self.id = id
         self.behavior: BlockBehavior | None = None
         self.pending: Pending | None = None
         self._block = block
         self._asked: Begin | Extend | None = None
         self._hold_changed: asyncio.Future[None] | None = None
+        self._points: Sequence[Point] = ()
 
     @property
     def is_by_body(self) -> bool:
@@ -89,18 +105,23 @@ class BehaviorRun:
             self._send()
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
-        """Take a report of the body."""
+        """Take a report of the body: it resolves the future of its sync point, which the behavior awaits."""
         block, point = self._block, Point(self.id, message.sync)
         if self.pending is None or self.pending.request.id != message.id or self.pending.outcome.done():
             return
         facts, bus = block.decisions.facts, block.bus
         at = facts.plausible(point, bus.local(message.at), bus.now())
         if isinstance(message, SyncPointArrived):
-            block.arrive(point, at)
-        else:
+            block.tell(Arrived(point, at))
+        elif point in self._points:
             same = message.arrived == message.at
             arrived = at if same else facts.plausible(point, bus.local(message.arrived), at)
-            block.reach(point, at, arrived=arrived, by_body=True)
+            self._report(point, Reached(point, at, arrived, by_body=True))
+
+    def _report(self, point: Point, news: Reached | None) -> None:
+        """Resolve the future of a sync point. Earlier ones that nobody has reported are made good by this one."""
+        for each in self._points[: self._points.index(point) + 1]:
+            self._block.futures.report(each, news if each == point else None)
 
     async def perform(self) -> None:
         """Wait until it may begin, and perform it to its end."""
@@ -120,7 +141,7 @@ class BehaviorRun:
             case _ if performer(behavior) == "clock":
                 await self._wait(0.0)
             case _:
-                await self._by_body(behavior)
+                await self._by_body(behavior, chain.points)
 
     def _send(self) -> Pending:
         assert self.behavior is not None
@@ -128,19 +149,28 @@ class BehaviorRun:
         self.pending = self._block.body.perform(self.behavior, self._asked)
         return self.pending
 
-    async def _by_body(self, behavior: BlockBehavior) -> None:
+    async def _by_body(self, behavior: BlockBehavior, points: Sequence[Point]) -> None:
+        """Follow the body through the sync points of the behavior.
+
+        A report of the body resolves the future of a point: the behavior tells it, and the net fires. What the net
+        grants then is sent at once (`command`), whichever point the behavior awaits.
+        """
         block = self._block
-        block.route(block.body.id(self.id))
         block.decisions.count_from(self.id, block.bus.now())
+        ended, self._points = self._send().outcome, points
+        ended.add_done_callback(lambda _: self._report(points[-1], None))
+        for point in points:
+            if (reached := await block.futures.reported(point)) is not None:
+                block.tell(reached)
         try:
-            outcome = await self._send().outcome
+            outcome = await ended
         except (RequestRefused, NeverEnded) as error:
             refused = isinstance(error, RequestRefused)
             self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
             return
         except EngageError as error:
             self.pending = None
-            block.lose_body(error.fault.at(block.id))
+            block.tell(BodyLost(error.fault.at(block.id)))
             return
         if not isinstance(outcome, BehaviorOutcome):
             self.lose(Fault(reason=f"control ended it with a {type(outcome).__name__}"))
@@ -148,14 +178,14 @@ class BehaviorRun:
         block.spoken.end(outcome)
         if outcome.status == "lapsed":  # the body has gone home: nothing of this block can be as planned
             unsaid = Fault(reason="nobody has renewed it", where=block.plan.block.id, cause="unrenewed")
-            block.lose_body(outcome.fault or unsaid)
+            block.tell(BodyLost(outcome.fault or unsaid))
             return
-        facts, end = block.decisions.facts, Point(self.id, sync_points(behavior)[-1])
+        facts, end = block.decisions.facts, points[-1]
         at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
         if outcome.status == "taken_over":  # its last report may be lost
-            block.reach(Point(self.id, outcome.passed), at, by_body=True)
+            block.tell(Reached(Point(self.id, outcome.passed), at, by_body=True))
         if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
-            block.reach(end, at, by_body=outcome.status == "done")
+            block.tell(Reached(end, at, by_body=outcome.status == "done"))
         else:
             self.lose(loss(outcome, Spelling(block.plan.block)), at_rest=outcome.status != "failed")
 
@@ -163,23 +193,23 @@ class BehaviorRun:
         """Give it up: it cannot be finished. The fault gets the line of the behavior."""
         assert self.behavior is not None
         fault = replace(fault, line=fault.line or self.behavior.line)
-        self._block.lose(self.id, fault, kind, at_rest=at_rest)
+        self._block.tell(Lost(self.id, fault, kind, at_rest))
 
     def _at_once(self) -> None:
         now = self._block.bus.now()
-        self._block.reach(Point(self.id, "start"), now)
-        self._block.reach(Point(self.id, "end"), now)
+        self._block.tell(Reached(Point(self.id, "start"), now))
+        self._block.tell(Reached(Point(self.id, "end"), now))
 
     async def _wait(self, duration: Seconds) -> None:
         block, end = self._block, Point(self.id, "end")
         began = block.bus.now()
-        block.reach(Point(self.id, "start"), began)
+        block.tell(Reached(Point(self.id, "start"), began))
         if duration:
             await self._time(began, duration)
         arrived = block.bus.now()
-        block.arrive(end, arrived)
+        block.tell(Arrived(end, arrived))
         await block.futures.granted(end)
-        block.reach(end, block.bus.now(), arrived=arrived)
+        block.tell(Reached(end, block.bus.now(), arrived))
 
     async def _time(self, began: Seconds, duration: Seconds) -> None:
         """Wait for so long, not counting the time in which the behavior is held."""
@@ -211,7 +241,7 @@ class BehaviorRun:
     async def _event(self, event: Event) -> None:
         block = self._block
         began = await self._really_begun(event)
-        block.reach(Point(event.id, "start"), began)
+        block.tell(Reached(Point(event.id, "start"), began))
         pending = block.recognition.ask(block.body.id(event.id), block.id, event, began)
         if pending is not None:
             self.pending = pending
@@ -222,4 +252,4 @@ class BehaviorRun:
             self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR")
         else:
             end = Point(event.id, "end")
-            block.reach(end, max(began, decision.at), by_body=decision.by_recognition)
+            block.tell(Reached(end, max(began, decision.at), by_body=decision.by_recognition))

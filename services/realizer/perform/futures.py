@@ -1,13 +1,22 @@
 """Futures of one block, which its running net resolves: one for each sync point and each instant that is awaited."""
 
 import asyncio
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.points import FINISH, Point
 
 T = TypeVar("T")
+
+
+class Reached(NamedTuple):
+    """A behavior has passed `point`. arrived: when it had come there, if it waited. by_body: told by the body."""
+
+    point: Point
+    at: Seconds
+    arrived: Seconds | None = None
+    by_body: bool = False
 
 
 class SyncPointFutures(Observer):
@@ -17,6 +26,7 @@ class SyncPointFutures(Observer):
         self._granted: dict[Point, asyncio.Future[None]] = {}
         self._fired: dict[Point, asyncio.Future[Seconds]] = {}
         self._reached: dict[Point, asyncio.Future[Seconds]] = {}
+        self._reported: dict[Point, asyncio.Future[Reached | None]] = {}
 
     def adopt(self, net: RunningNet) -> "SyncPointFutures":
         """Observe another net of the same block from now on."""
@@ -50,9 +60,18 @@ class SyncPointFutures(Observer):
         """Note that the behavior has passed `point`."""
         _resolve(self._reached, point, at)
 
+    def reported(self, point: Point) -> "asyncio.Future[Reached | None]":
+        """Resolved with the report of the body about `point`; with None if it was lost, or there will be none."""
+        return _future(self._reported, point)
+
+    def report(self, point: Point, news: Reached | None) -> None:
+        """Note what the body has reported of `point`; what comes after the first is ignored."""
+        if not (future := _future(self._reported, point)).done():
+            future.set_result(news)
+
     def cancel(self) -> None:
         """Cancel all that is still awaited: the block has ended."""
-        for futures in (self._granted, self._fired, self._reached):
+        for futures in (self._granted, self._fired, self._reached, self._reported):
             for future in futures.values():
                 future.cancel()
 

@@ -5,9 +5,10 @@ releases is commanded first; predictions, feedback and news for other blocks com
 """
 
 import asyncio
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, MutableMapping, Set
 from functools import partial
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import BlockOutcome
@@ -16,35 +17,80 @@ from engage_hri.schemas.faults import Cause, Fault, InputRefused
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Containing
+from engage_hri.services.bus.interface import Bus, Containing
+from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
+from engage_hri.services.realizer.perform.behavior_run import (
+    Arrived,
+    BehaviorRun,
+    BodyLost,
+    Lost,
+    RunNews,
+    Stage,
+)
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.ends_of_runs import all_ended
-from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.futures import Reached, SyncPointFutures
 from engage_hri.services.realizer.perform.net_stream import NetStream
+from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.again import planned_again, reestimated
+from engage_hri.services.realizer.plan.known import Known, is_named_in
 from engage_hri.services.realizer.plan.needs import events_needing, without
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
-from engage_hri.services.realizer.points import FINISH, Point
+from engage_hri.services.realizer.points import FINISH, Point, frozen
 from engage_hri.services.realizer.report.feedback import News, Reporter
 from engage_hri.services.realizer.report.outcome import completed, reasons
 from engage_hri.services.realizer.report.spoken import Spoken
-from engage_hri.services.realizer.together.held_block import HeldBlock
+from engage_hri.services.realizer.together.body_questions import is_crowd, parts_moved
 from engage_hri.services.realizer.together.live import Ending, Live
-from engage_hri.services.realizer.together.rehearsal import Rehearsing
-from engage_hri.services.realizer.together.shared_context import SharedContext
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Neighbor
+from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing
 from engage_hri.services.realizer.together.ties import Ties
+from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
 
 
-class BlockPerformance:
-    """A block being performed. id: the manager's for it; its name among other blocks is that of its plan's block."""
+class SharedContext(Struct, frozen=True):
+    """Context that all performances of one realizer share.
+
+    routes: for the id of each request to the body, the performance that sent it. others: all performances, in the
+    order in which they began. live_blocks: for ties between blocks. over: told of each block and behavior of it that
+    is held and has ended. ask: asks the body about behaviors of a block.
+    """
+
+    bus: Bus
+    requests: Requester
+    config: RealizerConfig
+    peers: Presence
+    routes: "MutableMapping[str, BlockPerformance]"
+    others: "Callable[[], list[BlockPerformance]]"
+    live_blocks: LiveBlocks
+    over: Callable[[str, str], None]
+    ask: Ask
+
+    def performed(self) -> list[Decisions]:
+        """Decisions of all blocks that are performed, in the order in which they began."""
+        return [each.decisions for each in self.others()]
+
+    def rehearse(self, plan: Plan, but: object = None) -> None:
+        """Let blocks rehearse what is to come, since a plan is new. but: a performance that need not."""
+        others, parts = self.others(), parts_moved(plan, plan.chains)
+        for each in () if is_crowd(self.performed()) else others:
+            if each is not but:
+                each.rehearsing.look_again(parts)
+
+
+class BlockPerformance(Neighbor):
+    """A block being performed. id: the manager's for it; its name among other blocks is that of its plan's block.
+
+    plan: the one that it began with. interrupted: behaviors that are ended on request, each with the reason if one
+    was given.
+    """
 
     def __init__(
         self,
@@ -55,33 +101,43 @@ class BlockPerformance:
         *,
         is_held: bool = False,
     ) -> None:
-        """held, is_held: see `HeldBlock`."""
+        """held: behaviors that are held as it begins; None: all. is_held: whether anything is, perhaps elsewhere."""
         self._live, self.id = live, live.id
         self.plan, self._shared = plan, shared
-        self.bus, self._config = shared.bus, shared.config
-        self.recognition = RecognitionLink(shared)
-        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
+        self.bus, self._config, self._ending = shared.bus, shared.config, live.ending
         self.futures = SyncPointFutures()
-        self.held = HeldBlock(self, shared.live_blocks, held, is_holding=is_held)
         spelling = Spelling(plan.block, live.elsewhere)
         self._net = NetStream(shared.bus, live.id, spelling, live.request.follows)
-        self.report = Reporter(shared.bus, live.id, shared.config.skew, spelling)
-        self._runs = {id: BehaviorRun(self, id) for id in plan.chains}
+        self.report = Reporter(shared.bus, live.id, spelling)
+        self.spoken = Spoken(plan.block.behaviors)
+        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
+        self.decisions = Decisions(
+            plan, self.bus.now(), shared.config, self._observers, self._is_free, self.bus.sight, self._ending.done
+        )
+        recognition = RecognitionLink(
+            shared.bus, shared.requests, shared.peers, lambda: (each.last_deed for each in shared.others())
+        )
+        stage = Stage(
+            live.id, plan, self.decisions, self.bus, self.body, recognition, self.futures, self.spoken, self._take
+        )
+        self._runs = {id: BehaviorRun(stage, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
         """Behaviors that were dropped, each with the reason."""
         self._loss = Fault(reason="")
         """The fault of the last one that was lost."""
         self.interrupted: dict[str, str] = {}
-        """Behaviors that are ended on request, each with the reason if one was given."""
-        self.ties = Ties(self, shared.others, shared.live_blocks, live.elsewhere)
-        self.spoken = Spoken(plan.block.behaviors)
-        self._ending = live.ending
+        self._ties = Ties(plan, shared.live_blocks, live.elsewhere)
+        self._held, self._is_held = held, is_held
+        """What of it is held, and whether anything is."""
+        self._stuck: tuple[Set[Point], Set[Point]] = frozen(), frozen()
+        """Points of other blocks that do not come before what is held goes on; those that come no nearer either."""
         self._timer = Timer(self.take_in)
         self._afterwards = Afterwards(self.take_in)
         self._soon = Alarm(self.take_in)
-        self.rehearsing = Rehearsing(self, shared.others, shared.bus.now, shared.ask)
-        self.leaders: Collection[str] = ()
+        self.rehearsing = Rehearsing(
+            self.decisions, shared.performed, self._known, self.bus.now, shared.ask, self._plan_with, self.containing
+        )
         self._untold: list[News] = []
         self._needs_replan = False
 
@@ -98,15 +154,18 @@ class BlockPerformance:
 
     async def run(self) -> BlockOutcome:
         """Perform the block to its end, whatever that is. Ends everything it began."""
-        began, block = self.bus.now(), self.plan.block.id
-        self.decisions = Decisions(self.plan, began, self._config, self._observers, self.ties.is_free, self.bus.sight)
-        self.held.begin()
+        began, block = self.decisions.began, self.plan.block.id
+        if self._is_held:
+            self.decisions.hold_up(True, self.bus.now())
+            self._hold_still()
         self.report.started(self.plan, began)
         self.report.unkept(self.plan)
         for behavior in self.plan.dropped:
             self._shared.live_blocks.lose(block, behavior)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "start"), began)
         self.futures.fired(FINISH).add_done_callback(self._finish)
+        routes = {self.body.id(id): self for id in self._runs}
+        self._shared.routes.update(routes)
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._tasks = {
@@ -114,9 +173,9 @@ class BlockPerformance:
                     for id in self.plan.begun_in_order(self._runs)  # Those that begin with the block do so in order.
                 }
                 self._shared.live_blocks.perform(block, self, self._live.elsewhere)
-                with self._shared.live_blocks.followed(self.ties, set(self.ties.foreign)):
-                    self.ties.begin()
-                    self.held.tell()
+                with self._shared.live_blocks.followed(self, set(self._ties.foreign)):
+                    self._begin_among_others()
+                    self.tell_stuck()
                     self._take_out(self._live.taken_out)
                     self.take_in()
                     self._shared.rehearse(self.plan, but=self)
@@ -144,11 +203,6 @@ class BlockPerformance:
     def _finish(self, fired: "asyncio.Future[Seconds]") -> None:
         if not fired.cancelled():
             self._live.stop(Ending("done"))
-
-    @property
-    def has_begun(self) -> bool:
-        """True if its behaviors may begin."""
-        return bool(self._tasks)
 
     def is_going_on(self, behavior: str) -> bool:
         """True if the behavior is of this block and has neither ended nor been dropped."""
@@ -178,40 +232,138 @@ class BlockPerformance:
         if (run := self._runs.get(message.behavior)) is not None:
             run.feed(message)
 
-    # -- other blocks ------------------------------------------------------------------------------------------------
-
-    @property
-    def is_ending(self) -> bool:
-        """True if its behaviors are being ended, whatever was planned."""
-        return self._ending.done()
-
-    def fail(self, behavior: str, fault: Fault) -> None:
-        """End the block as failed, and say that it is because of this behavior."""
-        self._tell()
-        self.report.warn("EXECUTION_FAILURE", fault.within(self.id, behavior), behavior)
-        self._live.fail(fault.at(f"{self.id}: {behavior}"))
-
-    def follow(self, points: Iterable[Point]) -> None:
-        """Tell from now on when these points are expected: other blocks are tied to them."""
-        if points:
-            self.take_in(partial(self.decisions.follow, points))
-            self.ties.name(points)
-
-    def times(self) -> Mapping[Point, Seconds]:
-        """Time of each point, measured or expected, by the loop's clock."""
-        return self.decisions.foresight.times(self.bus.now())
+    # -- other blocks (see `Neighbor`) -------------------------------------------------------------------------------
 
     @property
     def newest_plan(self) -> Plan:
-        """The plan that it follows now."""
         return self.decisions.plan
+
+    def times(self) -> Mapping[Point, Seconds]:
+        return self.decisions.foresight.times(self.bus.now())
+
+    def follow(self, points: Iterable[Point]) -> None:
+        if points:
+            self.take_in(partial(self.decisions.follow, points))
+            if self._ties.name(points):
+                self._replan_for_parts()
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        if point in self._ties.foreign:
+            self.take_in(partial(self._hear, point, at))
+
+    def _hear(self, point: Point, at: Seconds) -> None:
+        facts = self.decisions.facts
+        if point not in facts.reached:
+            facts.hear(point, at)
+            if point in facts.reached:  # else it was named by an earlier plan only
+                self.report.compare(self.decisions, point)
+
+    def foresee(self, point: Point, at: Seconds) -> None:
+        if point in self._ties.foreign:
+            self.take_in(partial(self.decisions.foresight.foresee, point, at))
+
+    def miss(self, behaviors: Iterable[str]) -> None:
+        if missed := self._ties.miss(behaviors, self.decisions):
+            self.take_in(partial(self._go_on_without, missed))
+
+    def _go_on_without(self, missed: Collection[Point]) -> None:
+        """Plan without points of other blocks; fail if a required behavior or constraint was tied to one of them."""
+        for id, point in self._ties.needed(missed, self.decisions):
+            if id not in self.interrupted:
+                reason = f"{self.report.spelling(point)}, which it is tied to, does not come, and the tie is required"
+                fault = Fault(reason=reason)
+                self._tell()
+                self.report.warn("EXECUTION_FAILURE", fault.within(self.id, id), id)
+                self._live.fail(fault.at(f"{self.id}: {id}"))
+                return
+        self.replan()
+
+    def _is_free(self, behavior: str) -> bool:
+        is_free = self._ties.is_free(behavior, self.decisions, self._shared.performed(), self.bus.now())
+        if not is_free:
+            self.plan_again()
+        return is_free
+
+    def _known(self) -> Known:
+        return self._ties.known(self.decisions, self._shared.performed(), self.bus.now())
+
+    def _begin_among_others(self) -> None:
+        """Tell other blocks that this one has begun: those that are tied to it can be planned now."""
+        for each in self._shared.others():
+            if each is not self and is_named_in(self.plan.block.id, each._ties.foreign_ties):
+                each.take_in(each.replan)
+        self._take_over()
+
+    def _take_over(self) -> None:
+        """Tell other blocks which of their behaviors this one takes a part from by plan."""
+        plan = self.decisions.plan
+        for other in self._shared.others():
+            takes = ((name.partition(":"), taker) for name, taker in plan.takes.items())
+            taken = {id: taker for (of, _, id), taker in takes if of == other.plan.block.id}
+            if other._ties.keep(plan.block.id, taken):
+                other._replan_for_parts()
+            for behavior, taker in taken.items():
+                start = Point(f"{plan.block.id}:{taker}", "start")
+                if other._ties.give(behavior, start, other.decisions.plan):
+                    other._replan_for_parts()
+
+    def _replan_for_parts(self) -> None:
+        """Plan again at once, with the parts that it hands over."""
+        if self._ties.may_replan(self.bus.now()):
+            self.take_in(self.replan)
+
+    # -- holds -------------------------------------------------------------------------------------------------------
+
+    def can_wait(self, behavior: str) -> bool:
+        """True if the behavior, which is going on, can still be made to wait somewhere."""
+        return self.decisions.can_wait(behavior)
+
+    def hold_up(self, is_held: bool) -> None:
+        """Note that something is held from now on, perhaps of another block, or nothing any more."""
+        if is_held != self._is_held:
+            self._is_held = is_held
+            self.decisions.hold_up(is_held, self.bus.now())
+
+    def hold(self, behaviors: Collection[str] | None) -> None:
+        """Hold these behaviors, and no others, from now on. None: all of them."""
+        if behaviors != self._held:
+            self._held = behaviors
+            self.take_in(self._hold_still)
+
+    def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
+        named = self._ties.foreign
+        if (elsewhere & named, standing & named) != self._stuck:
+            self._stuck = elsewhere & named, standing & named
+            self.take_in(self._hold_still)
+
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
+        return self._found(lambda: self.decisions.stuck(elsewhere, standing))
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        return self._found(lambda: self.decisions.running(elsewhere, running))
+
+    def _found(self, points: Callable[[], Set[Point]]) -> Set[Point]:
+        found = set[Point]()
+        if not self._ending.done():
+            with self.containing():
+                found.update(points())
+        return found
+
+    def tell_stuck(self) -> None:
+        """Tell other blocks what is stuck, if anything is held."""
+        if self._is_held:
+            self._shared.live_blocks.tell_stuck()
+
+    def _hold_still(self) -> None:
+        for effect in self.decisions.hold(self._held, self.bus.now(), *self._stuck):
+            self.apply(effect)
 
     # -- the end -----------------------------------------------------------------------------------------------------
 
     async def _end_behaviors(self, ending: Ending) -> None:
         """Abort what still runs, and wait until all has ended, or for as long as the body is given."""
         self._tell()
-        await all_ended(self._runs, self._tasks, self.body, ending, within=self._config.abort, bus=self.bus)
+        await all_ended(self._runs, self._tasks, self.body, ending, self.bus)
         if self._outcome.status == "done":
             self.decisions.net.let_go()
         else:
@@ -253,7 +405,7 @@ class BlockPerformance:
         if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
-        self.held.tell()
+        self.tell_stuck()
         untold = self.report.not_before if foresight.is_surprised else None
         deadlines = [each for each in (self.decisions.deadline, untold) if each is not None]
         self._timer.set(min(deadlines) if deadlines and not self._ending.done() else None)
@@ -291,25 +443,28 @@ class BlockPerformance:
 
     def _let_go(self, behavior: str) -> None:
         """Hold a behavior no more once it has ended: nothing else is to be late for it."""
-        if self.held.names(behavior) and not self.is_going_on(behavior):
+        if self._held is not None and behavior in self._held and not self.is_going_on(behavior):
             self._shared.over(self.id, behavior)
 
-    # -- what behaviors report (see `Performing`) --------------------------------------------------------------------
+    # -- what behaviors tell -----------------------------------------------------------------------------------------
 
-    def route(self, id: str) -> None:
-        """Send reports about this request here."""
-        self._shared.routes[id] = self
+    def _take(self, news: RunNews) -> None:
+        match news:
+            case Arrived(point, at):
+                if not self._ending.done():
+                    self.decisions.arrive(point, at)
+                    self._hurry()
+            case Reached():
+                self._reach(news)
+            case Lost(behavior, fault, kind, at_rest):
+                self.lose(behavior, fault, kind, at_rest=at_rest)
+            case BodyLost(fault):
+                self._lose_body(fault)
 
-    def arrive(self, point: Point, at: Seconds) -> None:
-        """Take the news that a behavior holds at `point`."""
-        if not self._ending.done():
-            self.decisions.arrive(point, at)
-            self._hurry()
-
-    def reach(self, point: Point, at: Seconds, *, arrived: Seconds | None = None, by_body: bool = False) -> None:
-        """Take the news that a behavior has passed `point`."""
+    def _reach(self, told: Reached) -> None:
+        point, at = told.point, told.at
         if news := self.decisions.reach(point, at):
-            self._untold += [News(each, at, arrived if each == point else None, by_body) for each in news]
+            self._untold += [News(each, at, told.arrived if each == point else None, told.by_body) for each in news]
             for each in news:
                 self.spoken.reach(each)
                 self.futures.reach(each, at)
@@ -352,7 +507,7 @@ class BlockPerformance:
         self._needs_replan = True
         self._soon.set(self.bus.now())
 
-    def lose_body(self, fault: Fault) -> None:
+    def _lose_body(self, fault: Fault) -> None:
         """End the block: what performs it is gone."""
         if not self._ending.done():
             self._tell()
@@ -364,25 +519,29 @@ class BlockPerformance:
         self._tell()  # A behavior of which something is to be told may not be in the new plan.
         self._needs_replan = False
         try:
-            self._go_on_with(planned_again(self.decisions.plan, self.ties.known(), self._gone))
+            self._go_on_with(planned_again(self.decisions.plan, self._known(), self._gone))
         except InputRefused as error:
             self._live.fail(error.fault)
 
-    def plan_with(self, estimates: Iterable[Estimate]) -> None:
+    def _plan_with(self, estimates: Iterable[Estimate]) -> None:
+        self.take_in(partial(self._go_on_with_estimates, estimates))
+
+    def _go_on_with_estimates(self, estimates: Iterable[Estimate]) -> None:
         """Go on with other estimates, if that costs nothing."""
         self._tell()
-        plan = reestimated(self.decisions.plan, self.ties.known(), self._gone, estimates)
+        plan = reestimated(self.decisions.plan, self._known(), self._gone, estimates)
         if plan is not None and not self._needs_replan:
             self._go_on_with(plan)
 
     @property
     def _gone(self) -> tuple[str, ...]:
-        return (*self._dropped, *self.ties.gone)
+        return (*self._dropped, *self._ties.gone(self.decisions))
 
     def _go_on_with(self, plan: Plan) -> None:
         gone = self._gone
         self.decisions.replan(plan)
-        self.ties.renew()
+        self._shared.live_blocks.follow(self, self._ties.renew(self.decisions))
+        self._take_over()
         self._shared.rehearse(plan)
         # Told only now that the block goes on: its followers would end with it. What they do may drop more of it.
         for id in tuple(self._dropped):

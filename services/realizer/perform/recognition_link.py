@@ -1,6 +1,7 @@
 """Requests of one block to recognition: connection events and turn signals. The clock decides if it is not there."""
 
 import asyncio
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from msgspec import Struct
@@ -11,12 +12,13 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
+from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.realizer.together.shared_context import SharedContext
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.requests.ends import Pending, RequestRefused, ServerRestarted
+from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
 
 UNPROMISED: Seconds = 30.0
 """Time from the robot's last deed that a recognizer has which promises none, before its event is given up."""
@@ -32,11 +34,14 @@ class Decision(Struct, frozen=True):
 class RecognitionLink:
     """Asks recognition for the events of one block."""
 
-    def __init__(self, shared: SharedContext) -> None:
-        self._bus = shared.bus
-        self._requests = shared.requests
-        self._peers = shared.peers
-        self._others = shared.others
+    def __init__(
+        self, bus: Bus, requests: Requester, peers: Presence, deeds: Callable[[], Iterable[Seconds]]
+    ) -> None:
+        """deeds: times when the robot last did something of each block."""
+        self._bus = bus
+        self._requests = requests
+        self._peers = peers
+        self._deeds = deeds
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
         """Tell recognition what became of a turn. The answer does not matter."""
@@ -76,7 +81,7 @@ class RecognitionLink:
                 at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
                 return Decision(at, True)
             now = self._bus.now()
-            deed = max(deed, *(each.last_deed for each in self._others()))
+            deed = max(deed, *self._deeds())
             if pending is None or "recognition" not in self._peers:
                 due = event_deadline(event, block, facts.reached)
             else:

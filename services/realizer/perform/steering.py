@@ -86,7 +86,7 @@ class Steering:
     def _can_wait(self, live: Live, behavior: str) -> bool:
         """True if the behavior can still be made to wait."""
         performance = self._performances.get(live.request.id)
-        return self.is_going_on(live, behavior) and (performance is None or performance.held.can_wait(behavior))
+        return self.is_going_on(live, behavior) and (performance is None or performance.can_wait(behavior))
 
     async def interrupt(self, live: Live, behavior: str, reason: str = "") -> bool:
         """End a behavior that is going on, or take it out if its block has yet to begin.
@@ -142,10 +142,10 @@ class Steering:
         performed = [(live, self._performances.get(id)) for id, live in self._live.items()]
         for _, performance in performed:
             if performance is not None:
-                performance.held.hold_up(self.is_holding)
+                performance.hold_up(self.is_holding)
         for live, performance in performed:
             if performance is not None:
-                performance.held.hold(self.held(live))
+                performance.hold(self.held(live))
         self._live_blocks.tell_stuck()  # Those that wait for their turn may be held, too.
         since = self._holds.earliest()
         self._timer.set(None if since is None else since + self._longest)

@@ -1,4 +1,14 @@
-"""Schedule of the earliest instants within lower and upper bounds: longest paths, and the cycles that forbid them."""
+"""Schedule of the earliest instants within lower and upper bounds: longest paths, and the cycles that forbid them.
+
+Each place of the net says that one instant comes no earlier than so many seconds after another. Without upper bounds
+the earliest times are longest paths: one pass over the places in the order in which transitions can fire finds them.
+
+An upper bound says that an instant comes no later than so long after another. Where it is broken, the *earlier* one
+of the two is moved, since nothing can be moved forward. What follows it moves with it, and may break other bounds.
+So passes forward over places and back over bounds take turns. Times only grow, so the passes end, unless a cycle of
+places and bounds asks for more time than it has. Such a cycle is a contradiction that no timing solves. It is
+returned, for the planner to say who is to blame.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple

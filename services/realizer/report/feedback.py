@@ -29,6 +29,8 @@ from engage_hri.services.realizer.plan.waiting import waited_for
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, as_told, frozen
 
+SKEW: Seconds = 0.1
+"""Time by which a point may miss its instant before it is reported as LATE: below it people notice nothing."""
 MOVED: Seconds = 0.008
 """Seconds; a prediction that moves by less, as something was measured, is not told again."""
 PLANNED: Seconds = 0.002
@@ -59,11 +61,9 @@ class News(NamedTuple):
 class Reporter:
     """The feedback of one block. It never goes back in time: what is told late gets the time of the last message."""
 
-    def __init__(self, bus: Bus, block: str, tolerance: Seconds, spelling: Spelling) -> None:
-        """tolerance: seconds by which a point may miss its instant before it is reported as late."""
+    def __init__(self, bus: Bus, block: str, spelling: Spelling) -> None:
         self._bus = bus
         self._block = block
-        self._tolerance = tolerance
         self.spelling = spelling
         self._late: dict[tuple[Point, str], Seconds] = {}
         """Instants that were reported as late, and what the block says of them: seconds planned; inf: it came."""
@@ -167,7 +167,7 @@ class Reporter:
         times: of points that have come, or are planned.
         """
         is_past = verb == "came"
-        if broken.seconds > (self._tolerance if is_past else UNNOTICED):
+        if broken.seconds > (SKEW if is_past else UNNOTICED):
             point = broken.point
             late = point.behavior if broken.direction == "later" else ""
             why = waited_for(plan, late, times, self.spelling, is_past=is_past) if late in plan.chains else ""
@@ -177,7 +177,7 @@ class Reporter:
             is_news = (instant, broken.said) not in self._late
             if is_past:
                 planned = max([seconds for (at, _), seconds in self._late.items() if at == instant], default=-inf)
-                is_news = broken.seconds > planned + self._tolerance
+                is_news = broken.seconds > planned + SKEW
             if is_news:
                 self._late[instant, broken.said] = inf if is_past else broken.seconds
                 # What is said only of other blocks is no behavior of this one.

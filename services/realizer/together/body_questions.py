@@ -5,21 +5,21 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, EstimateBehaviors, EstimateItem, PlannedTime
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.known import Known, is_foreign
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import behavior_times
 from engage_hri.services.realizer.points import performer
-from engage_hri.services.realizer.together.knowledge import Performed
 
 CROWD = 48
 """Behaviors of all live blocks from which on the body is asked about each block by itself: each question is about all
 of them, and each new plan calls for one of each block."""
 
 
-def is_crowd(performed: Iterable[Performed]) -> bool:
-    """True if these performances have so many behaviors that they are not rehearsed beside each other."""
-    return sum(len(each.decisions.plan.chains) for each in performed) > CROWD
+def is_crowd(performed: Iterable[Decisions]) -> bool:
+    """True if these blocks have so many behaviors that they are not rehearsed beside each other."""
+    return sum(len(each.plan.chains) for each in performed) > CROWD
 
 
 def question_about(
@@ -41,10 +41,10 @@ def question_about(
 
 
 def question_about_rest(
-    performed: Performed, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]]
+    performed: Decisions, before: Mapping[str, BodyPose], times: Mapping[str, tuple[PlannedTime, ...]]
 ) -> EstimateBehaviors:
     """The same about behaviors of a block that is being performed: those with `times`."""
-    plan, facts = performed.decisions.plan, performed.decisions.facts
+    plan, facts = performed.plan, performed.facts
     items = [
         EstimateItem(
             behavior=with_planned_hand(plan.chains[id]),
@@ -58,37 +58,36 @@ def question_about_rest(
 
 
 def meanwhile(
-    performed: Iterable[Performed],
+    performed: Iterable[Decisions],
     parts: Collection[str],
     now: Seconds,
-    is_meant: Callable[[Performed, str], bool] = lambda performed, behavior: True,
+    is_meant: Callable[[Decisions, str], bool] = lambda performed, behavior: True,
 ) -> tuple[EstimateItem, ...]:
-    """Behaviors of these performances that move the body from now on, as the body is asked about them.
+    """Behaviors of these blocks that move the body from now on, as the body is asked about them.
 
     parts: those that matter; head and arms aim for where the torso is, so with one, the other does. is_meant: False
-    for a behavior of a performance that is to be left out.
+    for a behavior of a block that is to be left out.
     """
     matters = {*parts, "torso"}
     return tuple([
         EstimateItem(
-            behavior=with_planned_hand(each.decisions.plan.chains[id]),
+            behavior=with_planned_hand(each.plan.chains[id]),
             times=times,
-            reached=each.decisions.facts.next_number(id),
+            reached=each.facts.next_number(id),
         )
         for each in performed
         if not each.is_ending
         for id, times in times_ahead(each, now).items()
-        if "torso" in parts or not matters.isdisjoint(each.decisions.plan.estimates[id].parts)
+        if "torso" in parts or not matters.isdisjoint(each.plan.estimates[id].parts)
         if is_meant(each, id)
     ])  # fmt: skip
 
 
-def times_ahead(performed: Performed, now: Seconds) -> dict[str, tuple[PlannedTime, ...]]:
+def times_ahead(decisions: Decisions, now: Seconds) -> dict[str, tuple[PlannedTime, ...]]:
     """Seconds from now at which behaviors began or begin, wait, hurry and dawdle, in the order in which they begin.
 
     Of those that move the body and have not ended.
     """
-    decisions = performed.decisions
     plan, facts, expected = decisions.plan, decisions.facts, decisions.foresight.times(now)
     others = Known(points={point: at - now for point, at in expected.items() if is_foreign(point.behavior)})
     moving = [id for id in plan.chains if _moves(plan, id) and not facts.has_ended(id)]

@@ -1,7 +1,6 @@
 """Knowledge about other live blocks, gathered for the planning of one: points, parts, and who depends on whom."""
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
-from typing import Protocol
 
 from msgspec import Struct
 
@@ -31,16 +30,6 @@ MOMENT: Seconds = 0.001
 """Least time that a behavior is expected to keep a part after now, if it has not let go of it yet."""
 
 
-class Performed(Protocol):
-    """A block that is being performed, as far as others plan with it."""
-
-    decisions: Decisions
-
-    @property
-    def is_ending(self) -> bool:
-        """True if its behaviors are being ended, whatever was planned."""
-
-
 class Asker(Struct, frozen=True):
     """The block that is planned. since: loop time from which its plan counts.
 
@@ -62,10 +51,10 @@ class Asker(Struct, frozen=True):
     performing: Container[str] = ()
 
 
-def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks) -> Known:
+def knowledge(asker: Asker, others: Iterable[Decisions], live_blocks: LiveBlocks) -> Known:
     """Other live blocks, as known now. others: those that are given, in the order in which they began."""
     concerned = [each for each in others if concerns(asker.named, asker.parts, each)]
-    there = {each.decisions.plan.block.id for each in concerned}
+    there = {each.plan.block.id for each in concerned}
     points: dict[Point, Seconds] = {}
     holders: dict[str, Holder] = {}
     coming = dict(_coming(asker, live_blocks))
@@ -75,31 +64,30 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
             points[qualified(block, point)] = at - asker.since
     awaiting = waiting_for(asker.block, live_blocks)
     for each in concerned:
-        plan, decisions = each.decisions.plan, each.decisions
-        block = plan.block.id
+        plan, block = each.plan, each.plan.block.id
         names = {id: f"{block}:{id}" for id in plan.chains}
-        under_way, begun = set(decisions.facts.under_way), decisions.facts.begun
-        for point, at in decisions.foresight.times(asker.now).items():
+        under_way, begun = set(each.facts.under_way), each.facts.begun
+        for point, at in each.foresight.times(asker.now).items():
             behavior = point.behavior
             if is_foreign(behavior):
                 continue
             if behavior in under_way and point.sync == "start":
                 at = begun[behavior]
-            elif point not in decisions.facts.reached and (
-                names.get(behavior) in asker.met or behavior in under_way or decisions.facts.is_held(behavior)
+            elif point not in each.facts.reached and (
+                names.get(behavior) in asker.met or behavior in under_way or each.facts.is_held(behavior)
             ):
                 at = max(at, asker.now + MOMENT)
             points[qualified(block, point)] = at - asker.since
         for point, at in live_blocks.reached(block).items():  # of what was dropped since, too
             points.setdefault(qualified(block, point), at - asker.since)
         if not each.is_ending:
-            over = {id for id, name in names.items() if decisions.facts.has_ended(id)}
+            over = {id for id, name in names.items() if each.facts.has_ended(id)}
             over |= {id for id, name in names.items() if block in asker.later and name not in asker.met}
             if is_named_in(asker.block, plan.constrained):
                 # It is planned with the asker in mind: two blocks that make way for each other never agree.
-                over |= plan.chains.keys() - decisions.facts.under_way
+                over |= plan.chains.keys() - each.facts.under_way
             kept = plan.constrained | live_blocks.named(block)
-            reached = decisions.facts.next_number
+            reached = each.facts.next_number
             after = {id: taker.partition(":") for id, (taker, _) in plan.successors.items()}
             takers = {id: taker for id, (of, _, taker) in after.items() if taker and of == asker.block}
             holders |= holders_of(block, plan.chains, plan.estimates, plan.natural, kept, over, reached, takers)
@@ -115,13 +103,12 @@ def knowledge(asker: Asker, others: Iterable[Performed], live_blocks: LiveBlocks
     )
 
 
-def concerns(named: Iterable[Point], parts: Collection[str], other: Performed) -> bool:
+def concerns(named: Iterable[Point], parts: Collection[str], other: Decisions) -> bool:
     """True if a block has to be planned with the other in mind: it names it, or uses a part that the other has."""
-    plan = other.decisions.plan
-    if is_named_in(plan.block.id, named):
+    if is_named_in(other.plan.block.id, named):
         return True
-    has_ended = other.decisions.facts.has_ended
-    return any(part in parts and not has_ended(id) for id, each in plan.chains.items() for part in each.parts)
+    has_ended, chains = other.facts.has_ended, other.plan.chains
+    return any(part in parts and not has_ended(id) for id, each in chains.items() for part in each.parts)
 
 
 def _coming(asker: Asker, live_blocks: LiveBlocks) -> Iterator[tuple[str, Holder]]:

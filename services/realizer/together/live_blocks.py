@@ -1,10 +1,10 @@
 """Sync points of live blocks that other live blocks refer to: expected, reached or lost; and those of the past."""
 
+from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from math import inf
-from typing import Protocol
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.references import with_names
@@ -21,55 +21,57 @@ MOST_TELLINGS = 20
 that changes hands, may never agree on a time; they go on when something is measured."""
 
 
-class TiedBlock(Protocol):
-    """A block that is tied to points of others. Their behaviors are named `block:behavior`."""
+class Neighbor(ABC):
+    """A live block, as other live blocks see it: it is being performed, or waits for its turn.
 
+    Points of others are named `block:behavior`. leaders: blocks that have to end before it begins.
+    """
+
+    leaders: Collection[str] = ()
+
+    @property
+    @abstractmethod
+    def newest_plan(self) -> Plan:
+        """The plan that it follows now, or would follow if its turn came."""
+
+    @abstractmethod
+    def times(self) -> Mapping[Point, Seconds]:
+        """Time of each point, measured or expected, by the loop's clock."""
+
+    @abstractmethod
+    def follow(self, points: Iterable[Point]) -> None:
+        """Tell from now on when these points are expected: others are tied to them."""
+
+    # -- news of other blocks ------------------------------------------------------------------------------------
+
+    @abstractmethod
     def hear(self, point: Point, at: Seconds) -> None:
         """Take the news that a point of another block is reached."""
 
+    @abstractmethod
     def foresee(self, point: Point, at: Seconds) -> None:
         """Take the news that a point of another block is expected at another time than before."""
 
+    @abstractmethod
     def miss(self, behaviors: Iterable[str]) -> None:
         """Take the news that no more points of these behaviors will be reached."""
 
+    # -- holds: a point is stuck if it does not come before what is held goes on ---------------------------------
 
-class Holding(Protocol):
-    """Points of a block that are stuck: they do not come before what is held goes on."""
-
+    @abstractmethod
     def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
         """Points that others are tied to and that are stuck.
 
         elsewhere: points of other blocks that are. standing: those of them that come no nearer either.
         """
 
+    @abstractmethod
     def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
         """Points that others are tied to and that come nearer. running: those of other blocks that do."""
 
+    @abstractmethod
     def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
         """Take the news which points of other blocks are stuck, and which come no nearer either."""
-
-
-class FollowedBlock(Protocol):
-    """A block that is being performed, or waits for its turn, and that others may be tied to."""
-
-    def follow(self, points: Iterable[Point]) -> None:
-        """Tell from now on when these points are expected: others are tied to them."""
-
-    def times(self) -> Mapping[Point, Seconds]:
-        """Time of each point, measured or expected, by the loop's clock."""
-
-    @property
-    def held(self) -> "Holding":
-        """Holds of it, and what of it waits for what is held."""
-
-    @property
-    def leaders(self) -> Collection[str]:
-        """Blocks that have to end before it begins."""
-
-    @property
-    def newest_plan(self) -> Plan:
-        """The plan that it follows now, or would follow if its turn came."""
 
 
 class _Tracked:
@@ -86,12 +88,12 @@ class _Tracked:
         self.block = block
         self.others = others
         self.number = number
-        self.performance: FollowedBlock | None = None
+        self.performance: Neighbor | None = None
         self.named: set[Point] = set()
         self.expected: dict[Point, Seconds] = {}
         self.reached: dict[Point, Seconds] = {}
         self.lost: frozenset[str] = frozen()
-        self.followers: list[TiedBlock] = []
+        self.followers: list[Neighbor] = []
 
     def end(self) -> None:
         """Forget all that only a live block needs: what it referred to, and who asked for its times."""
@@ -214,7 +216,7 @@ class LiveBlocks:
         for follower in list(tracked.followers):
             follower.hear(qualified(block, point), at)
 
-    def perform(self, block: str, performance: FollowedBlock, named: Container[str] = ()) -> None:
+    def perform(self, block: str, performance: Neighbor, named: Container[str] = ()) -> None:
         """Note that `performance` performs the block now, or lets it wait: it is asked for its expected times.
 
         named: other blocks that it refers to, whatever its plan says.
@@ -263,17 +265,17 @@ class LiveBlocks:
                 stuck, standing = self._stuck()
                 for tracked in list(self._tracked.values()):
                     if tracked.performance is not None:
-                        tracked.performance.held.stick(stuck, standing)
+                        tracked.performance.stick(stuck, standing)
         finally:
             self._is_finding = False
 
     def _stuck(self) -> tuple[Set[Point], Set[Point]]:
         """Points of all blocks that are stuck, and those of them that come no nearer either."""
-        first = self._found(lambda held, found: held.stuck(found, frozenset()))
-        standing = first - self._found(lambda held, found: held.running(first, found))
-        return self._found(lambda held, found: held.stuck(found, standing)), standing
+        first = self._found(lambda block, found: block.stuck(found, frozenset()))
+        standing = first - self._found(lambda block, found: block.running(first, found))
+        return self._found(lambda block, found: block.stuck(found, standing)), standing
 
-    def _found(self, more: Callable[[Holding, Set[Point]], Set[Point]]) -> Set[Point]:
+    def _found(self, more: Callable[[Neighbor, Set[Point]], Set[Point]]) -> Set[Point]:
         """Points of all blocks that follow from each other, and from nothing."""
         found: set[Point] = set()
         before = -1
@@ -281,7 +283,7 @@ class LiveBlocks:
             before = len(found)
             for name, tracked in self._tracked.items():
                 if tracked.performance is not None:
-                    found |= {qualified(name, point) for point in more(tracked.performance.held, found)}
+                    found |= {qualified(name, point) for point in more(tracked.performance, found)}
         return found
 
     def lose(self, block: str, behavior: str) -> None:
@@ -294,7 +296,7 @@ class LiveBlocks:
             follower.miss((f"{block}:{behavior}",))
 
     @contextmanager
-    def followed(self, follower: TiedBlock, points: Iterable[Point]) -> Iterator[None]:
+    def followed(self, follower: Neighbor, points: Iterable[Point]) -> Iterator[None]:
         """Tell `follower` what becomes of these points of other blocks, and what already has."""
         self.follow(follower, points)
         try:
@@ -304,7 +306,7 @@ class LiveBlocks:
                 if follower in tracked.followers:
                     tracked.followers.remove(follower)
 
-    def follow(self, follower: TiedBlock, points: Iterable[Point]) -> None:
+    def follow(self, follower: Neighbor, points: Iterable[Point]) -> None:
         """Tell `follower` from now on what becomes of these points of other blocks, and what already has."""
         wanted = sorted(points)
         found = {name: self._find(name) for name in map(block_of, wanted)}

@@ -11,8 +11,10 @@ from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.body import Estimate, EstimateBehaviors, Estimates
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
@@ -23,17 +25,20 @@ from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.body_questions import is_crowd, meanwhile, parts_moved, question_about
-from engage_hri.services.realizer.together.knowledge import Asker, Performed, knowledge, may_share, parts_of
+from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.runtime.unhurried import unhurried
+
+ESTIMATE: Seconds = 2.0
+"""Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
 
 
 class Planning:
     """Planning of blocks with the body and with what is known of the other live blocks."""
 
     def __init__(
-        self, bus: Bus, config: RealizerConfig, live_blocks: LiveBlocks, performing: Callable[[], Iterable[Performed]]
+        self, bus: Bus, config: RealizerConfig, live_blocks: LiveBlocks, performing: Callable[[], Iterable[Decisions]]
     ) -> None:
         self._bus = bus
         self._config = config
@@ -142,7 +147,7 @@ class Planning:
     ) -> Known:
         now = self._bus.now()
         parts, performed = parts_of(block.behaviors, estimates), list(self._performing())
-        performing = {each.decisions.plan.block.id for each in performed}
+        performing = {each.plan.block.id for each in performed}
         asker = Asker(block.id, now, now, named, parts, elsewhere, performing=performing)
         return knowledge(asker, performed, self._live_blocks)
 
@@ -151,7 +156,7 @@ class Planning:
         if not question.items:
             return ()
         try:
-            answer = await self._bus.query(keys.ESTIMATE, question, timeout=self._config.estimate)
+            answer = await self._bus.query(keys.ESTIMATE, question, timeout=ESTIMATE)
         except NoReply as error:
             unable = error.fault.following("no body performs it", block.id)
             raise BlockRefused(unable, "CANNOT_CREATE_BEHAVIOR") from error

@@ -7,8 +7,6 @@ was made with are no longer true. Nothing waits for the answer.
 
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable
-from functools import partial
-from typing import Protocol
 
 from msgspec.structs import replace
 
@@ -17,6 +15,7 @@ from engage_hri.schemas.body import Estimate, EstimateBehaviors
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Containing
+from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.agreement import STRAIGHT, between, difference
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
@@ -28,7 +27,6 @@ from engage_hri.services.realizer.together.body_questions import (
     question_about_rest,
     times_ahead,
 )
-from engage_hri.services.realizer.together.knowledge import Performed
 
 MOST = 6
 """Most questions in a row, each because of the answer to the one before."""
@@ -40,42 +38,33 @@ Ask = Callable[[Block, EstimateBehaviors], Awaitable[tuple[Estimate, ...]]]
 """A question to the body about behaviors of a block. Raises EngageError."""
 
 
-class Rehearsed(Performed, Protocol):
-    """A block that is being performed."""
-
-    @property
-    def ties(self) -> "KnowsOthers": ...
-
-    def containing(self) -> Containing:
-        """Contain exceptions in the body of `with`: they end this block, and no other."""
-
-    def take_in(self, news: Callable[[], object]) -> None:
-        """Take in news and do what follows from it, unless the block is ending."""
-
-    def plan_with(self, estimates: Iterable[Estimate]) -> None:
-        """Plan what is left with other estimates, unless that costs a behavior."""
-
-
-class KnowsOthers(Protocol):
-    """The ties of a block."""
-
-    def known(self) -> Known:
-        """Other live blocks, as known now."""
-
-
 class Rehearsing:
     """The questions about one block. Most blocks need none, so there is no task before there is news."""
 
-    __slots__ = ("_ask", "_now", "_others", "_owner", "_parts", "_task")
+    __slots__ = ("_answered", "_ask", "_containing", "_decisions", "_known", "_now", "_others", "_parts", "_task")
 
     def __init__(
-        self, owner: Rehearsed, others: Callable[[], Iterable[Performed]], now: Callable[[], Seconds], ask: Ask
+        self,
+        decisions: Decisions,
+        others: Callable[[], Iterable[Decisions]],
+        known: Callable[[], Known],
+        now: Callable[[], Seconds],
+        ask: Ask,
+        answered: Callable[[Iterable[Estimate]], None],
+        containing: Callable[[], Containing],
     ) -> None:
-        """others: all performances, in the order in which they began."""
-        self._owner = owner
+        """others: of all blocks that are performed, in the order in which they began. known: of other blocks, now.
+
+        answered: told of estimates that say something else than those of the plan. containing: what goes wrong in
+        the `with` of it ends this block, and no other.
+        """
+        self._decisions = decisions
         self._others = others
+        self._known = known
         self._now = now
         self._ask = ask
+        self._answered = answered
+        self._containing = containing
         self._parts: frozenset[str] = frozen()
         """Parts that move in another way than when the body was asked last."""
         self._task: asyncio.Task[None] | None = None
@@ -94,9 +83,9 @@ class Rehearsing:
     async def _run(self) -> None:
         """Ask until nothing has changed since."""
         try:
-            with self._owner.containing():
+            with self._containing():
                 pause = PAUSE
-                while not self._owner.is_ending and self._parts:
+                while not self._decisions.is_ending and self._parts:
                     for number in range(MOST):
                         if self._parts:
                             await self._look(1.0 if number < STRAIGHT else 0.5)
@@ -108,7 +97,7 @@ class Rehearsing:
 
     async def _look(self, weight: float) -> None:
         """Ask, and plan with the answer if it says something else. weight: of the answer."""
-        plan = self._owner.decisions.plan
+        plan = self._decisions.plan
         question = self._question(plan)
         if not question.items:
             return
@@ -116,16 +105,16 @@ class Rehearsing:
             told = await self._ask(plan.block, question)
         except EngageError:
             return  # Nobody knows better.
-        if self._owner.decisions.plan is plan:
+        if self._decisions.plan is plan:
             before = tuple(plan.estimates.values())
             told = tuple([self._ahead(plan, each) for each in told if each.feasible])
             if max(difference(before, told)) > NOTICEABLE:
                 better = {each.behavior: each for each in between(before, told, weight)}
-                self._owner.take_in(partial(self._owner.plan_with, {**plan.estimates, **better}.values()))
+                self._answered({**plan.estimates, **better}.values())
 
     def _ahead(self, plan: Plan, told: Estimate) -> Estimate:
         """The estimate that a behavior has in the plan, with the phases to the points that it has yet to reach."""
-        facts, id = self._owner.decisions.facts, told.behavior
+        facts, id = self._decisions.facts, told.behavior
         known = plan.estimates[id]
         reached = {point.sync for point in plan.chains[id].points[: facts.next_number(id)]}
         if id not in facts.begun or [each.to for each in known.phases] != [each.to for each in told.phases]:
@@ -138,18 +127,18 @@ class Rehearsing:
 
         Those that are told when to be where are not asked about: they take the time that they are told to take.
         """
-        now, decisions = self._now(), self._owner.decisions
+        now, decisions = self._now(), self._decisions
         facts, paces = decisions.facts, decisions.foresight.paces
         times = {
             id: each
-            for id, each in times_ahead(self._owner, now).items()
+            for id, each in times_ahead(decisions, now).items()
             if id not in facts.begun or (facts.next_number(id) and not paces.get(id) and not facts.is_held(id))
         }
         parts, changed = parts_moved(plan, times), self._parts
         self._parts = frozen()
         if not times or not (parts & changed or "torso" in parts | changed):
             return EstimateBehaviors(items=())
-        poses = poses_before(plan, self._owner.ties.known())
-        asked = question_about_rest(self._owner, poses, times)
-        moving = meanwhile(self._others(), parts, now, lambda each, id: each is not self._owner or id not in times)
+        poses = poses_before(plan, self._known())
+        asked = question_about_rest(decisions, poses, times)
+        moving = meanwhile(self._others(), parts, now, lambda each, id: each is not decisions or id not in times)
         return replace(asked, others=moving)

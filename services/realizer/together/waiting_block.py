@@ -6,10 +6,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Neighbor
 
 
-class WaitingBlock:
+class WaitingBlock(Neighbor):
     """A block that begins when others have ended: no earlier than the last of these is expected to end.
 
     It follows their ends, and is followed itself (see `LiveBlocks`). So dates pass from block to block, always from
@@ -27,7 +27,6 @@ class WaitingBlock:
         """leaders: blocks that have to end first. is_held: whether it is held itself."""
         self.leaders = leaders
         self._is_held = is_held
-        self.held = self
         self._plan = plan
         self._live_blocks = live_blocks
         self._now = now

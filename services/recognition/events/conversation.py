@@ -15,6 +15,11 @@ from engage_hri.services.recognition.events.machine import IDLE, EventWriter, On
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening
 
+TURN_PATIENCE: Seconds = 12.0
+"""Time after the robot's last word for which its unfinished turn still counts; longer than the silence after which
+generation closes a turn (10 s). Also the time, after the limit, for which an anchor that does not come is waited for.
+Ours."""
+
 
 class Conversation:
     """Conversation of one person with the robot."""
@@ -41,7 +46,7 @@ class Conversation:
     def _new_pair(writer: EventWriter, config: RecognitionConfig) -> AdjacencyPair:
         return AdjacencyPair(
             writer, limit=config.adjacency_pair_limit, third_turn=config.third_turn_limit,
-            patience=config.turn_patience,
+            patience=TURN_PATIENCE,
         )  # fmt: skip
 
     @property

@@ -10,6 +10,9 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import in_time
 
+LOOK_BREAK: Seconds = 0.15
+"""Longest pause in a look: one that is reported to end and to begin again within it has gone on. What happens
+meanwhile waits for the decision, for `SETTLING` at most, so it must not be longer. Ours."""
 Symbolic = ActionBegan | ActionEnded | ActorFound | ActorLost
 Timed = tuple[Seconds, Symbolic]
 
@@ -23,10 +26,9 @@ class _Break(Struct):
 
 
 class InterruptedLooks:
-    """The filter for all people. pause: time within which the same look has to follow to go on."""
+    """The filter for all people."""
 
-    def __init__(self, pause: Seconds) -> None:
-        self._pause = pause
+    def __init__(self) -> None:
         self._breaks: dict[str, _Break] = {}
         self._lost: set[str] = set()
         """People with their face out of sight."""
@@ -39,7 +41,7 @@ class InterruptedLooks:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which the earliest undecided end becomes certain, unless the look goes on before."""
-        return min((since + self._pause for since in self.undecided), default=None)
+        return min((since + LOOK_BREAK for since in self.undecided), default=None)
 
     def feed(self, report: Symbolic, at: Seconds) -> list[Timed]:
         """Take a report of perception. Returns the reports that hold now, each with its time."""
@@ -60,7 +62,7 @@ class InterruptedLooks:
 
     def advance(self, now: Seconds) -> list[Timed]:
         """Return the ends of looks that have become certain by `now`."""
-        over = [actor for actor, one in self._breaks.items() if not one.lost and now >= one.since + self._pause]
+        over = [actor for actor, one in self._breaks.items() if not one.lost and now >= one.since + LOOK_BREAK]
         return [ended for actor in over for ended in self._end(actor)]
 
     def forget(self, actor: str) -> None:
@@ -72,7 +74,7 @@ class InterruptedLooks:
         self._find(began.actor, at)
         one = self._breaks.get(began.actor)
         goes_on = one is not None and one.ended.targets == began.targets
-        if one is not None and goes_on and one.since <= at and in_time(at, one.since + self._pause):
+        if one is not None and goes_on and one.since <= at and in_time(at, one.since + LOOK_BREAK):
             del self._breaks[began.actor]
         return self._end(began.actor)
 

@@ -1,4 +1,10 @@
-"""Time limits of events: a clock that waits for its anchors, and the sync points of blocks that are such anchors."""
+"""Time limits of events: a clock that waits for its anchors, and the sync points of blocks that are such anchors.
+
+People get so many seconds to answer. These count from what they are to answer: not from when the event was asked for,
+but from the stroke of the point, or the end of the words. Such an anchor is a sync point that the body has yet to
+report, and a slow arm reports it late. If the clock did not wait for it, a person would fail because of the robot. An
+anchor may never come, if its behavior was dropped. So the wait ends with the block, or after some patience.
+"""
 
 import math
 from collections.abc import Iterable

@@ -18,6 +18,18 @@ from engage_hri.services.recognition.events.presence import Presence
 from engage_hri.services.recognition.events.scene import GazeState, SessionScene
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
 
+DIRECT_BY_LOOK: Seconds = 0.6
+"""Time for which a person looks at an object before that directs the robot's gaze: a shorter look takes in the scene.
+Less than the time for which an absent person is remembered. Ours."""
+AFTER_ROBOT_DIRECTED: Seconds = 2.0
+"""Time after a robot's directed gaze in which a look at the same object is no direction of its own, but a late
+response. Less than the time for which an absent person is remembered. Ours."""
+LONGEST_SPEECH: Seconds = 60.0
+"""Time after which speech is over if no report of its end has come. The next beginning ends it, too. Ours."""
+LONGEST_GESTURE: Seconds = 10.0
+"""The same for a nod, a shake or a point. Ours."""
+LONGEST_MANIPULATION: Seconds = 120.0
+"""The same for a manipulation. Ours."""
 ACTIONS_KEPT = 64
 """Number of actions of each person for which it is remembered when they last began and ended."""
 
@@ -92,7 +104,7 @@ class Person:
         if not any(map(self._scene.is_object, self.gaze.targets)):
             return None
         silent_since = self._scene.others_silent_since(self.id)
-        return None if silent_since is None else max(self.gaze.since, silent_since) + self._config.direct_by_look
+        return None if silent_since is None else max(self.gaze.since, silent_since) + DIRECT_BY_LOOK
 
     def leave(self, at: Seconds) -> None:
         """Count the person as gone, and close all its open events."""
@@ -176,8 +188,8 @@ class Person:
 
     def _longest(self, action: Action) -> Seconds:
         if action == "speak":
-            return self._config.longest_speech
-        return self._config.longest_manipulation if action == "act" else self._config.longest_gesture
+            return LONGEST_SPEECH
+        return LONGEST_MANIPULATION if action == "act" else LONGEST_GESTURE
 
     def _goes_on_too_long(self, at: Seconds) -> None:
         """End actions with a lost end and no later beginning."""
@@ -254,7 +266,7 @@ class Person:
     def _look_directs(self, at: Seconds) -> None:
         self.gaze.spent = True
         objects = tuple(filter(self._scene.is_object, self.gaze.targets))
-        self._human_directs(objects, at - self._config.direct_by_look, at, self.gaze.confidence)
+        self._human_directs(objects, at - DIRECT_BY_LOOK, at, self.gaze.confidence)
 
     def _human_directs(self, objects: tuple[str, ...], since: Seconds, at: Seconds, confidence: Probability) -> None:
         """Begin a directed gaze. since: start of the pointing, or of the look that has become a direction at `at`."""
@@ -337,7 +349,7 @@ class Person:
         self.forget_idle(at)
 
     def _is_recent(self, past: _Directed, at: Seconds) -> bool:
-        return in_time(at, past.at + self._config.after_robot_directed)
+        return in_time(at, past.at + AFTER_ROBOT_DIRECTED)
 
     # -- mutual facial gaze -------------------------------------------------------------------------------------
 

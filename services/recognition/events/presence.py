@@ -1,4 +1,10 @@
-"""Presence of a person: faces get lost and found again, and reports of it may come late or twice."""
+"""Presence of a person: faces get lost and found again, and reports of it may come late or twice.
+
+A tracker loses a face for half a second whenever a hand or a turn of the head covers it. If that counted as
+leaving, each such moment would end all events with the person, and begin their acquaintance anew. So a lost face
+counts as gone only after `FACE_GRACE` seconds (decision 0106). Times decide here, not the order of arrival: a loss
+that is reported after the person was seen again changes nothing.
+"""
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.reports.action_reports import FACE_GRACE

@@ -22,6 +22,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
@@ -30,6 +31,14 @@ from engage_hri.services.recognition.events.person import Person
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
 from engage_hri.services.reports.reports import GoesOn
 
+WORDS_PATIENCE: Seconds = 10.0
+"""Time after the end of an event for which it is told again, should its words become known or be corrected. Decision
+0065."""
+ACCEPT: tuple[Action, ...] = ("speak", "nod", "shake", "point")
+"""Actions that answer an adjacency pair of the robot, unless its request names others. Thesis 2.2.3."""
+SETTLING: Seconds = 0.35
+"""Longest time for which events wait for raw perception that is undecided.
+Decision 0009."""
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
     | GoesOn | Worded | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
@@ -56,7 +65,7 @@ class Session:
         self.blocks = Blocks()
         self.scene = SessionScene(robot, config.gaze_resolution)
         self._config = config
-        self._writer = EventWriter(clock, name, words_patience=config.words_patience)
+        self._writer = EventWriter(clock, name, words_patience=WORDS_PATIENCE)
         self._people = People(self.scene, config, self._writer, strict=strict)
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
@@ -317,7 +326,7 @@ class Session:
             case "mutual_facial_gaze":
                 return wanted.limit or self._config.mutual_facial_gaze_limit
             case "adjacency_pair":
-                by_acting = "act" in (wanted.accept or self._config.accept)
+                by_acting = "act" in (wanted.accept or ACCEPT)
                 return wanted.limit or (
                     self._config.manipulation_limit if by_acting else self._config.adjacency_pair_limit
                 )
@@ -328,11 +337,11 @@ class Session:
         """Longest time from the robot's last deed to the decision, also if the turn's end or anchors never come."""
         offsets = [found[1] for text in wanted.anchors if (found := anchor(text)) is not None]
         limit = max(event.limit or 0.0, self._config.backchannel_limit)
-        return limit + self._config.turn_patience + max([0.0, *offsets]) + self._config.sensing.settling
+        return limit + TURN_PATIENCE + max([0.0, *offsets]) + SETTLING
 
     def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock:
         assert event.limit is not None
-        clock = LimitClock(event.started, event.limit, wanted.anchors, self._config.turn_patience)
+        clock = LimitClock(event.started, event.limit, wanted.anchors, TURN_PATIENCE)
         for name in clock.waiting:
             if (realised := self.blocks.point(event.block, name)) is not None:
                 clock.realised(name, realised)
@@ -341,7 +350,7 @@ class Session:
         return clock
 
     def _ask(self, person: Person, event: OngoingEvent, wanted: Event) -> None:
-        event.accept = wanted.accept or self._config.accept
+        event.accept = wanted.accept or ACCEPT
         person.conversation.robot_asks(event)
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         if turn_end is not None:

@@ -39,8 +39,8 @@ class _Actor:
         self.id = id
         self.number = number
         """Position in the order in which people came."""
-        self.looking = Looking(config.sensing.dwell)
-        self.voice = Voice(config.sensing)
+        self.looking = Looking()
+        self.voice = Voice()
         self.posed_at = self.heard_at = self.alive_at = NEVER
         """Times of the latest head pose and voice level, and of the latest sign of life."""
         self.seen = False

@@ -10,8 +10,14 @@ from typing import NamedTuple
 
 from engage_hri.schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.config import GAZE_MARGIN, RecognitionConfig
 
+FACE_RADIUS: Meters = 0.12
+"""Radius of the faces of people and of the robot, around the point between the eyes: half a head. Ours."""
+ROBOT_FACE: Vector = (0.05, 0.0, 1.17)
+"""Place of the robot's eyes as long as its `RobotState` does not say it: that of the torso at the tangram table."""
+MEMORY: Seconds = 10.0
+"""Time in which the confidence in the place of a covered thing halves. Ours."""
 Targets = tuple[str, ...]
 AWAY: Targets = ()
 SURFACE = "table"
@@ -31,9 +37,9 @@ class Seen(NamedTuple):
 class _Thing:
     """An entity that a gaze can be on. radius: of its sphere, 0 for an outline. bound: of a sphere around it."""
 
-    def __init__(self, entity: Entity, face_radius: Meters) -> None:
+    def __init__(self, entity: Entity) -> None:
         self.entity = entity
-        self.radius = 0.0 if entity.footprint else entity.radius or (face_radius if entity.kind == "person" else 0.0)
+        self.radius = 0.0 if entity.footprint else entity.radius or (FACE_RADIUS if entity.kind == "person" else 0.0)
         self.bound = _extent(entity.footprint) if entity.footprint else self.radius
         self.hidden_since: Seconds | None = None
         """Time at which the thing was covered; None while it is in view."""
@@ -115,14 +121,13 @@ class GazeTargets:
         self._robot = robot
         self._by_table = config.gaze_resolution == "table"
         self._least = config.least_confidence
-        self._sensing = config.sensing
         self._half_angle = math.radians(config.sensing.gaze_half_angle)
-        self._margin = math.radians(config.sensing.gaze_margin)
+        self._margin = math.radians(GAZE_MARGIN)
         self._known: dict[str, _Thing] = {}
         self._surfaces: list[_Thing] = []
         self._spheres: dict[str, tuple[float, float, float, Meters, _Thing]] | None = None
         """Center and radius of a sphere around each thing but surfaces, by id; None if outdated."""
-        self.see_face(robot, config.sensing.robot_face)
+        self.see_face(robot, ROBOT_FACE)
 
     def see(self, world: World, at: Seconds) -> None:
         """Take a view of the world. Things that are missing, or seen with too little confidence, are covered."""
@@ -168,7 +173,7 @@ class GazeTargets:
             del self._known[id]
 
     def _thing(self, entity: Entity) -> _Thing:
-        return _Thing(entity, self._sensing.face_radius)
+        return _Thing(entity)
 
     def target(
         self, looker: str, gaze: tuple[Vector, Vector], *, present: Targets | None, at: Seconds, sure: Probability
@@ -226,7 +231,7 @@ class GazeTargets:
 
     def _confidence(self, thing: _Thing, at: Seconds) -> Probability:
         age = 0.0 if thing.hidden_since is None else max(0.0, at - thing.hidden_since)
-        return thing.entity.confidence * math.exp2(-age / self._sensing.memory)
+        return thing.entity.confidence * math.exp2(-age / MEMORY)
 
     def _reported(self, entity: Entity) -> str:
         """Id to report for the entity: at resolution `table` that of the surface on which an object lies."""

@@ -9,6 +9,9 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.perceive.gaze_targets import Seen, Targets
 
+DWELL: Seconds = 0.15
+"""Time for which the gaze stays on a target before that is a look, and off it before the look is over: a glance in
+passing is no look. Decision 0009."""
 ROUNDING: Seconds = 1e-9
 
 
@@ -32,11 +35,10 @@ class _Candidate(NamedTuple):
 class Looking:
     """Looks of one person. `nearest`: targets of the gaze at the latest pose, a look or not."""
 
-    def __init__(self, dwell: Seconds) -> None:
+    def __init__(self) -> None:
         self.target: Targets | None = None
         """Targets of the present look; None if there is none."""
         self.nearest: Targets | None = None
-        self._dwell = dwell - ROUNDING
         self._confidence: Probability = 1.0
         self._left: Seconds | None = None
         """Time at which the gaze left the target of a look that may be over."""
@@ -62,9 +64,9 @@ class Looking:
             self._candidate = _Candidate(seen, at)
         else:
             self._candidate = _Candidate(min(before.seen, seen, key=lambda one: one.confidence), before.since)
-        settled = at - self._candidate.since >= self._dwell
+        settled = at - self._candidate.since >= DWELL - ROUNDING
         changes = []
-        if settled or (self._left is not None and at - self._left >= self._dwell):
+        if settled or (self._left is not None and at - self._left >= DWELL - ROUNDING):
             changes += self.end(at)
         if settled:
             (targets, self._confidence), since = self._candidate

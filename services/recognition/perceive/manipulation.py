@@ -11,12 +11,23 @@ from typing import NamedTuple
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.units import Probability, Seconds, Vector
+from engage_hri.schemas.units import Meters, Probability, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.scene import Covering
+from engage_hri.services.recognition.perceive.gaze_targets import MEMORY
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
 
+HAND_REACH: Meters = 0.1
+"""Greatest distance from the center of a hand to that of a piece that it moves. Ours."""
+MOVED: Meters = 0.025
+"""Distance that a piece goes from its place, with a hand, before it counts as manipulated. Above the tremor. Ours."""
+TREMOR: Meters = 0.01
+"""Distance from its place within which a piece rests: the noise of vision, of which 0.005 is the deviation. Ours."""
+SMOOTHING: Seconds = 0.15
+"""Time over which places of pieces are averaged: two or three frames of a camera. Ours."""
+REST: Seconds = 0.3
+"""Time for which a piece rests before its manipulation is over: people stop for shorter times on the way. Ours."""
 ALONG = 0.5
 """Share of the piece's way that a hand must have gone meanwhile, to have moved it."""
 FOLLOW = 0.1
@@ -70,7 +81,6 @@ class Manipulation:
     def __init__(self, robot: str, config: RecognitionConfig) -> None:
         self._robot = robot
         self._least = config.least_confidence
-        self._sensing = config.sensing
         self._pieces: dict[str, _Piece] = {}
         self._hands: dict[str, Entity] = {}
         self._acts: dict[str, _Act] = {}
@@ -88,7 +98,7 @@ class Manipulation:
             for id, piece in self._pieces.items()
             if piece.hidden and not piece.holder
             for hand, until in piece.touched.items()
-            if hand in self._hands and self._before - until < self._sensing.memory
+            if hand in self._hands and self._before - until < MEMORY
         )
 
     @property
@@ -99,7 +109,7 @@ class Manipulation:
     def _rests_at(self, piece: _Piece) -> Seconds:
         """Time at which the moving piece rests. It is later if piece and hand are both out of sight."""
         lost = piece.hidden and piece.holder not in self._hands
-        return piece.moved_at + (self._sensing.memory if lost else self._sensing.rest)
+        return piece.moved_at + (MEMORY if lost else REST)
 
     def feed(self, world: World, at: Seconds) -> list[PersonChanges]:
         """Take the world at `at`, later than the last. Returns the manipulations that began and ended."""
@@ -148,15 +158,15 @@ class Manipulation:
             self._grip(piece, entity.position)
         elif piece.hidden:
             found = self._reappears(id, piece, entity, at)
-        elif math.dist(place, piece.place) <= self._sensing.tremor:
+        elif math.dist(place, piece.place) <= TREMOR:
             piece.still_at, piece.hands_then = at, self._hands
             piece.place = _between(piece.place, place, FOLLOW)
-        elif math.dist(place, piece.place) >= self._sensing.moved:
+        elif math.dist(place, piece.place) >= MOVED:
             if hand := self._moving_along(piece, entity.position):
                 found = self._begin(id, piece, entity, hand, piece.still_at)
             else:
                 self._rest(piece)
-        elif at - piece.moved_at >= self._sensing.rest:
+        elif at - piece.moved_at >= REST:
             self._rest(piece)  # nudged
         piece.hidden = False
         piece.touched.clear()
@@ -179,13 +189,13 @@ class Manipulation:
 
     def _averaged(self, piece: _Piece, place: Vector, at: Seconds) -> Vector:
         piece.sights.append((at, place))
-        while piece.sights[0][0] < at - self._sensing.smoothing:
+        while piece.sights[0][0] < at - SMOOTHING:
             piece.sights.popleft()
         x, y, z = (sum(part) / len(piece.sights) for part in zip(*(place for _, place in piece.sights), strict=True))
         return (x, y, z)
 
     def _pause(self, piece: _Piece, place: Vector, at: Seconds) -> None:
-        if math.dist(place, piece.pause) > self._sensing.tremor:
+        if math.dist(place, piece.pause) > TREMOR:
             piece.pause, piece.moved_at = place, at
         piece.paused_at = at
 
@@ -200,7 +210,7 @@ class Manipulation:
         piece.still_at, piece.hands_then = piece.paused_at, self._hands
 
     def _reappears(self, id: str, piece: _Piece, entity: Entity, at: Seconds) -> list[PersonChanges]:
-        if math.dist(entity.position, piece.place) < self._sensing.moved:
+        if math.dist(entity.position, piece.place) < MOVED:
             return []
         hands = [hand for hand in piece.touched if hand in self._hands]
         if not hands:
@@ -213,7 +223,7 @@ class Manipulation:
         return self._begin(id, piece, entity, hand, piece.touched[hand])
 
     def _reaches(self, hand: Entity, place: Vector) -> bool:
-        return math.dist(hand.position, place) <= self._sensing.hand_reach
+        return math.dist(hand.position, place) <= HAND_REACH
 
     def _moving_along(self, piece: _Piece, place: Vector) -> str:
         """Id of the nearest hand at `place` that has moved `ALONG` with the piece; empty if there is none."""

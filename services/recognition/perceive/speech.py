@@ -4,16 +4,21 @@ The input is levels, not edges, so any of them may be lost. A beginning needs ev
 """
 
 from engage_hri.schemas.units import Probability, Seconds
-from engage_hri.services.recognition.config import Sensing
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
+
+VOICE_ONSET: Seconds = 0.1
+"""Shortest sound that counts as speech: a knock or a cough is shorter. Ours."""
+VOICE_PAUSE: Seconds = 0.25
+"""Shortest silence that ends speech: a stop between two words is shorter. Ours."""
+VOICE_LOST: Seconds = 0.5
+"""Time without a voice level after which speech has ended, at the time of the last level. Ours."""
 
 
 class Voice:
     """Speech of one person."""
 
-    def __init__(self, sensing: Sensing) -> None:
+    def __init__(self) -> None:
         self.speaks = False
-        self._sensing = sensing
         self._heard: Seconds = float("-inf")
         """Time of the latest level."""
         self._since: Seconds | None = None
@@ -30,8 +35,8 @@ class Voice:
     def deadline(self) -> Seconds | None:
         """Time at which speech, or a sound, is over if nothing more is heard."""
         if self._silent_since is not None:
-            return self._silent_since + self._sensing.voice_pause
-        return None if self._since is None else self._heard + self._sensing.voice_lost
+            return self._silent_since + VOICE_PAUSE
+        return None if self._since is None else self._heard + VOICE_LOST
 
     def feed(self, active: bool, at: Seconds, confidence: Probability) -> list[Change]:
         """Take the level at `at`, later than the last. Returns beginning and end of speech."""
@@ -51,7 +56,7 @@ class Voice:
             self._since, self._confidence = at, confidence
         elif not self.speaks:
             self._confidence = min(self._confidence, confidence)
-        if self.speaks or at - self._since < self._sensing.voice_onset - ROUNDING:
+        if self.speaks or at - self._since < VOICE_ONSET - ROUNDING:
             return []
         self.speaks = True
         return [Change(True, "speak", self._since, (), self._confidence)]

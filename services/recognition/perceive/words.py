@@ -15,6 +15,9 @@ from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.scene import Worded
 
+WORDS_MARGIN: Seconds = 0.5
+"""Time by which spoken words may miss the speech that they belong to: recognizers and voice detectors disagree about
+where speech begins and ends. Decision 0065."""
 SPEECHES_KEPT = 64
 """Number of speeches of each person, and of utterances, that are remembered."""
 
@@ -75,9 +78,9 @@ class _Person:
         """Note a speech that nothing but words tells of."""
         self.speeches = sorted([*self.speeches[1 - SPEECHES_KEPT :], _Speech(began, ended)], key=_since)
 
-    def speech_with(self, words: HeardWords, margin: Seconds) -> Seconds | None:
+    def speech_with(self, words: HeardWords) -> Seconds | None:
         """Start of the speech that these words belong to; None if there is none."""
-        least = -ROUNDING if words.is_line else -margin - ROUNDING
+        least = -ROUNDING if words.is_line else -WORDS_MARGIN - ROUNDING
         found: tuple[Seconds, Seconds] | None = None
         for speech in self.speeches:
             overlap = min(words.ended, speech.until) - max(words.began, speech.since)
@@ -94,8 +97,7 @@ class _Person:
 class Words:
     """The words of all people. clock: of the stamps of speech that is derived from them."""
 
-    def __init__(self, margin: Seconds, clock: str) -> None:
-        self._margin = margin
+    def __init__(self, clock: str) -> None:
         self._clock = clock
         self._people: dict[str, _Person] = {}
 
@@ -115,7 +117,7 @@ class Words:
         text = " ".join(words.text.split())
         if not words.final or (known is not None and at <= known.at):
             return None
-        speech = person.speech_with(words, self._margin) if known is None else known.speech
+        speech = person.speech_with(words) if known is None else known.speech
         is_alone = speech is None
         if speech is None:
             if not text:

@@ -8,9 +8,12 @@ task nothing is concluded from silence: that explains the 70 s gap of the canapÃ
 from typing import Literal, NamedTuple
 
 from engage_hri.schemas.units import Probability, Seconds
-from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import Tally
 
+ENOUGH_EVENTS = 5
+"""Number of connection events from which a person's own mean counts; at least 2, since one event has no time between
+events. Ours."""
 Level = Literal["engaged", "weakening", "disengaged", "unknown"]
 
 JUST_AFTER: Seconds = 0.001
@@ -39,7 +42,7 @@ def quality(failed: int, judged: int) -> Probability:
 
 def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
     """Level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
-    margin = config.hysteresis
+    margin = HYSTERESIS
     engaged_from = config.engaged_from + {"engaged": -margin, "unknown": 0.0}.get(level, margin)
     disengaged_below = config.disengaged_below + {"disengaged": margin, "unknown": 0.0}.get(level, -margin)
     if value >= engaged_from:
@@ -94,7 +97,7 @@ class Engagement:
     @property
     def _usual(self) -> Seconds:
         mean = self._tally.starts.mean_difference
-        if mean is None or mean <= 0.0 or self._tally.starts.count < self._config.enough_events:
+        if mean is None or mean <= 0.0 or self._tally.starts.count < ENOUGH_EVENTS:
             return self._config.reference_mtbce
         return mean
 
@@ -119,7 +122,7 @@ class Engagement:
         if level not in ("engaged", "weakening"):
             return None
         threshold = self._config.engaged_from if level == "engaged" else self._config.disengaged_below
-        threshold -= self._config.hysteresis
+        threshold -= HYSTERESIS
         good = quality(*self._tally.judged(now))
         if threshold <= 0.0 or good <= threshold:
             return None

@@ -1,0 +1,35 @@
+"""Sync points of a behavior that moves, and where it may wait. Pure."""
+
+from functools import cache
+
+from msgspec import Struct
+
+from engage_hri.schemas.syncref import SYNC_POINTS
+
+
+class Point(Struct, frozen=True):
+    """A sync point on the way of a behavior.
+
+    held_with: the hold point at which it waits; its own name if it is one itself; empty: it is passed without a stop.
+    stands_at: the later point up to which the motion may go while it waits here: it is on target at both.
+    """
+
+    sync: str
+    held_with: str = ""
+    stands_at: str = ""
+
+
+@cache
+def held_on_target(*arrival: str) -> tuple[Point, ...]:
+    """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
+    before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
+    points = [Point(sync, "stroke", "relax") if sync in arrival else Point(sync) for sync in before]
+    return (*points, Point("stroke_end", "relax"), Point("relax", "relax"), Point("end"))
+
+
+@cache
+def held_around_stroke(strokes: tuple[str, ...] = ()) -> tuple[Point, ...]:
+    """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
+    number = SYNC_POINTS.index("stroke_end")
+    syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
+    return tuple(Point(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
