@@ -30,7 +30,10 @@ SECTIONS = {
     "Telling of people": ("perceive", "PerceivedPerson", "Utterance"),
     "What comes back": ("FragmentOutcome", "ConnectionEvent", "Statistics", "World", "Entity"),
     "Language models": ("perform_call", "stream", "tool_definition", "summary", "Summary"),
-    "Writing a body": ("Body", "OrdinaryBody", "MovementAuthority", "Arrived", "Reached", "JointLimit", "Ray"),
+    "Writing a body": (
+        "SetPointBody", "SimulatedServos", "OrdinaryBody", "Body", "MovementAuthority", "Arrived", "Reached",
+        "JointLimit", "Ray",
+    ),
     "What goes wrong": (
         "EngageError", "InputRefused", "RunFailed", "PerformFailed", "RequestRefused", "BehaviorRefused", "Fault",
     ),

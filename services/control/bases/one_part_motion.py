@@ -74,6 +74,8 @@ class OrdinaryBody(DrivenBody):
         self._look: _Look | None = None
         self._goal: Angles | None = None
         """Where the joints are on their way to; None: they stand."""
+        self._from: Angles = {}
+        """Where the joints were as the last command was sent."""
         self._is_open = False
         self._sending: asyncio.Future[None] | None = None
         """Of a command that takes time."""
@@ -279,16 +281,21 @@ class OrdinaryBody(DrivenBody):
 
     def _short(self, goal: Angles, sync: str, waited: Seconds, planned: Seconds) -> Fault:
         joint, angle = self._off(goal) or ("", 0.0)
+        turned = self._measured().get(joint, 0.0) - self._from.get(joint, 0.0)
+        is_other_way = turned * angle < 0.0 and abs(turned) > self.near
         where = f"{math.degrees(abs(angle)):.1f} degrees short of its goal"
+        other_way = ", and has turned the other way" if is_other_way else ""
         return Fault(
             reason=f"{joint} stands {where} {waited:.1f} s after the command to go to its {sync}; planned were "
-                   f"{planned:.1f} s",
-            advice="is the motor on, free and not too hot?", service="control",
+                   f"{planned:.1f} s{other_way}",
+            advice="is a sign turned around?" if is_other_way else "is the motor on, free and not too hot?",
+            service="control",
         )  # fmt: skip
 
     def _command(self, goal: Angles) -> Seconds:
         """Command the motors. Returns the time that is planned until the joints are measured there."""
-        seconds = self._seconds(self._measured(), goal)
+        self._from = self._measured()
+        seconds = self._seconds(self._from, goal)
         self._goal, self._failure = goal, None
         self._next = (goal, max(0.0, seconds - self.settling))
         self._send_next()

@@ -12,7 +12,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import AbortMode, Body, Spoke
 from engage_hri.services.control.testing.cases import Connection, still_running
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
-from engage_hri.services.control.testing.laws import broken, degrees, listed, ms
+from engage_hri.services.control.testing.laws import OLD_READINGS, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, Violation, recorded, violations
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
 from engage_hri.services.control.testing.suite import Suite, does_not_apply, trials
@@ -30,6 +30,10 @@ HOWS: tuple[AbortMode, ...] = ("relax", "freeze")
 def is_overlay(behavior: BlockBehavior) -> bool:
     """True for what goes back to rest by itself; a shift stays, wherever it was cut."""
     return not type_name(behavior).endswith("Shift") and type_name(behavior) != "pose"
+
+
+OLD: Seconds = 0.04
+"""Time for which readings come again in motion, from which on they are no measurement of it."""
 
 
 class EndingLaws(Suite):
@@ -238,6 +242,14 @@ class EndingLaws(Suite):
             for joint, speed in recording.fastest(self.noise).items():
                 self.fastest[joint] = max(speed, self.fastest.get(joint, 0.0))
         for each in violations(recording, body.capabilities.joints, self.noise, self.age):
+            if (repeats := recording.repeats) > OLD:
+                broken(
+                    behavior,
+                    expected=f"new readings while {each.joint} moves, to judge its {each.what} by",
+                    measured=f"each comes again for {ms(repeats)}",
+                    advice="are the motors asked often enough, and is it the newest reading that `angles` tells?",
+                    cause=OLD_READINGS,
+                )
             unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]
             broken(

@@ -5,6 +5,7 @@ once, and the laws are judged without it.
 """
 
 import asyncio
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from statistics import median
@@ -21,13 +22,23 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.cases import Connection, cause_of
 from engage_hri.services.control.testing.causes import by_words
-from engage_hri.services.control.testing.laws import NEVER_ENDS, NOTHING_MOVES, angles, listed, named
+from engage_hri.services.control.testing.laws import (
+    NEVER_ENDS,
+    NOTHING_MOVES,
+    WRONG_UNIT,
+    angles,
+    degrees,
+    listed,
+    named,
+)
 from engage_hri.services.control.testing.report import Cause
 from engage_hri.services.control.testing.stage import LOOK_EVERY, PATIENCE, Stage
 from engage_hri.services.control.testing.suite import STILL
 
 LOOKS = 20
 """Estimates whose time is taken."""
+BEYOND = 3.0
+"""Readings that are so many times beyond the range of a joint have the wrong unit: degrees are 57 times radians."""
 SLACK: Seconds = 5.0
 """Seconds that a behavior may take here in addition to three times what it said."""
 
@@ -82,6 +93,8 @@ class _Looking:
         """By the ids of the behaviors."""
         self._moved: dict[str, bool] = {}
         """Whether a joint has moved in behaviors that have joints; in words."""
+        self._farthest: dict[str, Radians] = {}
+        """The farthest from zero that each joint was read."""
 
     async def look(self, behaviors: Sequence[BlockBehavior]) -> FirstLook:
         self._note("", lambda: self._body.see(self._world))
@@ -153,6 +166,7 @@ class _Looking:
             while not stage.task.done() and asyncio.get_running_loop().time() < until:
                 await asyncio.sleep(LOOK_EVERY)
                 now = angles(self._body.state().pose)
+                self._farthest = {each: max(abs(now[each]), self._farthest.get(each, 0.0)) for each in now}
                 away = max((abs(angle - before.get(joint, angle)) for joint, angle in now.items()), default=0.0)
                 is_moved = is_moved or away > 5 * STILL + 12.0 * self._noise
             if stage.task.done():
@@ -173,8 +187,20 @@ class _Looking:
             kinds = {type_name(behavior) for behavior in asked if named(behavior) in unmoved}
             self._unable |= dict.fromkeys(kinds, what)
             self._wrong |= dict.fromkeys(unmoved, what)
+        if unit := self._wrong_unit():
+            self._unable = dict.fromkeys(map(type_name, asked), unit)
+            self._wrong = dict.fromkeys(map(named, asked), unit)
         causes = by_words(self._wrong)
         return tuple(replace(cause, behaviors=tuple(filter(None, cause.behaviors))) for cause in causes)
+
+    def _wrong_unit(self) -> str:
+        """Say of readings far beyond the range of their joint that they may be degrees; empty: there are none."""
+        for limit in self._body.capabilities.joints:
+            read = self._farthest.get(limit.joint, 0.0)
+            if read > max(math.pi, BEYOND * max(abs(limit.low), abs(limit.high))):
+                goes = f"it goes from {degrees(limit.low)} to {degrees(limit.high)}"
+                return f"{WRONG_UNIT} {limit.joint} was read at {degrees(read)}, and {goes}"
+        return ""
 
     def _has_ended(self, behavior: str) -> bool:
         """True if a behavior has ended or failed by itself, so that its joints are to blame."""

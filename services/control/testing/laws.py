@@ -33,7 +33,11 @@ from engage_hri.schemas.units import Radians, Seconds
 
 NEVER_ENDS = "what is begun never ends"
 NOTHING_MOVES = "nothing moves"
+WRONG_UNIT = "degrees or radians?"
 """Causes for which much cannot be judged; words follow them."""
+OLD_READINGS = "the readings of its joints are old"
+"""Cause for which motion looks like jumps."""
+OTHER_WAY = "it has turned the other way: is a sign turned around?"
 
 
 class Finding(Struct, frozen=True, kw_only=True, omit_defaults=True):

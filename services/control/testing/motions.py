@@ -89,6 +89,12 @@ class Recording:
             return np.zeros(len(self.joints))
         return np.asarray(np.diff(samples[fresh], axis=0).std(axis=0) / math.sqrt(2.0))
 
+    @property
+    def repeats(self) -> Seconds:
+        """Time for which most readings come again while the joints move: those of a driver are old for so long."""
+        fresh = np.flatnonzero(np.any(np.diff(self.angles, axis=0) != 0.0, axis=1)) + 1
+        return float(np.median(np.diff(np.array(self.times)[fresh]))) if len(fresh) > 1 else 0.0
+
     def fastest(self, noise: Radians) -> dict[str, float]:
         """The fastest that each joint was, radians per second: the slope of a line through all readings of 20 ms.
 

@@ -8,7 +8,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from engage_hri.services.control.testing.laws import NEVER_ENDS, NOTHING_MOVES, Finding, degrees, ms
+from engage_hri.services.control.testing.laws import NEVER_ENDS, NOTHING_MOVES, WRONG_UNIT, Finding, degrees, ms
 from engage_hri.services.control.testing.report import BodyReport, Cause, CheckedLaw, Verdict
 
 SHOWN = 4
@@ -147,7 +147,8 @@ def _broken(law: CheckedLaw, above: Container[str]) -> Iterator[Text]:
         yield _finding(finding)
     if len(findings) > SHOWN:
         yield Text(f"and {len(findings) - SHOWN} more; --json has all", style="dim")
-    yield Text.assemble(("usually: ", "yellow"), law.usually)
+    if not all(finding.cause for finding in findings):
+        yield Text.assemble(("usually: ", "yellow"), law.usually)
 
 
 def _finding(finding: Finding) -> Text:
@@ -200,7 +201,7 @@ def _laws_that(count: int, does: str, do: str) -> str:
 
 
 def _looks_like_another_clock(report: BodyReport) -> bool:
-    if report.stated.real_time:
+    if report.stated.real_time or any(cause.what.startswith(WRONG_UNIT) for cause in report.causes):
         return False
     if any(cause.what.startswith((NEVER_ENDS, NOTHING_MOVES)) for cause in report.causes):
         return True

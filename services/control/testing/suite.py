@@ -19,7 +19,7 @@ from engage_hri.schemas.units import Radians, Seconds, Vector
 from engage_hri.services.control.contract.body import Body, BodyState
 from engage_hri.services.control.testing.asked import BEHAVIORS, HOLDS, WORLD
 from engage_hri.services.control.testing.cases import Case, Connection, still_running
-from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
+from engage_hri.services.control.testing.laws import OTHER_WAY, Finding, LawBroken, angles, broken, degrees
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
@@ -233,10 +233,11 @@ class Suite:
         off = {joint: abs(seen[joint] - wanted[joint]) for joint in joints if joint in seen and joint in wanted}
         limit = self.accuracy + self.slack + margin
         if off and off[worst := max(off, key=lambda joint: off[joint])] > limit:
+            is_mirrored = abs(seen[worst] + wanted[worst]) <= limit < abs(wanted[worst])
             broken(
                 behavior,
                 sync,
-                advice=advice,
+                advice=OTHER_WAY if is_mirrored else advice,
                 expected=f"{what}: {worst} at {degrees(wanted[worst])}, within {degrees(limit)}",
                 measured=f"{worst} at {degrees(seen[worst])}",
             )
