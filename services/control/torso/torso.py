@@ -189,7 +189,7 @@ class Torso:
         for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):
             self.release(earlier)
             if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
-                earlier.lie_beneath()
+                earlier.is_beneath = True
             else:
                 earlier.authority.revoke("taken_over")
             earlier.bell.ring()
