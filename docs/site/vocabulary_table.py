@@ -13,9 +13,10 @@ from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT
 from engage_hri.schemas.vocabulary import NAMES, Term, terms
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.choreography import plan
-from engage_hri.services.control.figure.course import Impossible, Situation
+from engage_hri.services.control.figure.course import Situation
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "vocabulary.md"
 HEAD = """\

@@ -169,10 +169,6 @@ class WalkingBody(Body, Generic[R]):
         """
 
     @abstractmethod
-    def extend(self, run: R) -> None:
-        """Let a behavior go as far and as fast as its authority says now."""
-
-    @abstractmethod
     def leave(self, run: R, point: Point, *, has_waited: bool) -> Sequence[str]:
         """Let a behavior go on behind a point. has_waited: at this hold point. Returns the sync points passed."""
 
@@ -187,6 +183,12 @@ class WalkingBody(Body, Generic[R]):
     @abstractmethod
     def abandon(self, run: R) -> None:
         """Send home the parts of a behavior that has ended early. A shift of the head stays where it can stop."""
+
+    def extend(self, run: R) -> None:
+        """Let a behavior go as far as its authority says now. A body that can be faster or slower does that, too."""
+        now = self._loop.time()
+        run.motion.extend(run.limit(run.motion.path), now)
+        run.brake_for_hold(now)
 
     def due(self, run: R, point: Point) -> Seconds | None:
         """Instant at which the plan of a behavior passes a point; None: it does not go so far yet."""
@@ -266,10 +268,7 @@ class WalkingBody(Body, Generic[R]):
                 if run.waits_at(point):
                     run.holding = True
                     yield Arrived(point.held_with, arrived)
-                if not await self._wait_to_go_on(run, point):
-                    continue
-                # What is taken over just as it may go on has passed the point, and goes no further.
-                if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
+                if await self._wait_to_go_on(run, point):
                     since = self._loop.time()
                     for sync in self.leave(run, point, has_waited=True):
                         yield Reached(sync, since, arrived)
@@ -286,17 +285,21 @@ class WalkingBody(Body, Generic[R]):
                 yield Reached(sync, at := max(due, since), at)
 
     async def _wait_to_go_on(self, run: R, point: Point) -> bool:
-        """Wait at a hold point until it may be left, by authority and by joints. False: look again."""
-        while run.waits_at(point) and not run.is_over:
-            await run.bell.wait(inf)
+        """Wait at a hold point until it may be left, by authority and by joints. False: it is not left any more."""
+        is_there = False
+        while not run.is_over and not is_there:
             self.check(run)
-        while self.is_behind(run) and not run.is_over:
-            await run.bell.wait(self._loop.time() + CATCHES_UP)
-        if await self.come(run, point, self._loop.time()) is None:
-            return False
+            if run.waits_at(point):
+                await run.bell.wait(inf)
+            elif self.is_behind(run):
+                await run.bell.wait(self._loop.time() + CATCHES_UP)
+            else:
+                is_there = await self.come(run, point, self._loop.time()) is not None
         if not run.is_over:
             self.confirm(run, point.sync)
-        return True
+            return True
+        # What is taken over just as it may go on has passed the point, and goes no further.
+        return run.is_taken_over and run.may_pass(point.held_with) and self.has_come(run, point)
 
     async def _pass_beneath(self, run: R) -> AsyncGenerator[Progress, None]:
         """Report the points of a shift under a look: nothing moves. It ends at once, or at the instant asked for."""

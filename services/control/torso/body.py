@@ -37,7 +37,7 @@ from engage_hri.services.control.figure.estimates import beneath_a_look, wait_es
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
 from engage_hri.services.control.motion.points import Point
-from engage_hri.services.control.torso import displaced_joints, head, homing, truth
+from engage_hri.services.control.torso import displaced_joints, homing, truth
 from engage_hri.services.control.torso.copy_for_rehearsal import Clock, beside
 from engage_hri.services.control.torso.following import follow, is_behind
 from engage_hri.services.control.torso.idling import idling
@@ -112,7 +112,7 @@ class SimulatedBody(WalkingBody[Run]):
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
         estimate = torso.estimate(behavior, pose, world)
-        is_beneath = pose is None and head.is_shift(behavior) and torso.is_overlaid()
+        is_beneath = pose is None and choreography.is_shift(behavior) and torso.is_overlaid()
         return beneath_a_look(estimate) if is_beneath else estimate
 
     def rehearse(
@@ -228,7 +228,7 @@ class SimulatedBody(WalkingBody[Run]):
     # -- motion -------------------------------------------------------------------------------------------------
 
     def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
-        if not (head.is_shift(behavior) and self._torso.is_overlaid()):
+        if not (choreography.is_shift(behavior) and self._torso.is_overlaid()):
             return self._begin(behavior, authority)
         course = choreography.plan(behavior, self._torso.situation(self._torso.world))
         run = Run(behavior, course, authority, Deviations(), 0)
