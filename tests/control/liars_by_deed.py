@@ -206,12 +206,9 @@ class Obliging(SimulatedBody):
 class Greedy(SimulatedBody):
     """Moves the head for a shift though a look has it."""
 
-    def perform(self, behavior, authority):
-        return (
-            self._move(behavior, authority)
-            if isinstance(behavior, GazeShift)
-            else super().perform(behavior, authority)
-        )
+    def set_out(self, behavior, authority):
+        is_greedy = isinstance(behavior, GazeShift)
+        return self._begin(behavior, authority) if is_greedy else super().set_out(behavior, authority)
 
 
 # -- what is predicted --------------------------------------------------------------------------------------------

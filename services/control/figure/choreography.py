@@ -219,3 +219,15 @@ def lowering(here: tuple[float, ...], home: tuple[float, ...]) -> Leg:
     """Leg of an arm from a target back to where it belongs."""
     seconds = max(0.4, return_time(here, home))
     return Leg(goal=home, seconds=seconds, marks=(("relax", 0.1 / seconds), ("end", 1.0)))
+
+
+def is_shift(behavior: BlockBehavior) -> bool:
+    """True for a shift of the head: it says where the head belongs when no look lies over it."""
+    return isinstance(behavior, GazeShift | HeadDirectionShift)
+
+
+def eye_target(behavior: BlockBehavior | None) -> str:
+    """Id of the entity on the gaze axis once the motion is done; empty: none, as with an offset."""
+    if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
+        return ""
+    return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""

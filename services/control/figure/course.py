@@ -32,6 +32,16 @@ class Course(Struct, frozen=True, kw_only=True):
     note: str = ""
     """Warning, if this is only the nearest to what was asked: names both."""
 
+    @property
+    def arrival(self) -> str:
+        """The sync point that says that a behavior has come to its target."""
+        return "stroke" if any(point.sync == "stroke" for point in self.points) else "end"
+
+    @property
+    def goal(self) -> tuple[float, ...]:
+        """Angles of its joints on target."""
+        return tuple(self.on_target.values())
+
 
 class Situation(Struct, frozen=True):
     """Circumstances of a course. pose: joint angles at its start, with the trunk where it is going to be.

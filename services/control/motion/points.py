@@ -12,11 +12,13 @@ class Point(Struct, frozen=True):
 
     held_with: the hold point at which it waits; its own name if it is one itself; empty: it is passed without a stop.
     stands_at: the later point up to which the motion may go while it waits here: it is on target at both.
+    is_told: false for a place on the way that nobody is told of, as where a motor stalls; the motion stops there.
     """
 
     sync: str
     held_with: str = ""
     stands_at: str = ""
+    is_told: bool = True
 
 
 @cache

@@ -258,10 +258,12 @@ class MujocoBody(SimulatedBody):
         run.gate = stop
         motion.brake(now, min(stop, motion.limit))
 
-    async def _come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+    async def come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+        if not point.is_told:
+            return await super().come(run, point, due)
         self.pulse.step()
         now = self._loop.time()
-        if self._has_come(run, point):
+        if self.has_come(run, point):
             if self._awaiting.pop(run, None) is not None and run.gate < inf:
                 run.gate = inf
                 self._watches.pop(run, None)
@@ -274,10 +276,10 @@ class MujocoBody(SimulatedBody):
             self._awaiting.pop(run, None)
         return None
 
-    def _has_come(self, run: Run, point: Point) -> bool:
+    def has_come(self, run: Run, point: Point) -> bool:
         return self._off_point(run, point, self._loop.time()).share <= 1.0
 
-    def _check_joints(self, run: Run) -> None:
+    def check(self, run: Run) -> None:
         watch = self._watches.get(run)
         if watch is None or watch.off is None or run.is_over:
             return

@@ -5,8 +5,8 @@ plan has come there *and* the daemon measures the joints there: never because a 
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Mapping
-from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from math import degrees, inf
 from typing import ClassVar, Self
 
@@ -19,25 +19,23 @@ from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.bases.walk import WalkingBody
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
-    Arrived,
     BehaviorRefused,
-    Body,
     BodyFailed,
     BodyState,
     MovementAuthority,
     Progress,
-    Reached,
-    Revoked,
     TakenOver,
 )
 from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.control.contract.refusals import Impossible
+from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.estimates import wait_estimate
+from engage_hri.services.control.motion.points import Point
 from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
-from engage_hri.services.control.reachy_mini.courses import Instant
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
 from engage_hri.services.control.reachy_mini.idling import Idling, together
 from engage_hri.services.control.reachy_mini.link import Daemon, Link
@@ -49,15 +47,13 @@ from engage_hri.services.control.reachy_mini.tracks import Off, busy
 from engage_hri.services.control.reachy_mini.watching import Rate, Watch, slow
 from engage_hri.services.control.voice import speaking
 
-FREEZE: Seconds = 0.5
-"""Seconds that a track stands still when it is told to freeze, before it goes home."""
 RESTS_ON = 2.0
 """The eyes rest on what they look at within this many times the angle that counts as on target."""
 
 Connect = Callable[[ReachyMiniSettings], AbstractAsyncContextManager[Daemon]]
 
 
-class ReachyMini(Body):
+class ReachyMini(WalkingBody[Run]):
     """Reachy Mini through its daemon. Without `connected()` it answers for a robot at rest: `engage plan` asks so."""
 
     Settings: ClassVar[type[Struct]] = ReachyMiniSettings
@@ -71,6 +67,7 @@ class ReachyMini(Body):
         settings: of `control.drivers.reachy_mini`. connect: opens a connection; by default to `settings.url`.
         alive: it breathes, and its antennas sway.
         """
+        super().__init__()
         self._settings = settings or ReachyMiniSettings()
         self._connect = connect
         types = (*courses.TYPES_OF_BEHAVIORS, Wait)
@@ -78,14 +75,13 @@ class ReachyMini(Body):
             body="reachy_mini", types=tuple(map(type_name, types)), parts=("head", "torso", "face"),
             joints=joints.LIMITS,
         )  # fmt: skip
-        self._loop = asyncio.get_running_loop()
         self._moves = Moves(self._settings)
         self._idling = Idling(self._settings.lag, is_alive=alive)
         self._idle: dict[str, Radians] = {}
         """What is added to the joints by themselves, as it was sent last."""
         self._link: Link | None = None
         self._bells: set[Bell] = set()
-        """Of everything that waits for measurements."""
+        """Of those who wait for tracks to come home."""
         self._sent = ""
         self._last_frame: Seconds = -inf
         self._rate = Rate(GAP)
@@ -136,8 +132,7 @@ class ReachyMini(Body):
             self.on_fault(slow(rate, GAP))
         elif was_slow and not self._rate.is_slow:
             self.on_recovery("reachy_mini: the daemon sends enough measurements again")
-        for bell in list(self._bells):
-            bell.ring()
+        self._ring()
         is_corrected, commanded = self._moves.correct(now), self._moves.commanded(now)
         idle, self._idle = (
             self._idle,
@@ -151,11 +146,15 @@ class ReachyMini(Body):
         self._sent, before = text, self._sent
         return text if text != before else None
 
+    def _ring(self) -> None:
+        """Wake all that wait for measurements."""
+        for bell in [*self._bells, *(run.bell for run in self._moves.runs.values())]:
+            bell.ring()
+
     def _be_lost(self, fault: Fault) -> None:
         if self._link is not None:
             self.on_fault(fault)
-        for bell in list(self._bells):
-            bell.ring()
+        self._ring()
 
     def _be_back(self, measured: Measured) -> None:
         """Begin anew from where the joints are, and go home from there."""
@@ -189,14 +188,14 @@ class ReachyMini(Body):
             if (trouble := self._trouble) is not None:
                 raise Impossible("CANNOT_CREATE_BEHAVIOR", trouble.reason, trouble.advice)
             course = courses.course(behavior, around)
-            start = None if given is None else around.tracks[course.track]
+            start = None if given is None else around.tracks[course.parts[0]]
             path = self._moves.path(course, now, start)
             return motion_estimate(behavior, course, path, around, self._moves, self._settings.lag)
         except Impossible as impossible:
             return impossible.estimate(behavior)
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self._move(behavior, authority)
+        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         names = [name for name, part in joints.PARTS.items() if not parts or part in parts]
@@ -231,102 +230,56 @@ class ReachyMini(Body):
 
     # -- behaviors ----------------------------------------------------------------------------------------------
 
-    async def _move(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+    def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
         if (trouble := self._trouble) is not None:
             raise BehaviorRefused(replace(trouble, where=behavior.id))
-        now = self._loop.time()
-        try:
-            run = Run(
-                behavior, courses.course(behavior, self._moves.circumstances(now, self._moves.world)), authority
-            )
-            if run.course.stays and run.course.track == "head" and self._moves.is_overlaid():
-                run.is_beneath = True
-                self._moves.set_base(run)
-                self._moves.follow(now)
-            else:
-                self._moves.take_over(run, now)
-        except Impossible as impossible:
-            raise BehaviorRefused(impossible.fault(behavior)) from impossible
-        unwatch = authority.watch(run.bell.ring)
-        self._bells.add(run.bell)
-        try:
-            async with aclosing(self._pass_points(run)) as points:
-                async for progress in points:
-                    yield progress
-        except Revoked:
-            if authority.revoked == "freeze" and self._moves.owns(run):
-                await self._freeze(run)
-        finally:
-            unwatch()
-            self._bells.discard(run.bell)
-            self._moves.end_shift(authority)
-            if self._moves.owns(run):
-                self._moves.release(run)
-                if run.pending:
-                    self._moves.abandon(run, self._loop.time())
+        now, moves = self._loop.time(), self._moves
+        course = courses.course(behavior, moves.circumstances(now, moves.world))
+        run = Run(behavior, course, authority, self._settings.patience)
+        if choreography.is_shift(behavior) and moves.is_overlaid():
+            run.is_beneath = True
+            moves.set_base(run)
+            moves.follow(now)
+        else:
+            moves.take_over(run, now)
+        return run
 
-    async def _pass_points(self, run: Run) -> AsyncGenerator[Progress, None]:
-        """Report the sync points of `run` as its joints pass them. Raises Revoked or BodyFailed."""
-        at: Seconds = -inf
-        for instant in run.course.instants:
-            at = came = max(at, await self._come(run, instant))
-            if not run.may_pass(instant.hold):
-                run.waits = True
-                yield Arrived(instant.hold, came)
-                await self._wait_to_go_on(run, instant)
-                at = self._loop.time()
-            self._moves.leave(run, instant, self._loop.time())
-            run.waits = False
-            for sync in instant.syncs:
-                yield Reached(sync, at, came)
+    def leave(self, run: Run, point: Point, *, has_waited: bool) -> Sequence[str]:
+        run.look_anew()
+        return self._moves.leave(run, self._loop.time(), has_waited=has_waited)
 
-    async def _come(self, run: Run, instant: Instant) -> Seconds:
-        """Wait until plan and joints have come to an instant. Returns when. Raises Revoked or BodyFailed."""
-        watch = Watch(self._settings.patience)
-        while not run.is_beneath:
-            now = self._loop.time()
-            if run.authority.revoked is None or not self._moves.owns(run):
-                self._raise_trouble(run)
-            if run.authority.revoked is not None:
-                raise Revoked
-            run.regulate(now)
-            due = run.due(instant)
-            is_due = due is not None and run.bell.is_past(due)
-            if not is_due and run.course.arrival in instant.syncs and self._moves.follows(run, now):
-                if self._moves.off_run(run, instant, now).share <= 1.0:
-                    return self._last_frame
-            elif due is not None and is_due:
-                if not run.motion.path.marks[instant.syncs[0]] and instant is run.course.instants[0]:
-                    return now  # it begins: nothing has to be anywhere
-                off = self._moves.off_run(run, instant, now)
-                if self._has_come(watch, off, run.behavior.id, instant.syncs[-1]):
-                    return max(due, self._last_frame)  # when that was measured
-            await run.bell.wait(inf if due is None or is_due else due)
-        return self._loop.time()
+    def owns(self, run: Run) -> bool:
+        return self._moves.owns(run)
 
-    async def _wait_to_go_on(self, run: Run, instant: Instant) -> None:
-        """Wait at a hold point. Raises Revoked or BodyFailed; taken over just as it might pass, it passes."""
-        watch = Watch(self._settings.patience)
-        while run.authority.revoked is None:
-            self._raise_trouble(run)
-            run.regulate(now := self._loop.time())
-            if run.may_pass(instant.hold) and self._has_come(
-                watch, self._moves.off_run(run, instant, now), run.behavior.id, instant.hold
-            ):
-                return
-            await run.bell.wait(inf)
-        if not (run.authority.revoked == "taken_over" and run.authority.covers(instant.hold)):
-            raise Revoked
+    def release(self, run: Run) -> None:
+        self._moves.release(run)
 
-    async def _freeze(self, run: Run) -> None:
-        run.motion.brake(self._loop.time())
-        until = run.motion.end + FREEZE
-        while self._moves.owns(run) and not run.bell.is_past(until) and self._trouble is None:
-            await run.bell.wait(until)
+    def abandon(self, run: Run) -> None:
+        self._moves.abandon(run, self._loop.time())
 
-    def _raise_trouble(self, run: Run) -> None:
-        if (trouble := self._trouble) is not None:
+    def check(self, run: Run) -> None:
+        if (trouble := self._trouble) is not None and (run.authority.revoked is None or not self.owns(run)):
             raise BodyFailed(replace(trouble, where=run.behavior.id))
+
+    def due(self, run: Run, point: Point) -> Seconds | None:
+        due, now = run.due(point), self._loop.time()
+        if point.sync != run.course.arrival or not self._moves.follows(run, now):
+            return due
+        # The plan after a target that moves is laid anew again and again, and never over: what counts is the gaze.
+        return self._last_frame if self.has_come(run, point) else due
+
+    def has_come(self, run: Run, point: Point) -> bool:
+        return run.is_start(point.sync) or self._moves.off_run(run, point.sync, self._loop.time()).share <= 1.0
+
+    async def come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+        if run.is_start(point.sync):
+            return due
+        off = self._moves.off_run(run, point.sync, self._loop.time())
+        if self._has_come(run.watch, off, run.behavior.id, point.held_with or point.sync):
+            run.look_anew()
+            return max(due, self._last_frame)  # when that was measured
+        await run.bell.wait(inf)
+        return None
 
     # -- measured joints ----------------------------------------------------------------------------------------
 
@@ -368,10 +321,10 @@ class ReachyMini(Body):
         moves, now = self._moves, self._loop.time()
         run = moves.runs.get("head")
         look: BlockBehavior | None = moves.look
-        entity = getattr(look, "target", "")
         if run is not None and not run.is_homeward:
-            look, entity = run.behavior, run.course.entity
-        if now < moves.tracks["head"].motion.end and not (run is not None and (run.waits or run.has_arrived)):
+            look = run.behavior
+        entity = choreography.eye_target(look)
+        if now < moves.tracks["head"].motion.end and not (run is not None and (run.holding or run.has_arrived)):
             return ""
         if not entity or not isinstance(look, courses.Looks) or moves.world.entity(entity) is None:
             return ""
@@ -392,7 +345,3 @@ def _over_the_network(settings: ReachyMiniSettings) -> AbstractAsyncContextManag
     from engage_hri.services.control.reachy_mini.connection import connected
 
     return connected(settings)
-
-
-def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
-    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")

@@ -10,7 +10,6 @@ from math import radians
 
 from msgspec import Struct
 
-from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
@@ -34,9 +33,10 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import expressions
 from engage_hri.services.control.figure.choreography import OFFSETS
-from engage_hri.services.control.figure.course import Situation
+from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
+from engage_hri.services.control.motion.points import Point, held_on_target
 from engage_hri.services.control.reachy_mini import geometry, joints
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
 
@@ -56,46 +56,15 @@ DROOP, RAISED = 130.0, -15.0
 """Degrees outwards from straight up between which an antenna shows a face."""
 
 
-class Instant(Struct, frozen=True):
-    """Sync points that are passed together. hold: the one of them at which the behavior may have to wait."""
-
-    syncs: tuple[str, ...]
-    hold: str = ""
-
-
-class Course(Struct, frozen=True, kw_only=True):
-    """A behavior worked out. track: what it moves. goal: angles at its stroke, or at the end of a shift.
-
-    legs: its way; of what goes home by itself, up to its stroke only. is_swing: the way runs through to its end.
-    stays: it goes nowhere from its goal. entity: what the head is on at the goal. note: what is done otherwise.
-    """
-
-    track: str
-    legs: tuple[Leg, ...]
-    goal: tuple[float, ...]
-    instants: tuple[Instant, ...]
-    is_swing: bool = False
-    stays: bool = False
-    entity: str = ""
-    note: str = ""
-
-    @property
-    def arrival(self) -> str:
-        """The sync point that says that it is at its goal."""
-        return "end" if self.stays else "stroke"
-
-
-def instants(behavior: BlockBehavior, strokes: Sequence[str] = ()) -> tuple[Instant, ...]:
-    """Sync points of a behavior by instant. strokes: repetitions of its stroke."""
-    row = TYPES[type_name(behavior)]
-    found: list[Instant] = []
-    for sync in row.points:
-        group = next((tuple(group) for group in row.one_instant if sync in group), (sync,))
-        if sync == "stroke_end":
-            found += [Instant((each,)) for each in strokes]
-        if not found or sync not in found[-1].syncs:
-            found.append(Instant(group, next((each for each in group if each in row.holds), "")))
-    return tuple(found)
+def points(behavior: BlockBehavior) -> tuple[Point, ...]:
+    """Sync points of a behavior that goes to a goal."""
+    match behavior:
+        case Gaze():
+            return held_on_target("stroke")
+        case Face() | FaceLexeme() | FaceFacs() | Posture():
+            return held_on_target("ready", "stroke_start", "stroke")
+        case _:
+            return (Point("start"), Point("end"))
 
 
 class Circumstances(Struct, frozen=True):
@@ -175,20 +144,24 @@ def _situation(now: Circumstances) -> Situation:
 
 
 def _out(
-    behavior: BlockBehavior, track: str, goal: tuple[float, ...], now: Circumstances, *, entity: str = "",
-    note: str = "",
-) -> Course:  # fmt: skip
+    behavior: BlockBehavior, track: str, goal: tuple[float, ...], now: Circumstances, *, note: str = ""
+) -> Course:
     """The way to a goal, at which it may be held, and from which it goes home, or stays."""
-    points = instants(behavior)
-    stays = len(points) == 2
+    own = points(behavior)
+    stays = len(own) == 2
     here = now.tracks[track]
     time = seconds(track, here, goal)
     goal = goal if time else here
-    arrival = next(i for i, each in enumerate(points) if ("end" if stays else "stroke") in each.syncs)
-    marks = [(sync, 0.0) for each in points[:arrival] for sync in each.syncs]
-    marks += [(sync, 1.0) for each in points[arrival : None if stays else -1] for sync in each.syncs]
-    leg = Leg(goal=goal, seconds=time, marks=tuple(marks))
-    return Course(track=track, legs=(leg,), goal=goal, instants=points, stays=stays, entity=entity, note=note)
+    way = own if stays else own[:-1]
+    marks = tuple((each.sync, 1.0 if each.held_with or each.sync == "end" else 0.0) for each in way)
+    return _course(track, (Leg(goal=goal, seconds=time, marks=marks),), goal, own, note)
+
+
+def _course(track: str, legs: tuple[Leg, ...], goal: tuple[float, ...], own: tuple[Point, ...], note: str) -> Course:
+    names = tuple(limit.joint for limit in joints.TRACKS[track])
+    return Course(
+        parts=(track,), joints=names, legs=legs, points=own, on_target=dict(zip(names, goal, strict=True)), note=note
+    )
 
 
 def _look(behavior: Looks, now: Circumstances) -> Course:
@@ -202,8 +175,7 @@ def _look(behavior: Looks, now: Circumstances) -> Course:
             reason = f"cannot look at {behavior.target!r}: {wanted}; it goes from {low:.0f} to {high:.0f}"
             advice = "is control.drivers.reachy_mini.position where the robot stands?"
             raise Impossible("CANNOT_CREATE_BEHAVIOR", reason, advice)
-    is_beside = isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction
-    return _out(behavior, "head", goal, now, entity="" if is_beside else behavior.target, note=_looked_note(behavior))
+    return _out(behavior, "head", goal, now, note=_looked_note(behavior))
 
 
 def _looked_note(behavior: Looks) -> str:
@@ -229,11 +201,8 @@ def _nod(behavior: Head, now: Circumstances) -> Course:
         )
         for leg in made.legs
     )  # fmt: skip
-    strokes = [point.sync for point in made.points if point.sync.startswith("stroke:")]
     goal = next(leg.goal for leg in legs if any(sync == "stroke" for sync, _ in leg.marks))
-    return Course(
-        track="nod", legs=legs, goal=goal, instants=instants(behavior, strokes), is_swing=True, note=made.note
-    )
+    return _course("nod", legs, goal, made.points, made.note)
 
 
 def _posture(behavior: Posture | PostureShift | Pose, now: Circumstances) -> Course:

@@ -1,14 +1,17 @@
 """Estimates of Reachy Mini, from the paths that it then moves along and the time by which its joints follow. Pure."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.path import Path, resting
+from engage_hri.services.control.motion.points import Point
 from engage_hri.services.control.reachy_mini import geometry, joints
-from engage_hri.services.control.reachy_mini.courses import Circumstances, Course, Instant
+from engage_hri.services.control.reachy_mini.courses import Circumstances
 from engage_hri.services.control.reachy_mini.moving import Moves
 from engage_hri.services.control.reachy_mini.tracks import NEAR
 
@@ -20,12 +23,12 @@ def motion_estimate(
     behavior: BlockBehavior, course: Course, path: Path, around: Circumstances, moves: Moves, lag: Seconds
 ) -> Estimate:
     """Estimate a behavior that moves along `path` from `around`."""
-    track = course.track
+    track, stays = course.parts[0], len(course.points) == 2
     times = _times(course, path, around, moves, lag)
     after = dict(around.tracks)
     if track != "nod":
         after[track] = course.goal
-    end = after if course.stays or track == "nod" else {**after, track: around.base[track]}
+    end = after if stays or track == "nod" else {**after, track: around.base[track]}
     if track == "torso":  # the head keeps looking where it does; the body turns under it
         yaw, pitch, _ = after["head"]
         after["head"] = (yaw, pitch, joints.follow(yaw, after["torso"][0]))
@@ -36,7 +39,7 @@ def motion_estimate(
     part = joints.PARTS[track]
     return Estimate(
         behavior=behavior.id, feasible=True, degraded=course.note, parts=(part,),
-        phases=_phases(course.instants, times), head_degrees=degrees,
+        phases=_phases(course.points, times), head_degrees=degrees,
         ray=geometry.gaze(joints.summed(after), around.mounting) if track == "head" else None,
         pose_after=joints.message(joints.summed(after)), pose_end=joints.message(joints.summed(end)),
     )  # fmt: skip
@@ -44,18 +47,19 @@ def motion_estimate(
 
 def _times(course: Course, path: Path, around: Circumstances, moves: Moves, lag: Seconds) -> dict[str, Seconds]:
     """Times at which sync points are measured, in seconds from the beginning."""
-    times = {sync: s + _settling(course, path, s, lag) for sync, s in path.marks.items()}
-    if not course.is_swing and not course.stays:
-        back = moves.way(course.track, resting(course.goal), around.base[course.track])
-        times["end"] = times["relax"] + back.length + _settling(course, back, back.length, lag)
+    track = course.parts[0]
+    times = {sync: s + _settling(track, path, s, lag) for sync, s in path.marks.items()}
+    if "end" not in times:
+        back = moves.way(track, resting(course.goal), around.base[track])
+        times["end"] = times["relax"] + back.length + _settling(track, back, back.length, lag)
     return times
 
 
-def _settling(course: Course, path: Path, mark: Seconds, lag: Seconds) -> Seconds:
+def _settling(track: str, path: Path, mark: Seconds, lag: Seconds) -> Seconds:
     """Time from when the plan is at a place of a path until the joints are measured near it."""
     if mark <= 0.0:
         return 0.0
-    names = [limit.joint for limit in joints.TRACKS[course.track]]
+    names = [limit.joint for limit in joints.TRACKS[track]]
     goal, steps = path.at(mark).q, 16
     for step in range(1, steps + 1):
         behind = min(mark, lag * step / steps)
@@ -65,13 +69,12 @@ def _settling(course: Course, path: Path, mark: Seconds, lag: Seconds) -> Second
     return FRAME / 2
 
 
-def _phases(instants: tuple[Instant, ...], times: dict[str, Seconds]) -> tuple[Phase, ...]:
+def _phases(points: Sequence[Point], times: dict[str, Seconds]) -> tuple[Phase, ...]:
     """Phases from each sync point to the next. It has one pace."""
-    points = [(sync, instant.hold == sync) for instant in instants for sync in instant.syncs]
     found = []
-    for (since, _), (to, hold) in pairwise(points):
-        took = max(0.0, times[to] - times[since])
-        group = next(instant for instant in instants if to in instant.syncs)
-        longest = None if group.hold or not took else took
-        found.append(Phase(since=since, to=to, shortest=took, natural=took, longest=longest, hold=hold))
+    for since, to in pairwise(points):
+        took = max(0.0, times[to.sync] - times[since.sync])
+        longest = None if to.held_with or not took else took
+        hold = to.held_with == to.sync
+        found.append(Phase(since=since.sync, to=to.sync, shortest=took, natural=took, longest=longest, hold=hold))
     return tuple(found)

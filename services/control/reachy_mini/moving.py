@@ -15,10 +15,12 @@ from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
+from engage_hri.services.control.figure import choreography
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
 from engage_hri.services.control.reachy_mini import courses, geometry, joints
-from engage_hri.services.control.reachy_mini.courses import Circumstances, Course, Instant
+from engage_hri.services.control.reachy_mini.courses import Circumstances
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
 from engage_hri.services.control.reachy_mini.runs import Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
@@ -127,8 +129,8 @@ class Moves:
     def path(self, course: Course, now: Seconds, start: Sequence[float] | None = None) -> Path:
         """Lay a path along a course. start: angles where it begins at rest; None: as its track moves now."""
         if start is not None:
-            return Path(resting(start), course.legs, self._limits[course.track])
-        return Path(self._state(course.track, now), course.legs, self._limits[course.track])
+            return Path(resting(start), course.legs, self._limits[course.parts[0]])
+        return Path(self._state(course.parts[0], now), course.legs, self._limits[course.parts[0]])
 
     def way(self, track: str, here: JointMotion, goal: Sequence[float], *marks: tuple[str, float]) -> Path:
         """Lay a path to rest at a goal."""
@@ -155,17 +157,17 @@ class Moves:
         if not self.runs and self.is_astray(now):
             self.settle(now)
         path = self.path(run.course, now)
-        track = run.course.track
+        track = run.track
         if (earlier := self.runs.pop(track, None)) is not None:
-            if is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
+            if choreography.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
                 earlier.is_beneath = True
             else:
                 earlier.authority.revoke("taken_over")
             earlier.bell.ring()
         self.runs[track] = run
-        if is_shift(run.behavior):
+        if choreography.is_shift(run.behavior):
             self.set_base(run)
-        elif run.course.stays:
+        elif run.stays:
             self.tracks[track].base = run.course.goal
         self._play(run, path, now, self._aim_of(run.behavior, now))
         if track == "torso":
@@ -177,39 +179,39 @@ class Moves:
 
     def _play(self, run: Run, path: Path, now: Seconds, aim: Aim | None = None) -> None:
         run.motion = Motion(path, now, limit=run.limit(path))
-        track = self.tracks[run.course.track]
+        track = self.tracks[run.track]
         track.motion, track.aim = run.motion, aim
         run.bell.ring()
 
-    def leave(self, run: Run, instant: Instant, now: Seconds) -> None:
-        """Note that a behavior has passed an instant. From its goal it goes home; from a stop, on along its way."""
-        run.pending.remove(instant)
-        track = self.tracks[run.course.track]
+    def leave(self, run: Run, now: Seconds, *, has_waited: bool) -> list[str]:
+        """Let a behavior pass its next instant. From its goal it goes home; from a stop, on along its way."""
+        passed, track = run.leave_instant(now), self.tracks[run.track]
         if run.is_homeward and self.owns(run):
             here = self._state(track.name, now)
             self._play(run, self.way(track.name, here, track.base, ("end", 1.0)), now, self._base_aim(track, now))
-        elif run.waits and run.course.is_swing and self.owns(run):
-            left = run.motion.path.after(run.motion.s(now), [sync for each in run.pending for sync in each.syncs])
+        elif has_waited and run.is_swing and self.owns(run):
+            left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             self._play(run, Path(resting(run.motion.at(now).q), left, self._limits[track.name]), now)
+        return passed
 
     def _base_aim(self, track: Track, now: Seconds) -> Aim | None:
         return self._aim_of(self.look, now) if track.name == "head" else None
 
     def owns(self, run: Run) -> bool:
-        return self.runs.get(run.course.track) is run
+        return self.runs.get(run.track) is run
 
     def release(self, run: Run) -> None:
         if self.owns(run):
-            del self.runs[run.course.track]
+            del self.runs[run.track]
 
     def abandon(self, run: Run, now: Seconds) -> None:
         """Send a track home whose behavior has ended early. A shift of the head stays where it stops."""
-        track = self.tracks[run.course.track]
-        if is_shift(run.behavior):
+        track = self.tracks[run.track]
+        if choreography.is_shift(run.behavior):
             run.motion.brake(now)
             self.look, track.base, track.aim = None, track.going, None
             return
-        if run.course.stays:
+        if run.stays:
             track.base = joints.HOME[track.name]
         self.relax((track.name,), now)
 
@@ -248,11 +250,6 @@ class Moves:
         assert isinstance(run.behavior, GazeShift | HeadDirectionShift)
         self.look, self.tracks["head"].base, self._base_of = run.behavior, run.course.goal, run.authority
 
-    def end_shift(self, authority: MovementAuthority) -> None:
-        """Note that a shift has ended: what comes later takes nothing over from it."""
-        if self._base_of is authority:
-            self._base_of = None
-
     def see(self, world: World, now: Seconds) -> None:
         """Take note of a changed world, and follow what is looked at."""
         self._speeds.see(world, now)
@@ -288,13 +285,8 @@ class Moves:
         if run is None:
             track.motion, track.aim = Motion(self.way("head", here, goal), now), aim
             return
-        arrived = not any(arrival in instant.syncs for instant in run.pending)
-        marks = [
-            (sync, 0.0 if arrived else 1.0)
-            for each in run.pending
-            for sync in each.syncs
-            if sync in run.motion.path.marks
-        ]
+        arrived = not run.awaits(arrival)
+        marks = [(each.sync, 0.0 if arrived else 1.0) for each in run.pending if each.sync in run.motion.path.marks]
         left = max(SHORTEST, run.motion.end - now) if not arrived else 0.0
         time = max(left, courses.seconds("head", here.q.tolist(), goal), SHORTEST if not here.at_rest else 0.0)
         self._play(
@@ -310,17 +302,17 @@ class Moves:
         """Tell how far the measured joints of a track are off some angles."""
         return farthest(name, self._of_track(name, now), there, self._near)
 
-    def off_run(self, run: Run, instant: Instant, now: Seconds) -> Off:
+    def off_run(self, run: Run, sync: str, now: Seconds) -> Off:
         """Tell how far the measured joints are off a sync point, or off the nearest place on the way behind it.
 
         A look is on its target by the gaze axis: what counts are the angles that look there from where the eyes are.
         """
-        track = run.course.track
+        track = run.track
         if track == "head":
             look = self.look if run.is_homeward else run.behavior
             return self.off_target(look if isinstance(look, courses.Looks) else None, now)
         path = run.motion.path
-        mark = path.marks[instant.syncs[0]]
+        mark = path.marks[sync]
         s = min(run.motion.s(now), mark + BEHIND)  # later it may be where a stuck joint is
         places = np.linspace(mark, s, SAMPLES).tolist() if s - mark > 1e-6 else [mark]
         offs = [self.off(track, now, path.at(place).q.tolist()) for place in places]
@@ -339,7 +331,7 @@ class Moves:
 
     def follows(self, run: Run, now: Seconds) -> bool:
         """True if what a look is on its way to moves: then its plan is laid anew again and again, and has no end."""
-        return run.course.track == "head" and self._speeds.of(getattr(run.behavior, "target", ""), now) > 0.0
+        return run.track == "head" and self._speeds.of(getattr(run.behavior, "target", ""), now) > 0.0
 
     def _on_target(self, look: courses.Looks | None) -> tuple[Radians, Radians]:
         track = self.tracks["head"]
@@ -384,15 +376,11 @@ class Moves:
                 continue
             run, q, s = self.runs.get(name), track.motion.at(since).q, track.motion.s(since)
             if run is not None and run.motion is track.motion:
-                left = track.motion.path.after(s, [sync for each in run.pending for sync in each.syncs])
+                left = track.motion.path.after(s, [each.sync for each in run.pending])
                 self._play(run, Path(resting(q), left, self._limits[name]), now, track.aim)
             else:
                 left = track.motion.path.after(s)
                 track.motion = Motion(Path(resting(q), left, self._limits[name]), now)
-
-
-def is_shift(behavior: BlockBehavior) -> bool:
-    return isinstance(behavior, GazeShift | HeadDirectionShift)
 
 
 def _goal(look: courses.Looks, around: Circumstances) -> tuple[float, ...]:

@@ -4,25 +4,23 @@ The position of each part at an instant is a formula (`tracks`, `motion`); a beh
 next sync point, or until its authority changes. So a part needs no task to go home: it is given its path once.
 """
 
-import asyncio
 from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import aclosing
 from math import inf, radians
 from typing import Self
 
-from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift, Speech, Wait
+from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
 from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.bases.walk import WalkingBody
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.contract import variability
 from engage_hri.services.control.contract.body import (
-    Arrived,
     BehaviorRefused,
-    Body,
     BodyFailed,
     BodyState,
     MouthShape,
@@ -39,8 +37,7 @@ from engage_hri.services.control.figure.estimates import beneath_a_look, wait_es
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
 from engage_hri.services.control.motion.points import Point
-from engage_hri.services.control.torso import displaced_joints, head, homing, truth
-from engage_hri.services.control.torso.beneath import pass_end
+from engage_hri.services.control.torso import displaced_joints, homing, truth
 from engage_hri.services.control.torso.copy_for_rehearsal import Clock, beside
 from engage_hri.services.control.torso.following import follow, is_behind
 from engage_hri.services.control.torso.idling import idling
@@ -61,13 +58,9 @@ FAULTS = tuple(KINDS)
 """Kinds of faults that it can play: all that have a name."""
 ELEMENTS = 256
 """Elements that an estimate with a path counts for (see `steps`)."""
-CATCHES_UP: Seconds = 0.02
-"""Seconds between two looks at whether it has come to a target that has moved."""
-FREEZE: Seconds = 0.5
-"""Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
 
-class SimulatedBody(Body):
+class SimulatedBody(WalkingBody[Run]):
     """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for its faults."""
 
     carries = kinematics.CARRIES
@@ -81,6 +74,7 @@ class SimulatedBody(Body):
         alive: bool = False,
     ) -> None:
         """Make a torso at rest, in a running event loop. alive: it blinks and breathes. Raises InputRefused."""
+        super().__init__()
         self.capabilities = Capabilities(
             body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
@@ -89,7 +83,6 @@ class SimulatedBody(Body):
         for fault in self._deviations.faults:
             if reason := flaw(fault, self.capabilities):
                 raise InputRefused(Fault(reason=reason, where="control.variability", service="control"))
-        self._loop = asyncio.get_running_loop()
         self._torso = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
@@ -119,7 +112,7 @@ class SimulatedBody(Body):
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
         estimate = torso.estimate(behavior, pose, world)
-        is_beneath = pose is None and head.is_shift(behavior) and torso.is_overlaid()
+        is_beneath = pose is None and choreography.is_shift(behavior) and torso.is_overlaid()
         return beneath_a_look(estimate) if is_beneath else estimate
 
     def rehearse(
@@ -160,10 +153,8 @@ class SimulatedBody(Body):
                 return self._speak(behavior, authority)
             case Wait():
                 return speaking.wait(behavior, authority)
-            case GazeShift() | HeadDirectionShift() if self._torso.is_overlaid():
-                return self._shift_beneath(behavior, authority)
             case _:
-                return self._move(behavior, authority)
+                return self.walk(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         going = {part for part in self._torso.tracks if not parts or part.replace("nod", "head") in parts}
@@ -236,101 +227,58 @@ class SimulatedBody(Body):
 
     # -- motion -------------------------------------------------------------------------------------------------
 
-    async def _move(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        try:
-            course = choreography.plan(behavior, self._torso.situation(self._torso.world, real=True))
-            self._occasions += 1
-            run = Run(behavior, course, authority, self._deviations, self._occasions)
-            path = self._torso.path(run.course)
-        except Impossible as impossible:
-            raise BehaviorRefused(impossible.fault(behavior)) from impossible
-        unwatch = authority.watch(run.bell.ring)
-        self._torso.take_over(run, path)
-        try:
-            async with aclosing(self._pass_points(run)) as points:
-                async for progress in points:
-                    yield progress
-            if run.is_beneath and run.pending:
-                if run.awaits("start"):  # joints that lag have not let it set out
-                    yield Reached("start", now := self._loop.time(), now)
-                run.pending.clear()
-                async with aclosing(pass_end(authority)) as points:
-                    async for progress in points:
-                        yield progress
-            if authority.revoked == "freeze" and self._torso.owns(run):
-                await self._freeze(run)
-        finally:
-            unwatch()
-            # After an abort, a failure or a cancelled task the parts go home by themselves.
-            if self._torso.owns(run):
-                self._torso.release(run)
-                if run.pending:
-                    self._torso.abandon(run)
+    def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
+        if not (choreography.is_shift(behavior) and self._torso.is_overlaid()):
+            return self._begin(behavior, authority)
+        course = choreography.plan(behavior, self._torso.situation(self._torso.world))
+        run = Run(behavior, course, authority, Deviations(), 0)
+        run.is_beneath = True
+        self._torso.set_base(behavior, course, authority)
+        follow(self._torso)
+        return run
 
-    async def _pass_points(self, run: Run) -> AsyncGenerator[Progress, None]:
-        """Report the sync points of `run` as it crosses them, until it is done, cut or revoked. Raises BodyFailed."""
-        since = -inf
-        while run.pending and not run.is_over:
-            self._check_joints(run)
-            if not run.holding:
-                self._torso.extend(run)
-            point = run.pending[0]
-            due = run.due(point)
-            if not run.holding and (due is None or not run.bell.is_past(due)):
-                await run.bell.wait(inf if due is None else due)
-            elif point.sync in (STALL, OVERHEAT):
-                await self._fail_or_stall(run, point)
-            elif (came := await self._come(run, point, self._loop.time() if due is None else due)) is None:
-                continue
-            elif not run.holding and self._torso.is_off_target(run, point.sync):
-                raise _out_of_reach(run)
-            elif point.held_with and (run.holding or not run.may_pass(point.held_with)):
-                arrived = max(came, since)
-                if not run.may_pass(point.held_with):
-                    run.holding = True
-                    yield Arrived(point.held_with, arrived)
-                while not run.may_pass(point.held_with) and not run.is_over:
-                    await run.bell.wait(inf)
-                    self._check_joints(run)
-                while is_behind(self._torso, run) and not run.is_over:
-                    await run.bell.wait(self._loop.time() + CATCHES_UP)
-                if await self._come(run, point, self._loop.time()) is None:
-                    continue
-                if not run.is_over and self._torso.is_off_target(run, point.sync):
-                    raise _out_of_reach(run)
-                # What is taken over just as it may go on has passed the point, and goes no further.
-                if not run.is_over or (run.is_taken_over and run.may_pass(point.held_with)):
-                    since = self._loop.time()
-                    for sync in self._torso.leave_hold(run, point.held_with):
-                        yield Reached(sync, since, arrived)
-            else:
-                run.pending.pop(0)
-                if is_last_on_target(run.behavior, point.sync):
-                    self._torso.leave_target(run)
-                self._torso.attention.follow_run(run, self._loop.time())
-                yield Reached(point.sync, came, came)
-        if run.is_beneath or run.is_taken_over:
-            for sync, due in run.passed_by(self._loop.time()):
-                if not self._has_come(run, run.pending[0]):
-                    break
-                run.pending.pop(0)
-                yield Reached(sync, at := max(due, since), at)
+    def _begin(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
+        course = choreography.plan(behavior, self._torso.situation(self._torso.world, real=True))
+        self._occasions += 1
+        run = Run(behavior, course, authority, self._deviations, self._occasions)
+        self._torso.take_over(run, self._torso.path(run.course))
+        return run
 
-    async def _come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
-        """Wait until the joints have come to a point that the plan has passed at `due`. Returns when they had.
+    def extend(self, run: Run) -> None:
+        self._torso.extend(run)
 
-        None: something else has changed; look again. Raises BodyFailed. These joints are where the plan has them.
-        """
-        return due
+    def leave(self, run: Run, point: Point, *, has_waited: bool) -> Sequence[str]:
+        if has_waited:
+            return self._torso.leave_hold(run, point.held_with)
+        run.pending.pop(0)
+        if is_last_on_target(run.behavior, point.sync):
+            self._torso.leave_target(run)
+        self._torso.attention.follow_run(run, self._loop.time())
+        return [point.sync]
 
-    def _has_come(self, run: Run, point: Point) -> bool:
-        """True if the joints have come to a point that the plan has passed."""
-        return True
+    def owns(self, run: Run) -> bool:
+        return self._torso.owns(run)
 
-    def _check_joints(self, run: Run) -> None:
-        """Raise BodyFailed if the joints do not come along any more."""
+    def release(self, run: Run) -> None:
+        self._torso.release(run)
 
-    async def _fail_or_stall(self, run: Run, point: Point) -> None:
+    def abandon(self, run: Run) -> None:
+        self._torso.abandon(run)
+
+    def confirm(self, run: Run, sync: str) -> None:
+        if self._torso.is_off_target(run, sync):
+            raise BodyFailed(_fault(run.behavior, "its target is out of reach where the torso is now"))
+
+    def is_behind(self, run: Run) -> bool:
+        return is_behind(self._torso, run)
+
+    def stop(self, run: Run) -> None:
+        super().stop(run)
+        self._torso.attention.expect("", 0.0, self._loop.time())
+
+    async def come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+        if point.is_told:
+            return due
         if point.sync == OVERHEAT:
             raise BodyFailed(_fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
         stall = run.faults[STALL]
@@ -338,31 +286,7 @@ class SimulatedBody(Body):
         while not run.is_over and point in run.pending and not run.bell.is_past(until):
             await run.bell.wait(until)
         run.pending = [each for each in run.pending if each is not point]
-
-    async def _freeze(self, run: Run) -> None:
-        run.motion.brake(self._loop.time())
-        self._torso.attention.expect("", 0.0, self._loop.time())
-        until = run.motion.end + FREEZE
-        while self._torso.owns(run) and not run.bell.is_past(until):
-            await run.bell.wait(until)
-
-    # -- gaze ---------------------------------------------------------------------------------------------------
-
-    async def _shift_beneath(
-        self, behavior: BlockBehavior, authority: MovementAuthority
-    ) -> AsyncGenerator[Progress, None]:
-        """Change the base gaze while a `Gaze` lies over it: nothing moves until that ends. `end` comes as asked."""
-        try:
-            course = choreography.plan(behavior, self._torso.situation(self._torso.world))
-        except Impossible as impossible:
-            raise BehaviorRefused(impossible.fault(behavior)) from impossible
-        self._torso.set_base(behavior, course, authority)
-        follow(self._torso)
-        now = self._loop.time()
-        yield Reached("start", now, now)
-        async with aclosing(pass_end(authority)) as points:
-            async for progress in points:
-                yield progress
+        return None
 
     # -- voice --------------------------------------------------------------------------------------------------
 
@@ -392,7 +316,3 @@ def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
     return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
-
-
-def _out_of_reach(run: Run) -> BodyFailed:
-    return BodyFailed(_fault(run.behavior, "its target is out of reach where the torso is now"))

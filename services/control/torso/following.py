@@ -47,7 +47,7 @@ def _follow_with_head(torso: Parts) -> None:
         return
     run.is_lost = False
     path: Path | None = None
-    if run.holding or run.awaits("stroke") or head.is_shift(run.behavior):
+    if run.holding or run.awaits("stroke") or choreography.is_shift(run.behavior):
         path, aim = head.retargeted(run, course, track, now), course.aim
         run.course = course if path is not None else run.course
     elif not run.awaits("relax"):

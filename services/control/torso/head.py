@@ -24,17 +24,6 @@ SHORTEST: Seconds = 0.1
 """Least time that is given to catch up with a target."""
 
 
-def is_shift(behavior: BlockBehavior) -> bool:
-    return isinstance(behavior, GazeShift | HeadDirectionShift)
-
-
-def eye_target(behavior: BlockBehavior | None) -> str:
-    """Id of the entity on the gaze axis once the motion is done; empty: none, as with an offset."""
-    if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
-        return ""
-    return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
-
-
 class Fixation:
     """The base gaze and the fixation: the entity that the eyes rest on, and the instant from which they do.
 
@@ -52,7 +41,7 @@ class Fixation:
     @property
     def entity(self) -> str:
         """Id of the entity of the base gaze; empty: none."""
-        return eye_target(self.base)
+        return choreography.eye_target(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
         self.base, self.angles, self.aim = behavior, course.legs[-1].goal, course.aim
@@ -86,11 +75,11 @@ class Fixation:
         marks, motion = run.motion.path.marks, run.motion
         if isinstance(run.behavior, Gaze):
             if run.awaits("stroke"):
-                self.expect(eye_target(run.behavior), motion.crossing(marks["stroke"]), now)
+                self.expect(choreography.eye_target(run.behavior), motion.crossing(marks["stroke"]), now)
             elif not run.awaits("relax"):
                 self.expect(self.entity, motion.crossing(marks["end"]), now)
         elif isinstance(run.behavior, GazeShift | HeadDirectionShift) and run.awaits("end"):
-            self.expect(eye_target(run.behavior), motion.crossing(marks["end"]), now)
+            self.expect(choreography.eye_target(run.behavior), motion.crossing(marks["end"]), now)
 
 
 def turn(track: Track, goal: tuple[float, ...], now: Seconds, aim: Aim | None) -> None:

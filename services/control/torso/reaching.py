@@ -7,17 +7,11 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.figure.aiming import Aim
-from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.torso.parts import Parts
 
 STEP: Seconds = 0.02
 """Seconds between two looks at where the trunk will be."""
-
-
-def arrival(course: Course) -> str:
-    """The sync point that says that a behavior has come to its target."""
-    return "stroke" if any(point.sync == "stroke" for point in course.points) else "end"
 
 
 def delay(torso: Parts, aim: Aim | None, at: Seconds) -> Seconds:
@@ -38,7 +32,7 @@ def wait_for_reach(torso: Parts) -> None:
     """Delay what is on its way to a target that is not in reach by then, since the trunk moves otherwise."""
     now = torso.clock.time()
     for run in dict.fromkeys(torso.runs.values()):
-        point = arrival(run.course)
+        point = run.course.arrival
         if run.course.aim is None or run.is_over or not run.awaits(point):
             continue
         at = run.motion.crossing(run.motion.path.marks[point])

@@ -23,7 +23,7 @@ from engage_hri.services.control.figure import choreography, tracks
 from engage_hri.services.control.figure.estimates import beneath_a_look
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path, resting
-from engage_hri.services.control.torso import following, head
+from engage_hri.services.control.torso import following
 from engage_hri.services.control.torso.asked import HURRIED, START, paced_by, told_apart
 from engage_hri.services.control.torso.copy_for_rehearsal import Clock
 from engage_hri.services.control.torso.runs import Run
@@ -299,7 +299,7 @@ def _begin(
 ) -> Steps[_Part | Estimate]:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
-    if head.is_shift(behavior) and torso.is_overlaid():
+    if choreography.is_shift(behavior) and torso.is_overlaid():
         estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
             course = choreography.plan(behavior, torso.situation(torso.world))

@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.bases import walk
 from engage_hri.services.control.contract import variability
-from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure.course import Course
@@ -23,11 +23,10 @@ STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")
 """Marks on a path where a fault happens; they are never reported."""
 
 
-class Run:
-    """A behavior that is being performed: `course` under `authority`.
+class Run(walk.Run):
+    """A behavior that moves the torso along `course`: in the size and at the rate that it is asked for, with faults.
 
-    bell: rings when the authority changes. began: when it was given its parts.
-    holding: it waits at a hold point, standing or still coming to a stop.
+    began: when it was given its parts.
     """
 
     def __init__(
@@ -38,27 +37,17 @@ class Run:
         deviations: Deviations,
         occasion: int,
     ) -> None:
-        self.behavior = behavior
+        super().__init__(behavior, course.points, authority)
         self.course = course
-        self.authority = authority
-        self.bell = Bell()
         self.began: Seconds = inf
-        self.pending: list[Point] = list(course.points)
-        self.holding = False
-        self.is_beneath = False
-        """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
         self.is_lost = False
         """True while its target is where it cannot follow."""
-        self.motion: Motion
         self.size = 1.0
         """Share of the full amplitude, 0 to 1."""
         self.gate: Seconds = inf
         """Position on its path at which it waits for joints that have not come along; inf: they have."""
         self._aim: tuple[str, Seconds] | None = None
         """The sync point that the rate is set for, with the instant asked for; None: it runs at its own rate."""
-        self._is_held = False
-        self._missed: frozenset[str] = frozenset()
-        """Hold points at which it could not stop any more when it was told to wait."""
         self._tried_aims: list[tuple[str, Seconds]] = []
         """Instants asked for when a smaller path was last looked for."""
         self.cruise = 1.0
@@ -67,17 +56,10 @@ class Run:
         self._occasion = occasion
         self._take_faults(deviations)
 
-    def awaits(self, sync: str) -> bool:
-        return any(point.sync == sync for point in self.pending)
-
     @property
     def is_setting_out(self) -> bool:
         """True if it has not left its target yet. A shift never does."""
         return self.awaits("stroke_end") or len(self.course.points) == 2
-
-    @property
-    def is_over(self) -> bool:
-        return self.is_beneath or self.authority.revoked is not None
 
     def play(self, motion: Motion) -> None:
         self.motion = motion
@@ -91,7 +73,7 @@ class Run:
         if is_passing or aims == self._tried_aims:
             return None
         self._tried_aims = aims
-        stops = [point.sync for point in self.pending if point.held_with and not self.may_pass(point.held_with)]
+        stops = [point.sync for point in self.pending if self.waits_at(point)]
         reduced = yield from hurried(self.course, self.motion, self.size, aims, now, self.cruise, stops)
         if reduced is None:
             return None
@@ -142,60 +124,17 @@ class Run:
 
         A point at which the joints rest is reported at the instant asked for, if that is later than its arrival.
         """
-        mark = self.motion.path.marks[point.sync]
-        crossing = self.motion.crossing(mark)
-        waits = bool(point.held_with) and not self.may_pass(point.held_with)
-        if crossing is None or waits or not self.motion.path.rests_at(mark):
+        crossing = super().due(point)
+        if (
+            crossing is None
+            or self.waits_at(point)
+            or not self.motion.path.rests_at(self.motion.path.marks[point.sync])
+        ):
             return crossing
         return max(crossing, self.authority.pace.get(point.sync, crossing))
 
     def limit(self, path: Path) -> Seconds:
-        """Position on `path`, in its natural seconds, up to which it may go now."""
-        for point in self.pending:
-            if point.sync in FAULTS or (point.held_with and not self.may_pass(point.held_with)):
-                return min(self.gate, path.marks.get(point.stands_at or point.sync, inf))
-        return self.gate
-
-    @property
-    def is_taken_over(self) -> bool:
-        return self.authority.revoked == "taken_over"
-
-    def may_pass(self, hold: str) -> bool:
-        """True if it may go on from a hold point now, or has to, since it could stop there no more."""
-        return self.authority.covers(hold) or hold in self._missed
-
-    def brake_for_hold(self, now: Seconds) -> None:
-        """While the behavior is held, stop at the next hold point where the joints can."""
-        is_news, self._is_held = self.authority.held and not self._is_held, self.authority.held
-        if not self._is_held:
-            self._missed = frozenset()
-            return
-        if is_news:
-            marks = self.motion.path.marks
-            self._missed = frozenset(
-                point.held_with
-                for point in self.pending
-                if point.held_with
-                and self.authority.is_granted(point.held_with)
-                and not self.motion.can_stop_at(marks[point.stands_at or point.sync], now)
-            )
-        if (limit := self.limit(self.motion.path)) < self.motion.limit:
-            self.motion.brake(now, limit)
-
-    @property
-    def stands(self) -> bool:
-        """True if it has come to a stop where it has to wait."""
-        return self.holding and self.bell.is_past(self.motion.end)
-
-    def leave(self, hold: str, now: Seconds) -> list[str]:
-        """Stop waiting at `hold`; return the sync points passed. The same place may be another hold point, too."""
-        passed = [point.sync for point in self.pending if point.held_with == hold]
-        self.pending = [point for point in self.pending if point.held_with != hold]
-        following = next(point for point in self.pending if point.sync not in FAULTS)
-        here = self.motion.s(now) + 1e-9
-        is_here = following.held_with and self.motion.path.marks[following.sync] <= here
-        self.holding = self.stands and bool(is_here)
-        return passed
+        return min(self.gate, super().limit(path))
 
     def with_faults(self, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
         """Mark the faults that are still due on new `legs`."""
@@ -205,20 +144,6 @@ class Run:
                 following = next(each.sync for each in self.pending[number:] if each.sync not in FAULTS)
                 legs = tuple(_marked(leg, point.sync, following) for leg in legs)
         return legs
-
-    def lie_beneath(self) -> None:
-        """Note that a look lies over this shift of the head."""
-        self.is_beneath = True
-
-    def passed_by(self, at: Seconds) -> list[tuple[str, Seconds]]:
-        """Sync points that it has passed by then and not reported yet, each with its instant."""
-        passed: list[tuple[str, Seconds]] = []
-        for point in () if self.holding else self.pending:
-            due = None if point.sync in FAULTS else self.due(point)
-            if due is None or due > at or (point.held_with and not self.may_pass(point.held_with)):
-                break
-            passed.append((point.sync, due))
-        return passed
 
     def deviate(self, deviations: Deviations, now: Seconds) -> None:
         """Take over exactly these faults, in the middle of the motion."""
@@ -256,7 +181,7 @@ class Run:
             return
         legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
         self.course = replace(self.course, legs=legs)
-        self.pending.insert(index, Point(fault))
+        self.pending.insert(index, Point(fault, is_told=False))
 
     def _mark_faults(self, motion: Motion, now: Seconds) -> None:
         """Mark the faults that are due on the path of a motion, half-way from here. One that comes too late to stop

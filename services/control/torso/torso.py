@@ -160,7 +160,7 @@ class Torso:
     def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
         path = laid_path(start, course, is_free=True)
-        point = reaching.arrival(course)
+        point = course.arrival
         if delay := reaching.delay(self, course.aim, self.clock.time() + path.marks[point]):
             path = laid_path(start, replace(course, legs=reaching.delayed(course.legs, point, delay)), is_free=True)
         table_clearance.check_carried(self, course, path)
@@ -169,9 +169,7 @@ class Torso:
     def is_off_target(self, run: Run, sync: str) -> bool:
         """True if `sync` says that a behavior is on its target, which is out of reach."""
         aim, trunk = run.course.aim, self.tracks["torso"].angles(self.clock.time())
-        is_claim = sync == reaching.arrival(run.course) or (
-            isinstance(run.behavior, Pointing) and sync == "stroke_end"
-        )
+        is_claim = sync == run.course.arrival or (isinstance(run.behavior, Pointing) and sync == "stroke_end")
         return aim is not None and is_claim and (run.is_lost or not aim.is_in_reach(trunk))
 
     # -- motion -------------------------------------------------------------------------------------------------
@@ -188,8 +186,8 @@ class Torso:
         left: list[str] = []
         for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):
             self.release(earlier)
-            if head.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
-                earlier.lie_beneath()
+            if choreography.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
+                earlier.is_beneath = True
             else:
                 earlier.authority.revoke("taken_over")
             earlier.bell.ring()
@@ -198,7 +196,7 @@ class Torso:
             self.runs[part] = run
         for bell in self.homeward:
             bell.ring()
-        if head.is_shift(run.behavior):
+        if choreography.is_shift(run.behavior):
             self.set_base(run.behavior, run.course, run.authority)
         elif isinstance(run.behavior, choreography.SETTLING):
             tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
@@ -319,7 +317,7 @@ class Torso:
 
     def abandon(self, run: Run) -> None:
         """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
-        if head.is_shift(run.behavior):
+        if choreography.is_shift(run.behavior):
             self._stay(run)
             self.attention.expect("", 0.0, self.clock.time())
         else:

@@ -14,7 +14,6 @@ from engage_hri.services.control.contract.body import BodyFailed, Reached
 from engage_hri.services.control.motion.path import JointMotion, resting
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.body import ReachyMini
-from engage_hri.services.control.reachy_mini.courses import Course
 from engage_hri.services.control.reachy_mini.estimates import FRAME, _settling
 from engage_hri.services.control.reachy_mini.moving import SHORTEST, Moves
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
@@ -296,7 +295,7 @@ def test_joints_that_follow_late_are_expected_at_their_goal_not_before_and_soon_
         step for step, place in enumerate(places) if abs(place - home[0] - yaw) <= limit
     )  # it only comes nearer
 
-    told = _settling(Course(track="head", legs=(), goal=(), instants=()), path, path.length, lag)
+    told = _settling("head", path, path.length, lag)
 
     assert 0 < near < 16_000
     assert told == pytest.approx(lag * (1.0 - near // 1000 / 16) + FRAME / 2)  # in sixteenths, rounded up
