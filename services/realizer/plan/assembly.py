@@ -42,12 +42,13 @@ class Assembly(Struct, frozen=True):
     def waits(self, ties: Iterable[Place | Bound]) -> set[tuple[str, str]]:
         """Waits among `ties` that only make sure of an order, or are mere custom: pairs of names of transitions."""
         names = [each.name for each in self.net.transitions]
-        return {
-            (names[tie.source], names[tie.target])
-            for tie in ties
-            if (tie.kind == "order" and tie.behavior and tie.source and tie.target != len(names) - 1)
-            or (tie.kind == "series" and not tie.behavior)
-        }
+        return {(names[tie.source], names[tie.target]) for tie in ties if self.is_dispensable(tie)}
+
+    def is_dispensable(self, tie: Place | Bound) -> bool:
+        """True for a wait that only makes sure of an order, or is mere custom."""
+        if tie.kind == "order":
+            return bool(tie.behavior and tie.source and tie.target != len(self.net.transitions) - 1)
+        return tie.kind == "series" and not tie.behavior
 
     def rounds(self, times: Sequence[Seconds]) -> dict[Point, int]:
         """Number of measured events in a row that each point waits for at its own time: an order of equal times."""

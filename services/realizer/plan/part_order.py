@@ -1,93 +1,202 @@
-"""The order in which behaviors of a block have a part: of two that cannot be in one order, the other is tried."""
+"""The order in which behaviors of a block have a part, where the order of their starts leaves no time for all.
+
+Who has a part first is found by when the behaviors would start, each by itself. Ties to others may leave no time for
+that order: the second cannot wait for the first, or it could if a third came earlier. A search that swaps one pair
+after the other needs hundreds of schedules for a block of a hundred behaviors. So all parts are ordered in one pass
+(precedence constraint posting: Smith and Cheng, "Slack-based heuristics for constraint satisfaction scheduling", AAAI
+1993):
+
+1. For each two behaviors it is known how much later than the start of the one the other leaves its part, at least.
+   That comes from the spare time of the ties in a schedule in which nobody waits for a part.
+2. Of two behaviors of which only one can wait for the other, that one waits. This is a new tie and leaves less time
+   to others. So the pairs are looked at again, until nothing new follows.
+3. What is still open is decided in the order in which the behaviors would have to set out: each comes last of those
+   that have the part so far, or as late as the ties allow. Each decision is a tie for the next.
+
+A behavior that fits nowhere stays without a place. The schedule tells why, and the behavior is lost.
+
+The work ends: the order follows from the behaviors that have been in the way of others, and these only become more.
+They are kept in mind when a behavior is dropped, so that the next order is right at once.
+"""
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from itertools import accumulate
+from itertools import accumulate, combinations, pairwise
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.handover import Turn, in_series, least
+from engage_hri.services.realizer.net.petri_net import Bound, Place
+from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.handover import Turn, least
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.points import Point
+from engage_hri.services.realizer.plan.relations import Relations
+from engage_hri.services.realizer.plan.spare_time import distances, spare_times
+from engage_hri.services.realizer.points import EPSILON, SHIFTS
+from engage_hri.services.runtime.steps import Steps
+
+
+class Untouched(NamedTuple):
+    """A schedule in which nobody waits for a part. times: of each transition. present: what the block says."""
+
+    assembly: Assembly
+    times: Sequence[Seconds]
+    present: Relations
+
+    def left(self, chain: Chain) -> int:
+        """Number of the point of a behavior from which on another may have its part."""
+        held = self.present.held
+        return max([least(chain), *(number for number, point in enumerate(chain.points) if point in held)])
+
+    def leaving(self, chain: Chain) -> Seconds:
+        """Time at which a behavior sets out for the first of its points that are tied, at its natural pace."""
+        at, tied = self.assembly.at, self.present.constrained
+        gone = accumulate((each.natural for each in chain.segments), initial=0.0)
+        passed = [(point, self.times[at[point]] - seconds) for point, seconds in zip(chain.points, gone, strict=True)]
+        return round(max(passed[0][1], min((at for point, at in passed if point in tied), default=0.0)), 6)
+
+    @property
+    def ties(self) -> list[Place | Bound]:
+        """The ties that must be kept; mere custom leaves time for anything."""
+        net = self.assembly.net
+        ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
+        return [tie for tie in ties if not self.assembly.is_dispensable(tie)]
 
 
 class PartOrder:
-    """Behaviors that have changed places. turns: the waits that come of it, and those `given`, to begin with.
-
-    Who takes a part first is found by when the two would start, each by itself. Only what is tied to them may tell
-    that there is no time for it. Then those that are in each other's way come in the order in which they would have
-    to set out if nobody waited for a part; if that does not help, they change places, once each pair; if that does
-    not, either, back again.
-    """
+    """Behaviors that have changed places. turns: the waits that come of it, and those `given`, to begin with."""
 
     def __init__(self, given: frozenset[Turn] = frozenset()) -> None:
         self.given = given
+        self._rivals = set[str]()
+        """Behaviors that have been in the way of others, or had others in their way."""
         self.begin_anew()
 
     def begin_anew(self) -> None:
         """Begin again without changes: the speeches have another order, or something is gone."""
         self._changed = frozenset[Turn]()
-        self._times: Mapping[Point, Seconds] = {}
-        self._tied: Container[Point] = ()
-        self._sorted = set[str]()
-        self._is_sorting = True
-        self._tried = set[frozenset[str]]()
+        self._untouched: Untouched | None = None
 
     @property
     def turns(self) -> frozenset[Turn]:
         return self.given | self._changed
 
-    def see(self, times: Mapping[Point, Seconds], tied: Container[Point]) -> None:
-        """Note when points come, the first time, when nobody waits for a part yet.
+    def see(self, assembly: Assembly, times: Sequence[Seconds], present: Relations) -> None:
+        """Note a schedule; the first is the one in which nobody waits for a part yet."""
+        self._untouched = self._untouched or Untouched(assembly, times, present)
 
-        tied: points of which the block says when they come.
-        """
-        if not self._times:
-            self._times, self._tied = times, tied
+    def change(
+        self, impossible: Iterable[Turn], turns: Iterable[Turn], chains: Mapping[str, Chain], begun: Container[str]
+    ) -> Steps[bool]:
+        """Order the parts anew, since one behavior cannot wait for another; False if that gives no new order.
 
-    def change(self, impossible: Sequence[Turn], chains: Mapping[str, Chain], begun: Container[str]) -> bool:
-        """Let some change places of which one cannot wait for the other; False if none has to be tried any more.
-
-        impossible: waits for which there is no time. begun: behaviors that have their parts already.
+        impossible: waits for which there is no time. turns: all waits so far. begun: behaviors that have their parts
+        already.
         """
         found = [each for each in impossible if each[0] in chains and chains[each[0]].type != "speech"]
         if idle := self.given.intersection(found):
             self.given -= idle
             return True
-        if found and self._times and self._is_sorting:
-            turns = self._in_turn(found, chains, begun)
-            self._is_sorting = turns not in (self._changed, frozenset(found))
-            if self._is_sorting or self._changed:
-                self._changed = turns if self._is_sorting else frozenset()
-                return True
-        for waiter, point in sorted(found):
-            pair = frozenset((waiter, point.behavior))
-            if pair in self._tried or point.behavior not in chains or any(id in begun for id in pair):
-                continue
-            self._tried.add(pair)
-            last = chains[waiter].points[least(chains[waiter])]
-            self._changed |= {(point.behavior, last)}
-            return True
-        if found and self._changed:
-            self._changed = frozenset()
-            return True
-        return False
+        if not found or self._untouched is None:
+            return False
+        rivals = {id for waiter, point in (*found, *turns) for id in (waiter, point.behavior)}
+        self._rivals |= {id for id in rivals & chains.keys() if id not in begun and chains[id].type != "speech"}
+        before = self._changed
+        self._changed = yield from _ordered([chains[id] for id in chains if id in self._rivals], self._untouched)
+        return self._changed != before
 
-    def _in_turn(self, found: Iterable[Turn], chains: Mapping[str, Chain], begun: Container[str]) -> frozenset[Turn]:
-        """Let each that has been in another's way wait for the one before it that has the same part."""
-        self._sorted.update(id for waiter, point in found for id in (waiter, point.behavior))
-        ids = [id for id in chains if id in self._sorted and id not in begun and chains[id].type != "speech"]
-        ids.sort(key=lambda id: self._leaving(chains[id]))
-        users = (
-            [id for id in ids if part in chains[id].parts]
-            for part in {part for id in ids for part in chains[id].parts}
-        )
-        return frozenset(
-            (later, chains[earlier].points[least(chains[earlier], chains[later])])
-            for each in users
-            for earlier, later in in_series(each, chains)
-        )
 
-    def _leaving(self, chain: Chain) -> Seconds:
-        """Time at which a behavior sets out for the first of its points that are tied, at its natural pace."""
-        gone = accumulate((each.natural for each in chain.segments), initial=0.0)
-        passed = [(point, self._times[point] - seconds) for point, seconds in zip(chain.points, gone, strict=True)]
-        return round(max(passed[0][1], min((at for point, at in passed if point in self._tied), default=0.0)), 6)
+def _ordered(users: Sequence[Chain], untouched: Untouched) -> Steps[frozenset[Turn]]:
+    """Each of these behaviors with the one before it that has the same part."""
+    room = yield from _room(users, untouched)
+    by_leaving = sorted(users, key=untouched.leaving)
+    parts = sorted({part for chain in users for part in chain.parts})
+    # A shift takes nothing from a look, nor a look from a shift: see `handover.in_series`.
+    groups = [
+        [chain for chain in by_leaving if part in chain.parts and (chain.type in SHIFTS) == is_shift]
+        for part in parts
+        for is_shift in (False, True)
+    ]
+    yield from _decide(groups, room)
+    turns = set[Turn]()
+    for group in groups:
+        order: list[Chain] = []
+        for chain in group:
+            places = range(len(order), -1, -1)
+            fitting = (place for place in places if room.fits(chain, order[max(0, place - 1) : place + 1], place))
+            if (place := next(fitting, None)) is not None:
+                order.insert(place, chain)
+                for earlier, later in pairwise(order[max(0, place - 1) : place + 2]):
+                    room.take(earlier, later)
+        yield 4 * len(group)
+        turns |= {(later.behavior.id, one.points[untouched.left(one)]) for one, later in pairwise(order)}
+    return frozenset(turns)
+
+
+def _decide(groups: Iterable[Sequence[Chain]], room: "_Room") -> Steps[None]:
+    """Let one wait for the other wherever only one can, until nothing new follows."""
+    undecided = {
+        frozenset((one.behavior.id, two.behavior.id)): (one, two)
+        for each in groups
+        for one, two in combinations(each, 2)
+    }
+    is_new = True
+    while is_new:
+        decided = [pair for pair, both in undecided.items() if room.decide(*both)]
+        yield len(undecided) // 2
+        for pair in decided:
+            del undecided[pair]
+        is_new = bool(decided)
+
+
+class _Room:
+    """The time that ties leave for one behavior to have a part after another.
+
+    users: the behaviors. apart: how much later than the start of each (row) the others leave their parts (column), at
+    least.
+    """
+
+    def __init__(self, users: Sequence[Chain], apart: Sequence[Sequence[Seconds]]) -> None:
+        self._number = {chain.behavior.id: number for number, chain in enumerate(users)}
+        self._apart = np.array(apart)
+
+    def is_left(self, earlier: Chain, later: Chain) -> bool:
+        """True if `later` can wait for `earlier`."""
+        one, other = self._number[earlier.behavior.id], self._number[later.behavior.id]
+        return bool(self._apart[other, one] <= EPSILON)
+
+    def take(self, earlier: Chain, later: Chain) -> None:
+        """Let `later` wait for `earlier`: what comes after its start is as much later than what `earlier` follows."""
+        one, other = self._number[earlier.behavior.id], self._number[later.behavior.id]
+        np.maximum(self._apart, self._apart[:, one, None] + self._apart[other], out=self._apart)
+
+    def decide(self, one: Chain, two: Chain) -> bool:
+        """Let one wait for the other if only one can; False if both can."""
+        is_first, is_second = self.is_left(one, two), self.is_left(two, one)
+        if is_first != is_second:
+            self.take(*((one, two) if is_first else (two, one)))
+        return not (is_first and is_second)
+
+    def fits(self, chain: Chain, neighbors: Sequence[Chain], place: int) -> bool:
+        """True if there is room for a behavior among its neighbors. place: how many come before it; 0: none does."""
+        before, after = (neighbors[:1], neighbors[1:]) if place else ((), neighbors)
+        return all(self.is_left(each, chain) for each in before) and all(self.is_left(chain, each) for each in after)
+
+
+def _room(users: Sequence[Chain], untouched: Untouched) -> Steps[_Room]:
+    at, times = untouched.assembly.at, untouched.times
+    spare = spare_times(untouched.ties, times)
+    yield len(times)
+    clock = distances(0, spare)
+    spare[0] = []  # From each start, the way through the start of the block is known then.
+    ends = [at[chain.points[untouched.left(chain)]] for chain in users]
+    apart = []
+    for start in (at[chain.points[0]] for chain in users):
+        found = distances(start, spare)
+        back = found.get(0, inf)
+        apart.append(
+            [times[end] - times[start] - min(found.get(end, inf), back + clock.get(end, inf)) for end in ends]
+        )
+        yield len(found)
+    return _Room(users, apart)

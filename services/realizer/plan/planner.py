@@ -99,6 +99,7 @@ class _Planner:
         self.doubted: set[Point] = set()  # known points, not planned for when they came or are expected
         self.untied: set[Point] = set(known.untied)  # see `Plan`
         self.early: frozenset[tuple[str, Point]] = frozenset()  # see `Arrangement`
+        self.customs: set[tuple[str, str]] = set()  # waits by mere custom for which there is no time
         self.waived: set[tuple[Point, Point]] = set()  # own and other, that wait for each other whatever is planned
         self.spelling = Spelling(block, known.blocks)
         self.lines = {behavior.id: behavior.line for behavior in block.behaviors}
@@ -191,7 +192,7 @@ class _Planner:
                 continue
             except Losses as found:
                 waits = [loss.turn for loss in found.losses if loss.turn in self.turns]
-                if self.parts.change(waits, self.chains, self.known.begun):
+                if (yield from self.parts.change(waits, self.turns, self.chains, self.known.begun)):
                     continue
                 times = yield from times_of(self.speeches, self.relations)
                 gone, losses, given_up = {*self.dropped}, list[Loss](), set[Point]()
@@ -259,11 +260,12 @@ class _Planner:
         tried: list[Arrangement] = []
         """Arrangements since the last conflict."""
         while True:
+            assembler.waive(self.customs)
             if (named := naming_others(present, arrangement)) != assembler.relations:
                 assembler = yield from assembling(self.chains, named, classes, waited_for)
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
-            self.parts.see(times, present.constrained)
+            self.parts.see(assembly, solution.times, present)
             yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
             rounds = assembly.rounds(solution.times)
@@ -363,7 +365,7 @@ class _Planner:
         except Impossible as impossible:
             turns = self.turns | arrangement.waits
             waits = list(turns_in(by_ends(turns, assembly.at), *impossible.circles))
-            if self.parts.change(waits, self.chains, self.known.begun):
+            if (yield from self.parts.change(waits, self.turns, self.chains, self.known.begun)):
                 raise Misordered from None
             if self.order.refute(impossible.circles, assembly.net):
                 self.parts.begin_anew()
@@ -388,7 +390,8 @@ class _Planner:
                     self.untied |= foreign
                     raise Misordered from None
             elif idle := points_of_others.idle(impossible, assembly, self.places):
-                assembler.waive(idle)
+                self.customs |= idle
+                assembler.waive(self.customs)
             else:
                 yield 2 * len(self.chains)  # All that was asked of these circles.
                 present, turns = assembler.relations, turns | self.order.turns

@@ -6,7 +6,6 @@ which of them have to come before which; next is the document's order but for th
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from heapq import heappop, heappush
 from itertools import pairwise
 from math import inf
 from typing import Literal
@@ -14,10 +13,11 @@ from typing import Literal
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Circle, least
+from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import Relations
+from engage_hri.services.realizer.plan.spare_time import distances, spare_times
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.runtime.steps import PORTION, Steps
+from engage_hri.services.runtime.steps import Steps
 
 WORK = 400
 """Orders that are tried, times behaviors of the block."""
@@ -158,42 +158,22 @@ def _before(
 
     times: of a schedule. Two that have to come before each other are in no order.
     """
-    spare: list[list[tuple[int, Seconds]]] = [[] for _ in net.transitions]
-    """For each transition, those that wait for it, and how many seconds later than they must they come."""
     ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
-    for number, tie in enumerate(ties):
-        seconds = times[tie.target] - times[tie.source] - least(tie)
-        if tie.kind != "idle" and -EPSILON < seconds < inf:
-            spare[tie.source].append((tie.target, max(0.0, seconds)))
-        if not number % PORTION:
-            yield PORTION // 4
+    spare = spare_times(ties, times)
+    yield len(ties) // 4
     starts, ends = ({id: at[Point(id, sync)] for id in speeches} for sync in ("start", "end"))
-    clock = _distances(0, spare)
+    clock = distances(0, spare)
     yield len(clock)
     spare[0] = []  # From each start, the way through the start of the block is known then.
     before: dict[str, dict[str, None]] = {id: {} for id in speeches}
     for id, start in starts.items():
-        found = _distances(start, spare)
+        found = distances(start, spare)
         yield len(found) + len(speeches) // 4
         for other, end in ends.items():
             distance = min(found.get(end, inf), found.get(0, inf) + clock.get(end, inf))
             if other != id and distance < times[end] - times[start] - EPSILON:
                 before[other][id] = None
     return {id: [each for each in before[id] if id not in before[each]] for id in speeches}
-
-
-def _distances(source: int, out: Sequence[Sequence[tuple[int, Seconds]]]) -> dict[int, Seconds]:
-    """Shortest distances from a node to all that can be reached."""
-    found: dict[int, Seconds] = {}
-    todo = [(0.0, source)]
-    while todo:
-        distance, here = heappop(todo)
-        if here not in found:
-            found[here] = distance
-            for target, length in out[here]:
-                if target not in found:
-                    heappush(todo, (distance + length, target))
-    return found
 
 
 def may_speak_at_once(id: str, chains: Mapping[str, Chain], present: Relations) -> bool:
