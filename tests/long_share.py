@@ -25,6 +25,7 @@ LONG = {
     "mutants": "each test runs pytest on a copy of the tree; it guards a tool and not the robot",
     "cli/test_early_ctrl_c.py": "each test starts `engage` and interrupts it while it loads",
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
+    "recording/test_pictures.py": "it draws pictures and films of recordings, and has ffmpeg write them",
     "control/mujoco/test_pictures.py": "it draws films of physics, and has ffmpeg write them",
 }
 """Files and folders whose tests are long though they are not marked `real_time`, with the reason."""
@@ -42,6 +43,7 @@ SHORT_PROCESSES: dict[str, str] = {
     "cli/test_formats.py": "terminals of other encodings need a process, which prints a page and ends",
     "cli/test_loading.py": "it asks Python once how a command is loaded",
     "control/test_liars.py": "it asks pytest once, and no robot",
+    "recording/test_annotation_files.py": "it has ffmpeg write a film of an instant",
     "runtime/test_installation.py": "it asks Python once where a package is",
 }
 """Files of the short share that may start processes, with the reason."""
