@@ -10,6 +10,7 @@ processes makes `make test` slow unseen.
 """
 
 import subprocess
+import traceback
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,11 @@ def is_long(path: Path, *, real_time: bool) -> bool:
     return name != SMOKE and (real_time or any(name == each or name.startswith(f"{each}/") for each in LONG))
 
 
+def _is_importing() -> bool:
+    """Whether whoever calls this does so while a module is loaded."""
+    return any(frame.f_code.co_filename.startswith("<frozen importlib") for frame, _ in traceback.walk_stack(None))
+
+
 class Started:
     """Counts processes that are started from here, by `subprocess` or by asyncio, which uses it."""
 
@@ -62,11 +68,14 @@ class Started:
         self.number = 0
 
     def watching(self, patch: pytest.MonkeyPatch) -> None:
-        """Count from now on, until the patch is undone."""
+        """Count from now on, until the patch is undone.
+
+        What a library starts while it is imported is not counted: MuJoCo's glfw does so, in whichever test loads it.
+        """
         begin = subprocess.Popen.__init__
 
         def counted(process: "subprocess.Popen[Any]", *arguments: Any, **options: Any) -> None:
-            self.number += 1
+            self.number += not _is_importing()
             begin(process, *arguments, **options)
 
         patch.setattr(subprocess.Popen, "__init__", counted)
