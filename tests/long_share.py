@@ -27,6 +27,8 @@ LONG = {
     "cli/test_early_ctrl_c.py": "each test starts `engage` and interrupts it while it loads",
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
     "recording/test_pictures.py": "it draws pictures and films of recordings, and has ffmpeg write them",
+    "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
+    "scenario/test_on_physics.py": "a whole task in physics; test_appendix_b.py has it on the simulated torso",
     "control/mujoco/test_pictures.py": "it draws films of physics, and has ffmpeg write them",
 }
 """Files and folders whose tests are long though they are not marked `real_time`, with the reason."""
