@@ -28,6 +28,8 @@ LONG = {
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
     "recording/test_pictures.py": "it draws pictures and films of recordings, and has ffmpeg write them",
     "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
+    "scenario/test_raw_perception.py": "whole tasks seen by cameras; recognition/ has the parts",
+    "recording/test_commands_on_damage.py": "each command on each damage; test_damage.py has what reading finds",
     "scenario/test_on_physics.py": "a whole task in physics; test_appendix_b.py has it on the simulated torso",
     "control/mujoco/test_pictures.py": "it draws films of physics, and has ffmpeg write them",
 }
