@@ -8,29 +8,29 @@ READY := .venv/.ready
 PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 \
 	$(BIN)/python -m pip install -qq
 PROFILE := same
+CHOSEN := -m "not long"
 
-.PHONY: demo test test-long test-rest test-machines mutants lint style docs generate coverage bench reachy-mini clean
+.PHONY: demo test test-all test-long test-machines mutants lint style docs generate coverage bench reachy-mini clean
 
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
 
-# Whoever changes something runs this: all that needs no process of its own, in four minutes on two free processors.
-# mypy keeps one of them busy for as long as others would wait for it: it runs beside the tests.
-test: SOME := -m "not long"
-test test-long: style
+# Four minutes on two processors: all but the long share (tests/long_share.py). mypy keeps one processor busy for as long as
+# others would wait for it: it runs beside the tests.
+test: style
 	@$(BIN)/mypy --no-error-summary & types=$$!; \
-	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) $(SOME) $(ARGS); tests=$$?; \
-	wait $$types && exit $$tests
+	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) $(CHOSEN) $(ARGS); \
+	tests=$$?; wait $$types && exit $$tests
 
-# All tests: real processes, browsers, the wheel and the site as well (tests/long.toml), and all random cases of those of
-# which `make test` tries one of six (tests/random_cases.py).
+# The long share as well: real processes, sockets, browsers, the wheel, the site. `.ci/run` runs this.
+test-all: CHOSEN :=
+test-all: test
+
+# And all random cases, of which the others try a share (tests/random_cases.py).
 test-long: PROFILE := long
+test-long: test-all
 
-# What `make test` leaves out, with the same share of random cases: `.ci/run` runs both.
-test-rest: $(READY)
-	@$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder --hypothesis-profile=$(PROFILE) -m long $(ARGS)
-
-# What `make test-long` leaves out on most machines, and never has the time for: several machines on this one, which wants root,
+# What `make test` leaves out on most machines, and never has the time for: several machines on this one, which wants root,
 # and all of the contract on the mock-up of a Reachy Mini. CI does it each week.
 test-machines: $(READY) reachy-mini
 	@REACHY_MINI_FULL=1 ENGAGE_PLATFORM=weekly $(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder \

@@ -18,7 +18,7 @@ from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
-from tests.long_tests import is_long
+from tests.long_share import Left, Started, is_long
 from tests.longest import LONGEST
 from tests.skips import Skips
 
@@ -51,28 +51,24 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "smoke: in real time, and quick: `make test` runs it")
-    config.addinivalue_line("markers", "long: `make test` leaves it out (tests/long.toml says which)")
     config.addinivalue_line("markers", "contained: something goes wrong here on purpose, and is contained")
     config.addinivalue_line(
         "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
     )
+    config.addinivalue_line("markers", "long: left to `make test-long` (set by conftest: tests/long_share.py)")
+    config.pluginmanager.register(Left(config), "left")
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
 
 
-@pytest.hookimpl(tryfirst=True)  # before `-m` asks for the marks that are given here
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is `long` (`long.toml`). Long files first: whoever gets the last ones ends soon after the others."""
+    """Mark the long share before `-m` is judged. Long files first: whoever gets the last ends soon after others."""
     for item in items:
-        if is_long(item.path.relative_to(config.rootpath / "tests").as_posix(), {*map(_name, item.iter_markers())}):
+        if is_long(item.path, real_time=item.get_closest_marker("real_time") is not None):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))
-
-
-def _name(mark: pytest.Mark) -> str:
-    return mark.name
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -119,6 +115,20 @@ def _a_bug_is_loud(request: pytest.FixtureRequest) -> Iterator[None]:
         log.removeHandler(bugs)
     expected = request.node.get_closest_marker("contained") is not None
     assert expected or not bugs.found, "\n".join(bugs.found)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _started() -> Iterator[Started]:
+    started = Started()
+    with pytest.MonkeyPatch.context() as patch:
+        started.watching(patch)
+        yield started
+
+
+@pytest.fixture(autouse=True)
+def _who_starts_processes_is_long(request: pytest.FixtureRequest, _started: Started) -> Iterator[None]:
+    """A test of real processes that nobody has marked would make `make test` slow, and nobody would see why."""
+    yield from _started.guarded(request.node)
 
 
 @pytest.fixture(autouse=True)

@@ -93,7 +93,7 @@ def _is_whole(session: pytest.Session) -> bool:
     asked = config.option
     return (
         config.args_source is pytest.Config.ArgsSource.TESTPATHS
-        and asked.markexpr in ("", "long")  # all that is skipped for want of something is long (long.toml)
+        and asked.markexpr in ("", "long")  # all that is skipped for want of something is long (long_share.py)
         and not (asked.keyword or asked.deselect or asked.ignore or asked.ignore_glob)
         and not getattr(asked, "lf", False)
         and not (session.shouldstop or session.shouldfail)

@@ -1,16 +1,19 @@
-"""How many random cases are tried, and which files begin first."""
+"""How many random cases are tried, which tests are long, and which files begin first."""
 
+import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from tests.long_tests import LONG_FILES, is_long
+from tests.long_share import LONG, SHORT_PROCESSES, SMOKE, is_long
 from tests.longest import LONGEST
 from tests.random_cases import share_of, trials
 
 ROOT = Path(__file__).parents[1]
+TESTS = ROOT / "tests"
 
 
 @pytest.fixture(params=["same", "long", "search"])
@@ -21,52 +24,92 @@ def profile(request: pytest.FixtureRequest):
     settings.load_profile(before)
 
 
-def test_a_sixth_is_tried_but_at_least_one_unless_all_are_asked_for(profile: str) -> None:
-    told = [share_of(whole) for whole in (1, 6, 7, 300)]
+def test_a_third_is_tried_but_at_least_one_unless_all_are_asked_for(profile: str) -> None:
+    told = [share_of(whole) for whole in (1, 3, 4, 300)]
 
-    assert told == ([1, 1, 2, 50] if profile == "same" else [1, 6, 7, 300])
+    assert told == ([1, 1, 2, 100] if profile == "same" else [1, 3, 4, 300])
     assert trials() == (1 if profile == "same" else None)
 
 
-@pytest.mark.parametrize(("goal", "name"), [("test", "same"), ("test-long", "long")])
-def test_make_asks_for_a_share_or_for_all(goal: str, name: str) -> None:
+@pytest.mark.parametrize(
+    ("goal", "name", "short"), [("test", "same", True), ("test-all", "same", False), ("test-long", "long", False)]
+)
+def test_make_asks_for_a_share_or_for_all(goal: str, name: str, short: bool) -> None:
     told = subprocess.run(["make", "-n", goal], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 
     assert [word for word in told.split() if "profile" in word] == [f"--hypothesis-profile={name}"]
-
-
-def test_make_leaves_out_what_is_long_and_its_rest_is_all_of_that() -> None:
-    told = {
-        goal: subprocess.run(["make", "-n", goal], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-        for goal in ("test", "test-rest", "test-long")
-    }
-
-    assert {goal: '-m "not long"' in text for goal, text in told.items()} == {
-        "test": True,
-        "test-rest": False,
-        "test-long": False,
-    }
-    assert " -m long" in told["test-rest"]
-    assert " -m " not in told["test-long"].replace("-m pip", "")
+    assert ('-m "not long"' in told) is short
 
 
 @pytest.mark.parametrize(
-    ("file", "marks", "left_out"),
+    ("name", "real_time", "long"),
     [
-        ("bus/test_processes.py", {"real_time"}, True),
-        ("cli/test_smoke.py", {"real_time", "smoke"}, False),
-        ("lab/test_units.py", set(), True),
-        ("realizer/test_net.py", set(), False),
-        ("test_wheel.py", set(), True),
+        ("bus/test_cuts.py", True, True),
+        ("bus/test_order.py", False, False),
+        ("lab/test_lab.py", False, True),
+        ("test_wheel.py", False, True),
+        (SMOKE, True, False),
     ],
 )
-def test_what_is_in_real_time_or_listed_is_long(file: str, marks: set[str], left_out: bool) -> None:
-    assert is_long(file, marks) == left_out
+def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(name: str, real_time: bool, long: bool) -> None:
+    assert is_long(TESTS / name, real_time=real_time) is long
 
 
-def test_the_list_of_long_files_has_what_is_there_each_with_a_reason() -> None:
-    assert [name for name in LONG_FILES if not (ROOT / "tests" / name).exists()] == []
-    assert all(len(reason.split()) > 3 for reason in LONG_FILES.values())
+def test_what_the_long_share_names_is_there_and_has_a_reason() -> None:
+    named = {**LONG, **SHORT_PROCESSES}
+
+    assert [name for name in named if not (TESTS / name).exists()] == []
+    assert all(named.values())
+
+
+CONFTEST = """\
+import pytest
+from tests import long_share
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.get_closest_marker("real_time"):
+            item.add_marker("long")
+
+def pytest_configure(config):
+    for mark in ("real_time", "long"):
+        config.addinivalue_line("markers", mark)
+    config.pluginmanager.register(long_share.Left(config))
+
+@pytest.fixture(autouse=True)
+def _guard(request, monkeypatch):
+    long_share.TESTS = request.config.rootpath
+    started = long_share.Started()
+    started.watching(monkeypatch)
+    yield from started.guarded(request.node)
+"""
+STARTS = "import pytest, subprocess, sys\n{}def test_it(): subprocess.run([sys.executable, '-c', ''], check=True)\n"
+
+
+def pytest_in(folder: Path, *arguments: str) -> tuple[int, str]:
+    done = subprocess.run(
+        (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments), cwd=folder, text=True,
+        capture_output=True, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout
+
+
+@pytest.mark.parametrize("workers", [("-n", "0"), ("-n", "2")], ids=["alone", "on workers"])
+def test_a_process_that_nobody_has_marked_is_red_and_what_is_left_out_is_told(tmp_path: Path, workers) -> None:
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    (tmp_path / "conftest.py").write_text(CONFTEST)
+    (tmp_path / "test_marked.py").write_text(STARTS.format("@pytest.mark.real_time\n"))
+    (tmp_path / "test_plain.py").write_text("def test_it(): pass\n")
+
+    assert pytest_in(tmp_path, *workers)[0] == 0
+    short, told = pytest_in(tmp_path, *workers, "-m", "not long")
+    (tmp_path / "test_plain.py").write_text(STARTS.format(""))
+    unmarked, reason = pytest_in(tmp_path, *workers, "-m", "not long")
+
+    assert (short, unmarked) == (0, 1)
+    assert "1 tests are left to `make test-long`" in told
+    assert "it starts a process: mark it `real_time`" in reason
 
 
 def test_the_files_that_begin_first_are_there_each_once() -> None:

@@ -173,6 +173,7 @@ def test_of_a_file_that_ends_between_two_chunks_no_bytes_are_said_to_be_lost(run
     assert shown.err.splitlines()[0].endswith(" are whole")
 
 
+@pytest.mark.real_time
 def test_exports_lie_beside_the_recording_and_are_not_overwritten(run: Engage, tmp_path: Path) -> None:
     path = saved(tmp_path / "a.mcap", told())
 

@@ -109,6 +109,7 @@ def test_the_number_of_processes_changes_nothing(engage: Engage, tmp_path: Path)
     assert files == {file.name: file.read_bytes() for file in (tmp_path / "many").iterdir()}
 
 
+@pytest.mark.real_time
 def test_another_process_plays_the_same_session_with_the_robot() -> None:
     """And again the same after another one. Broken off early, to be quick."""
     orders = simulate.orders_of(simulate.Options(sessions=1, seed=7, out=Path(), limit=12.0))[:2]

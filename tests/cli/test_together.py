@@ -58,7 +58,6 @@ def services_of(pid: int) -> str:
     return arguments[arguments.index("run") + 1]
 
 
-@pytest.mark.smoke  # the one test of real processes in `make test`: they play, one is killed, all stop
 @pytest.mark.real_time
 async def test_a_group_is_one_process_that_dies_and_comes_back_as_one_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "block.xml").write_text(GOOD_BLOCK)

@@ -27,6 +27,7 @@ from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.stage import Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.random_cases import trials
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")
 
@@ -47,11 +48,14 @@ def apart() -> Body:
 
 
 class TestComposedBody(BodyContract):
+    seeds = trials()
+
     def make(self) -> Body:
         return split()
 
 
 class TestApart(BodyContract):
+    seeds = trials()
     behaviors = tuple(each for each in BEHAVIORS if not isinstance(each, Posture | PostureShift | Pose))
 
     def make(self) -> Body:

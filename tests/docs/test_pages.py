@@ -36,7 +36,7 @@ pytestmark = pytest.mark.real_time
 
 EXCUSED = {
     "make demo": "takes two and a half minutes; it runs with ARGS=--virtual-time",
-    "make test": "is what runs this",
+    "make test": "is all but what is long, as this is; `make test-all` runs both",
     "make docs": "tests/docs/test_site.py builds it and looks at the result",
     "make generate": "writes into the tree; tests/docs/test_generated.py compares",
     ".venv/bin/engage up": "is what all pages are run against",

@@ -8,11 +8,12 @@ from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.testing import BodyContract
 from tests.control.reachy_mini.fake import FakeDaemon
+from tests.random_cases import share_of
 
 
 class TestReachyMini(BodyContract):
     tolerance = 0.06
-    seeds = 6
+    seeds = share_of(6, 6)
 
     def make(self) -> Body:
         return ReachyMini(connect=FakeDaemon())
@@ -31,7 +32,7 @@ class TestReachyMini(BodyContract):
 class TestLivingReachyMini(TestReachyMini):
     """It breathes and sways all the while."""
 
-    seeds = 3
+    seeds = share_of(3)
 
     def make(self) -> Body:
         return ReachyMini(connect=FakeDaemon(), alive=True)
@@ -40,7 +41,7 @@ class TestLivingReachyMini(TestReachyMini):
 class TestNoisyReachyMini(BodyContract):
     tolerance = 0.06
     noise = math.radians(0.3)
-    seeds = 3
+    seeds = share_of(3)
 
     def make(self) -> Body:
         daemon = FakeDaemon()
