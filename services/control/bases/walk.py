@@ -42,7 +42,7 @@ from engage_hri.services.control.contract.body import (
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
@@ -59,11 +59,11 @@ class Run:
 
     motion: Motion
 
-    def __init__(self, behavior: BlockBehavior, points: Sequence[Point], authority: MovementAuthority) -> None:
+    def __init__(self, behavior: BlockBehavior, points: Sequence[WalkPoint], authority: MovementAuthority) -> None:
         self.behavior = behavior
         self.authority = authority
         self.bell = Bell()
-        self.pending: list[Point] = list(points)
+        self.pending: list[WalkPoint] = list(points)
         self.holding = False
         self.is_beneath = False
         """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
@@ -94,7 +94,7 @@ class Run:
         """True if it may go on from a hold point now, or has to, since it could stop there no more."""
         return self.authority.covers(hold) or hold in self._missed
 
-    def waits_at(self, point: Point) -> bool:
+    def waits_at(self, point: WalkPoint) -> bool:
         """True if it may not pass a sync point yet."""
         return bool(point.held_with) and not self.may_pass(point.held_with)
 
@@ -105,7 +105,7 @@ class Run:
                 return path.marks.get(point.stands_at or point.sync, inf)
         return inf
 
-    def due(self, point: Point) -> Seconds | None:
+    def due(self, point: WalkPoint) -> Seconds | None:
         """Instant at which the plan passes `point`; None if it does not go so far yet."""
         mark = self.motion.path.marks.get(point.sync)
         return None if mark is None else self.motion.crossing(mark)
@@ -169,7 +169,7 @@ class WalkingBody(Body, Generic[R]):
         """
 
     @abstractmethod
-    def leave(self, run: R, point: Point, *, has_waited: bool) -> Sequence[str]:
+    def leave(self, run: R, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
         """Let a behavior go on behind a point. has_waited: at this hold point. Returns the sync points passed."""
 
     @abstractmethod
@@ -190,11 +190,11 @@ class WalkingBody(Body, Generic[R]):
         run.motion.extend(run.limit(run.motion.path), now)
         run.brake_for_hold(now)
 
-    def due(self, run: R, point: Point) -> Seconds | None:
+    def due(self, run: R, point: WalkPoint) -> Seconds | None:
         """Instant at which the plan of a behavior passes a point; None: it does not go so far yet."""
         return run.due(point)
 
-    async def come(self, run: R, point: Point, due: Seconds) -> Seconds | None:
+    async def come(self, run: R, point: WalkPoint, due: Seconds) -> Seconds | None:
         """Wait until the joints have come to a point that the plan has passed at `due`. Returns when they had.
 
         None: something else may have changed; the walk looks again. Raises BodyFailed. Not overridden, the joints are
@@ -202,7 +202,7 @@ class WalkingBody(Body, Generic[R]):
         """
         return due
 
-    def has_come(self, run: R, point: Point) -> bool:
+    def has_come(self, run: R, point: WalkPoint) -> bool:
         """True if the joints have come to a point that the plan has passed."""
         return True
 
@@ -284,7 +284,7 @@ class WalkingBody(Body, Generic[R]):
                 run.pending.pop(0)
                 yield Reached(sync, at := max(due, since), at)
 
-    async def _wait_to_go_on(self, run: R, point: Point) -> bool:
+    async def _wait_to_go_on(self, run: R, point: WalkPoint) -> bool:
         """Wait at a hold point until it may be left, by authority and by joints. False: it is not left any more."""
         is_there = False
         while not run.is_over and not is_there:

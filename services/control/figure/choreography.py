@@ -42,7 +42,7 @@ from engage_hri.services.control.figure.expressions import SETTLE, sides
 from engage_hri.services.control.figure.kinematics import Side, Unreachable
 from engage_hri.services.control.figure.pace import arm_time, return_time, turning_time
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import Point, held_around_stroke, held_on_target
+from engage_hri.services.control.motion.points import WalkPoint, held_around_stroke, held_on_target
 
 SLIDE: Seconds = 0.2
 OFFSETS: Mapping[str, tuple[int, int]] = {
@@ -152,7 +152,7 @@ def _shift(looked: Looked, situation: Situation) -> Course:
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
     ray = kinematics.gaze({**situation.pose, **dict(zip(joints, goal, strict=True))})
-    return course(("head",), joints, legs, (Point("start"), Point("end")), goal, ray, aim=aim)
+    return course(("head",), joints, legs, (WalkPoint("start"), WalkPoint("end")), goal, ray, aim=aim)
 
 
 def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:

@@ -10,7 +10,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.figure.aiming import UPRIGHT, Aim, Trunk
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 
 
 class Course(Struct, frozen=True, kw_only=True):
@@ -19,7 +19,7 @@ class Course(Struct, frozen=True, kw_only=True):
     parts: tuple[str, ...]
     joints: tuple[str, ...]
     legs: tuple[Leg, ...]
-    points: tuple[Point, ...]
+    points: tuple[WalkPoint, ...]
     on_target: Mapping[str, float] = {}
     """Joint angles at the stroke, or at the end of a shift."""
     ray: Ray | None = None
@@ -71,7 +71,7 @@ class Situation(Struct, frozen=True):
 
 
 def course(
-    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[Point, ...],
+    parts: tuple[str, ...], joints: tuple[str, ...], legs: tuple[Leg, ...], points: tuple[WalkPoint, ...],
     goal: tuple[float, ...], ray: Ray | None = None, note: str = "", aim: Aim | None = None,
 ) -> Course:  # fmt: skip
     """Make the course of a motion to `goal`."""

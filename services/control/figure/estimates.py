@@ -16,14 +16,14 @@ from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.sizing import quickest
 from engage_hri.services.control.motion.motion import SLOWEST
 from engage_hri.services.control.motion.path import Array, Path
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 
 Added = Callable[[Seconds], Array]
 """What the trunk adds to the joints of a path so many seconds after it began."""
 
 
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
-    phases = _phases((Point("start"), Point("end", "end")), {"start": 0.0, "end": duration})
+    phases = _phases((WalkPoint("start"), WalkPoint("end", "end")), {"start": 0.0, "end": duration})
     return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
 
 
@@ -111,7 +111,7 @@ def _travel(path: Path, until: Seconds, added: Added) -> float:
 
 
 def _phases(
-    points: Sequence[Point],
+    points: Sequence[WalkPoint],
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
     slowest: float = 1.0,

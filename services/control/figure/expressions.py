@@ -27,7 +27,7 @@ from engage_hri.services.control.figure.pace import arm_time, moving_time, retur
 from engage_hri.services.control.figure.repertoire import Absent, Found, GesturePath, HeadPath, Table
 from engage_hri.services.control.figure.table_lift import clear_of_table
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import Point, held_around_stroke, held_on_target
+from engage_hri.services.control.motion.points import WalkPoint, held_around_stroke, held_on_target
 
 SETTLE: Seconds = 0.08
 DRIFT = radians(0.3)
@@ -213,7 +213,7 @@ def shift(goals: Mapping[str, Mapping[str, float]], situation: Situation, note: 
     seconds = moving_time(joints, here, goal)
     goal = goal if seconds else here
     legs = (Leg(goal=goal, seconds=seconds, marks=(("start", 0.0), ("end", 1.0))),)
-    points = (Point("start"), Point("end"))
+    points = (WalkPoint("start"), WalkPoint("end"))
     return course(tuple(goals), joints, legs, points, goal, note=note)
 
 

@@ -7,7 +7,7 @@ from msgspec import Struct
 from engage_hri.schemas.syncref import SYNC_POINTS
 
 
-class Point(Struct, frozen=True):
+class WalkPoint(Struct, frozen=True):
     """A sync point on the way of a behavior.
 
     held_with: the hold point at which it waits; its own name if it is one itself; empty: it is passed without a stop.
@@ -22,16 +22,16 @@ class Point(Struct, frozen=True):
 
 
 @cache
-def held_on_target(*arrival: str) -> tuple[Point, ...]:
+def held_on_target(*arrival: str) -> tuple[WalkPoint, ...]:
     """Sync points of a course that can hold while it is on target. arrival: points at which it is first there."""
     before = SYNC_POINTS[: SYNC_POINTS.index("stroke_end")]
-    points = [Point(sync, "stroke", "relax") if sync in arrival else Point(sync) for sync in before]
-    return (*points, Point("stroke_end", "relax"), Point("relax", "relax"), Point("end"))
+    points = [WalkPoint(sync, "stroke", "relax") if sync in arrival else WalkPoint(sync) for sync in before]
+    return (*points, WalkPoint("stroke_end", "relax"), WalkPoint("relax", "relax"), WalkPoint("end"))
 
 
 @cache
-def held_around_stroke(strokes: tuple[str, ...] = ()) -> tuple[Point, ...]:
+def held_around_stroke(strokes: tuple[str, ...] = ()) -> tuple[WalkPoint, ...]:
     """Sync points of a course that can hold before and after its stroke. strokes: the stroke's repetitions."""
     number = SYNC_POINTS.index("stroke_end")
     syncs = (*SYNC_POINTS[:number], *strokes, *SYNC_POINTS[number:])
-    return tuple(Point(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)
+    return tuple(WalkPoint(sync, sync if sync in ("stroke_start", "stroke_end") else "") for sync in syncs)

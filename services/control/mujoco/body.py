@@ -28,7 +28,7 @@ from engage_hri.services.control.figure import kinematics, tracks
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
 from engage_hri.services.control.figure.tracks import Track
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.mujoco import along
 from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
@@ -74,7 +74,7 @@ class MujocoBody(SimulatedBody):
         )  # fmt: skip
         self.bench = Workbench(self._plan(), self._loop.time(), self._settings.seed)
         self._watches: dict[Run, Watch] = {}
-        self._awaiting: dict[Run, Point] = {}
+        self._awaiting: dict[Run, WalkPoint] = {}
         """The sync point that joints have not come to, though the plan has."""
         self.pulse = Pulse(step=self._compute, rise=self.bench.rise, after=self._look)
         self._faults: tuple[BodyFault, ...] = ()
@@ -258,7 +258,7 @@ class MujocoBody(SimulatedBody):
         run.gate = stop
         motion.brake(now, min(stop, motion.limit))
 
-    async def come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+    async def come(self, run: Run, point: WalkPoint, due: Seconds) -> Seconds | None:
         if not point.is_told:
             return await super().come(run, point, due)
         self.pulse.step()
@@ -276,7 +276,7 @@ class MujocoBody(SimulatedBody):
             self._awaiting.pop(run, None)
         return None
 
-    def has_come(self, run: Run, point: Point) -> bool:
+    def has_come(self, run: Run, point: WalkPoint) -> bool:
         return self._off_point(run, point, self._loop.time()).share <= 1.0
 
     def check(self, run: Run) -> None:
@@ -301,7 +301,7 @@ class MujocoBody(SimulatedBody):
                     limits.append(allowed[part])
         return along.farthest(joints, here, there, limits) if joints else None
 
-    def _off_point(self, run: Run, point: Point, now: Seconds) -> Off:
+    def _off_point(self, run: Run, point: WalkPoint, now: Seconds) -> Off:
         """Measure how far the joints of a run are off a sync point, or off the nearest place behind it.
 
         A look that has waited and followed its target is to be where that has led it.

@@ -34,7 +34,7 @@ from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.estimates import wait_estimate
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.reachy_mini import courses, geometry, joints, messages
 from engage_hri.services.control.reachy_mini.estimates import motion_estimate
 from engage_hri.services.control.reachy_mini.idling import Idling, together
@@ -244,7 +244,7 @@ class ReachyMini(WalkingBody[Run]):
             moves.take_over(run, now)
         return run
 
-    def leave(self, run: Run, point: Point, *, has_waited: bool) -> Sequence[str]:
+    def leave(self, run: Run, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
         run.look_anew()
         return self._moves.leave(run, self._loop.time(), has_waited=has_waited)
 
@@ -261,17 +261,17 @@ class ReachyMini(WalkingBody[Run]):
         if (trouble := self._trouble) is not None and (run.authority.revoked is None or not self.owns(run)):
             raise BodyFailed(replace(trouble, where=run.behavior.id))
 
-    def due(self, run: Run, point: Point) -> Seconds | None:
+    def due(self, run: Run, point: WalkPoint) -> Seconds | None:
         due, now = run.due(point), self._loop.time()
         if point.sync != run.course.arrival or not self._moves.follows(run, now):
             return due
         # The plan after a target that moves is laid anew again and again, and never over: what counts is the gaze.
         return self._last_frame if self.has_come(run, point) else due
 
-    def has_come(self, run: Run, point: Point) -> bool:
+    def has_come(self, run: Run, point: WalkPoint) -> bool:
         return run.is_start(point.sync) or self._moves.off_run(run, point.sync, self._loop.time()).share <= 1.0
 
-    async def come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+    async def come(self, run: Run, point: WalkPoint, due: Seconds) -> Seconds | None:
         if run.is_start(point.sync):
             return due
         off = self._moves.off_run(run, point.sync, self._loop.time())

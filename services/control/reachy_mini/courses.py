@@ -36,7 +36,7 @@ from engage_hri.services.control.figure.choreography import OFFSETS
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import Point, held_on_target
+from engage_hri.services.control.motion.points import WalkPoint, held_on_target
 from engage_hri.services.control.reachy_mini import geometry, joints
 from engage_hri.services.control.reachy_mini.geometry import Angles, Mounting
 
@@ -56,7 +56,7 @@ DROOP, RAISED = 130.0, -15.0
 """Degrees outwards from straight up between which an antenna shows a face."""
 
 
-def points(behavior: BlockBehavior) -> tuple[Point, ...]:
+def points(behavior: BlockBehavior) -> tuple[WalkPoint, ...]:
     """Sync points of a behavior that goes to a goal."""
     match behavior:
         case Gaze():
@@ -64,7 +64,7 @@ def points(behavior: BlockBehavior) -> tuple[Point, ...]:
         case Face() | FaceLexeme() | FaceFacs() | Posture():
             return held_on_target("ready", "stroke_start", "stroke")
         case _:
-            return (Point("start"), Point("end"))
+            return (WalkPoint("start"), WalkPoint("end"))
 
 
 class Circumstances(Struct, frozen=True):
@@ -157,7 +157,9 @@ def _out(
     return _course(track, (Leg(goal=goal, seconds=time, marks=marks),), goal, own, note)
 
 
-def _course(track: str, legs: tuple[Leg, ...], goal: tuple[float, ...], own: tuple[Point, ...], note: str) -> Course:
+def _course(
+    track: str, legs: tuple[Leg, ...], goal: tuple[float, ...], own: tuple[WalkPoint, ...], note: str
+) -> Course:
     names = tuple(limit.joint for limit in joints.TRACKS[track])
     return Course(
         parts=(track,), joints=names, legs=legs, points=own, on_target=dict(zip(names, goal, strict=True)), note=note

@@ -9,7 +9,7 @@ from engage_hri.schemas.body import Estimate, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.path import Path, resting
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.reachy_mini import geometry, joints
 from engage_hri.services.control.reachy_mini.courses import Circumstances
 from engage_hri.services.control.reachy_mini.moving import Moves
@@ -69,7 +69,7 @@ def _settling(track: str, path: Path, mark: Seconds, lag: Seconds) -> Seconds:
     return FRAME / 2
 
 
-def _phases(points: Sequence[Point], times: dict[str, Seconds]) -> tuple[Phase, ...]:
+def _phases(points: Sequence[WalkPoint], times: dict[str, Seconds]) -> tuple[Phase, ...]:
     """Phases from each sync point to the next. It has one pace."""
     found = []
     for since, to in pairwise(points):

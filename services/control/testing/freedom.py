@@ -44,7 +44,7 @@ class FreedomLaws(Suite):
         """
         for case in self.cases(body):
             async with case as behavior:
-                turns: list[Turn] = []
+                turns: list[LoopTurn] = []
                 while len(turns) < TRIES and (not turns or turns[-1].held > LONGEST):
                     async with recorded(body):
                         with longest_turn() as turn:
@@ -64,7 +64,7 @@ class FreedomLaws(Suite):
                     )
 
 
-class Turn(Struct):
+class LoopTurn(Struct):
     """The longest turn of the loop. held: time for which it is to blame. computes: time of the processor in it."""
 
     held: Seconds = 0.0
@@ -72,9 +72,9 @@ class Turn(Struct):
 
 
 @contextmanager
-def longest_turn() -> Iterator[Turn]:
+def longest_turn() -> Iterator[LoopTurn]:
     """Time each call that the running loop makes meanwhile. What is given to it before is not timed."""
-    loop, longest = asyncio.get_running_loop(), Turn()
+    loop, longest = asyncio.get_running_loop(), LoopTurn()
     soon, at = loop.call_soon, loop.call_at
 
     def timed(callback: Callable[..., object], *args: Any) -> None:

@@ -36,7 +36,7 @@ from engage_hri.services.control.figure.alive import Alive
 from engage_hri.services.control.figure.estimates import beneath_a_look, wait_estimate
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.torso import displaced_joints, homing, truth
 from engage_hri.services.control.torso.copy_for_rehearsal import Clock, beside
 from engage_hri.services.control.torso.following import follow, is_behind
@@ -247,7 +247,7 @@ class SimulatedBody(WalkingBody[Run]):
     def extend(self, run: Run) -> None:
         self._torso.extend(run)
 
-    def leave(self, run: Run, point: Point, *, has_waited: bool) -> Sequence[str]:
+    def leave(self, run: Run, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
         if has_waited:
             return self._torso.leave_hold(run, point.held_with)
         run.pending.pop(0)
@@ -276,7 +276,7 @@ class SimulatedBody(WalkingBody[Run]):
         super().stop(run)
         self._torso.attention.expect("", 0.0, self._loop.time())
 
-    async def come(self, run: Run, point: Point, due: Seconds) -> Seconds | None:
+    async def come(self, run: Run, point: WalkPoint, due: Seconds) -> Seconds | None:
         if point.is_told:
             return due
         if point.sync == OVERHEAT:

@@ -16,7 +16,7 @@ from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.sizing import hurried
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path, unmarked
-from engage_hri.services.control.motion.points import Point
+from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.runtime.steps import Steps
 
 STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")
@@ -119,7 +119,7 @@ class Run(walk.Run):
         coming = (point.sync for point in self.pending if marks.get(point.sync, 0.0) > here + 1e-9)
         return [(sync, planned[sync]) for sync in coming if sync in planned]
 
-    def due(self, point: Point) -> Seconds | None:
+    def due(self, point: WalkPoint) -> Seconds | None:
         """Instant at which it reports `point`; None if it may not go so far.
 
         A point at which the joints rest is reported at the instant asked for, if that is later than its arrival.
@@ -181,7 +181,7 @@ class Run(walk.Run):
             return
         legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
         self.course = replace(self.course, legs=legs)
-        self.pending.insert(index, Point(fault, is_told=False))
+        self.pending.insert(index, WalkPoint(fault, is_told=False))
 
     def _mark_faults(self, motion: Motion, now: Seconds) -> None:
         """Mark the faults that are due on the path of a motion, half-way from here. One that comes too late to stop

@@ -15,7 +15,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.futures import Reached, SyncPointFutures
+from engage_hri.services.realizer.perform.futures import PointPassed, SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.phases import with_planned_hand
@@ -26,14 +26,14 @@ from engage_hri.services.realizer.report.spoken import Spoken
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
 
 
-class Arrived(NamedTuple):
+class PointHeld(NamedTuple):
     """A behavior holds at `point`."""
 
     point: Point
     at: Seconds
 
 
-class Lost(NamedTuple):
+class BehaviorLost(NamedTuple):
     """A behavior cannot be finished. at_rest: its parts rest."""
 
     behavior: str
@@ -48,7 +48,7 @@ class BodyLost(NamedTuple):
     fault: Fault
 
 
-RunNews = Arrived | Reached | Lost | BodyLost
+RunNews = PointHeld | PointPassed | BehaviorLost | BodyLost
 """What becomes of a behavior, as its run tells it."""
 
 
@@ -112,13 +112,13 @@ class BehaviorRun:
         facts, bus = block.decisions.facts, block.bus
         at = facts.plausible(point, bus.local(message.at), bus.now())
         if isinstance(message, SyncPointArrived):
-            block.tell(Arrived(point, at))
+            block.tell(PointHeld(point, at))
         elif point in self._points:
             same = message.arrived == message.at
             arrived = at if same else facts.plausible(point, bus.local(message.arrived), at)
-            self._report(point, Reached(point, at, arrived, by_body=True))
+            self._report(point, PointPassed(point, at, arrived, by_body=True))
 
-    def _report(self, point: Point, news: Reached | None) -> None:
+    def _report(self, point: Point, news: PointPassed | None) -> None:
         """Resolve the future of a sync point. Earlier ones that nobody has reported are made good by this one."""
         for each in self._points[: self._points.index(point) + 1]:
             self._block.futures.report(each, news if each == point else None)
@@ -183,9 +183,9 @@ class BehaviorRun:
         facts, end = block.decisions.facts, points[-1]
         at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
         if outcome.status == "taken_over":  # its last report may be lost
-            block.tell(Reached(Point(self.id, outcome.passed), at, by_body=True))
+            block.tell(PointPassed(Point(self.id, outcome.passed), at, by_body=True))
         if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
-            block.tell(Reached(end, at, by_body=outcome.status == "done"))
+            block.tell(PointPassed(end, at, by_body=outcome.status == "done"))
         else:
             self.lose(loss(outcome, Spelling(block.plan.block)), at_rest=outcome.status != "failed")
 
@@ -193,23 +193,23 @@ class BehaviorRun:
         """Give it up: it cannot be finished. The fault gets the line of the behavior."""
         assert self.behavior is not None
         fault = replace(fault, line=fault.line or self.behavior.line)
-        self._block.tell(Lost(self.id, fault, kind, at_rest))
+        self._block.tell(BehaviorLost(self.id, fault, kind, at_rest))
 
     def _at_once(self) -> None:
         now = self._block.bus.now()
-        self._block.tell(Reached(Point(self.id, "start"), now))
-        self._block.tell(Reached(Point(self.id, "end"), now))
+        self._block.tell(PointPassed(Point(self.id, "start"), now))
+        self._block.tell(PointPassed(Point(self.id, "end"), now))
 
     async def _wait(self, duration: Seconds) -> None:
         block, end = self._block, Point(self.id, "end")
         began = block.bus.now()
-        block.tell(Reached(Point(self.id, "start"), began))
+        block.tell(PointPassed(Point(self.id, "start"), began))
         if duration:
             await self._time(began, duration)
         arrived = block.bus.now()
-        block.tell(Arrived(end, arrived))
+        block.tell(PointHeld(end, arrived))
         await block.futures.granted(end)
-        block.tell(Reached(end, block.bus.now(), arrived))
+        block.tell(PointPassed(end, block.bus.now(), arrived))
 
     async def _time(self, began: Seconds, duration: Seconds) -> None:
         """Wait for so long, not counting the time in which the behavior is held."""
@@ -241,7 +241,7 @@ class BehaviorRun:
     async def _event(self, event: Event) -> None:
         block = self._block
         began = await self._really_begun(event)
-        block.tell(Reached(Point(event.id, "start"), began))
+        block.tell(PointPassed(Point(event.id, "start"), began))
         pending = block.recognition.ask(block.body.id(event.id), block.id, event, began)
         if pending is not None:
             self.pending = pending
@@ -252,4 +252,4 @@ class BehaviorRun:
             self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR")
         else:
             end = Point(event.id, "end")
-            block.tell(Reached(end, max(began, decision.at), by_body=decision.by_recognition))
+            block.tell(PointPassed(end, max(began, decision.at), by_body=decision.by_recognition))

@@ -10,7 +10,7 @@ from engage_hri.services.realizer.points import FINISH, Point
 T = TypeVar("T")
 
 
-class Reached(NamedTuple):
+class PointPassed(NamedTuple):
     """A behavior has passed `point`. arrived: when it had come there, if it waited. by_body: told by the body."""
 
     point: Point
@@ -26,7 +26,7 @@ class SyncPointFutures(Observer):
         self._granted: dict[Point, asyncio.Future[None]] = {}
         self._fired: dict[Point, asyncio.Future[Seconds]] = {}
         self._reached: dict[Point, asyncio.Future[Seconds]] = {}
-        self._reported: dict[Point, asyncio.Future[Reached | None]] = {}
+        self._reported: dict[Point, asyncio.Future[PointPassed | None]] = {}
 
     def adopt(self, net: RunningNet) -> "SyncPointFutures":
         """Observe another net of the same block from now on."""
@@ -60,11 +60,11 @@ class SyncPointFutures(Observer):
         """Note that the behavior has passed `point`."""
         _resolve(self._reached, point, at)
 
-    def reported(self, point: Point) -> "asyncio.Future[Reached | None]":
+    def reported(self, point: Point) -> "asyncio.Future[PointPassed | None]":
         """Resolved with the report of the body about `point`; with None if it was lost, or there will be none."""
         return _future(self._reported, point)
 
-    def report(self, point: Point, news: Reached | None) -> None:
+    def report(self, point: Point, news: PointPassed | None) -> None:
         """Note what the body has reported of `point`; what comes after the first is ignored."""
         if not (future := _future(self._reported, point)).done():
             future.set_result(news)

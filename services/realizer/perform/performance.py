@@ -24,16 +24,16 @@ from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import (
-    Arrived,
+    BehaviorLost,
     BehaviorRun,
     BodyLost,
-    Lost,
+    PointHeld,
     RunNews,
     Stage,
 )
 from engage_hri.services.realizer.perform.control_link import ControlLink
 from engage_hri.services.realizer.perform.ends_of_runs import all_ended
-from engage_hri.services.realizer.perform.futures import Reached, SyncPointFutures
+from engage_hri.services.realizer.perform.futures import PointPassed, SyncPointFutures
 from engage_hri.services.realizer.perform.net_stream import NetStream
 from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
@@ -450,18 +450,18 @@ class BlockPerformance(Neighbor):
 
     def _take(self, news: RunNews) -> None:
         match news:
-            case Arrived(point, at):
+            case PointHeld(point, at):
                 if not self._ending.done():
                     self.decisions.arrive(point, at)
                     self._hurry()
-            case Reached():
+            case PointPassed():
                 self._reach(news)
-            case Lost(behavior, fault, kind, at_rest):
+            case BehaviorLost(behavior, fault, kind, at_rest):
                 self.lose(behavior, fault, kind, at_rest=at_rest)
             case BodyLost(fault):
                 self._lose_body(fault)
 
-    def _reach(self, told: Reached) -> None:
+    def _reach(self, told: PointPassed) -> None:
         point, at = told.point, told.at
         if news := self.decisions.reach(point, at):
             self._untold += [News(each, at, told.arrived if each == point else None, told.by_body) for each in news]
