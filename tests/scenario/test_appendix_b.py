@@ -17,6 +17,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
+from engage_hri.services.collaboration import plans
 from engage_hri.services.collaboration.relations import Relation, relation
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.virtual_time import run_virtual
@@ -304,9 +305,13 @@ def test_a_body_that_is_early_or_late_by_a_tenth_gives_the_same_events(resolutio
 
 
 @pytest.mark.parametrize("settle", [0.8, 1.8, 2.4])
-def test_how_soon_the_robot_speaks_after_a_placement_changes_no_event(settle: float) -> None:
+def test_how_soon_the_robot_speaks_after_a_placement_changes_no_event(
+    settle: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """1.8 and 2.4 start a turn while the eyes are on the hand: the look that ends it must not fall back there."""
-    assert by_step(played(settle=settle)) == EXPECTED["table"]
+    monkeypatch.setattr(plans, "SETTLE", settle)
+
+    assert by_step(run_virtual(play())) == EXPECTED["table"]
 
 
 def test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right() -> None:

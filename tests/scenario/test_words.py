@@ -26,7 +26,7 @@ from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.console.follow import following
-from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns.events import WORDS_PATIENCE
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import show_world, tangram_world
 
@@ -78,7 +78,7 @@ async def test_a_manager_gets_the_words_that_answer_its_question(hub: MemoryHub)
 
 
 async def test_words_that_never_come_are_waited_for_only_so_long(hub: MemoryHub) -> None:
-    patience = GenerationConfig().words_patience
+    patience = WORDS_PATIENCE
     async with robot_in(hub) as robot, perceive("ann", hub=hub) as ann:
 
         async def answer() -> None:
@@ -98,7 +98,7 @@ async def test_words_that_never_come_are_waited_for_only_so_long(hub: MemoryHub)
 
 
 async def test_who_has_lost_the_microphone_is_waited_for_once(hub: MemoryHub) -> None:
-    patience = GenerationConfig().words_patience
+    patience = WORDS_PATIENCE
     async with robot_in(hub) as robot, perceive("ann", hub=hub) as ann:
         await ann.look_at("robot")
         await ann.say("hello")
