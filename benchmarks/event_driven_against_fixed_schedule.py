@@ -215,7 +215,7 @@ EXECUTORS = {"event-driven": in_closed_loop, "fixed schedule": by_the_clock}
 
 async def run(executor: str, block: Block, deviation: Deviation) -> Run:
     async with stage(deviation) as (bus, requests):
-        plan = await planned_alone(bus, block, RealizerConfig())
+        plan = await planned_alone(bus, block)
         times: dict[Point, Seconds] = {}
 
         async def listen() -> None:

@@ -41,7 +41,6 @@ from engage_hri.schemas.body import PerformBehavior, SyncPointArrived, SyncPoint
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.config import Stall, Variability
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.planning import planned_alone
@@ -181,7 +180,7 @@ class Run(Struct, frozen=True):
 
 async def run(executor: str, block: Block, variability: Variability) -> Run:
     async with stage(variability) as (bus, requests):
-        plan = await planned_alone(bus, block, RealizerConfig())
+        plan = await planned_alone(bus, block)
         waiting = Waiting(plan, bus, requests)
         began = bus.now()
         with bus.subscribe(keys.SYNC_POINT) as inbox:

@@ -31,7 +31,6 @@ from engage_hri.services.control.contract.body import Body, BodyFailed, Movement
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.pulse import Pulse
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.planning import planned_alone
 from engage_hri.services.runtime.virtual_time import run_virtual
@@ -221,7 +220,7 @@ async def told(executor: str, physical: Physical) -> Told:
     module.MujocoBody.__init__ = noted  # type: ignore[method-assign]
     try:
         async with stage(physical) as (bus, requests):
-            plan = await planned_alone(bus, FIGURE_4_4, RealizerConfig())
+            plan = await planned_alone(bus, FIGURE_4_4)
             times: dict[Point, Seconds] = {}
             trace: list[tuple[Seconds, float, float]] = []
             body = bodies[-1]

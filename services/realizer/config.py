@@ -29,12 +29,10 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py)."""
     longest_hold: Seconds = 60.0
     """What is held for longer is stopped, so that no arm stays in the air when whoever held it has gone."""
-    most: int = 2000
-    """Behaviors, marks and sync references in a block; more is refused. Planning takes 0.1 ms each."""
 
     FIXED: ClassVar[Mapping[str, Any]] = {
         "late": 0.5, "late_factor": 1.0, "stall_factor": 5.0, "lead": 0.3, "gap": 0.05, "skew": 0.1,
-        "estimate": 2.0, "abort": 5.0, "pulse": 1.0, "lease": 4.0,
+        "estimate": 2.0, "abort": 5.0, "pulse": 1.0, "lease": 4.0, "most": 2000,
     }  # fmt: skip
     """Former keys, and the value of the constant that has taken the place of each."""
 

@@ -70,7 +70,7 @@ class _Realizer:
         """How the blocks have ended that are over, by id."""
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
-        self.planning = Planning(bus, config, self.live_blocks, lambda: self.shared.performed())
+        self.planning = Planning(bus, self.live_blocks, lambda: self.shared.performed())
         self.steering = Steering(bus, self.desk, config, self.live, self.performances, self.live_blocks)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,

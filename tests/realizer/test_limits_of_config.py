@@ -8,6 +8,7 @@ from engage_hri.services.realizer.config import LATE, LEASE, RealizerConfig
 from engage_hri.services.realizer.decide.lateness import LATE_FACTOR, STALL_FACTOR
 from engage_hri.services.realizer.report.feedback import SKEW
 from engage_hri.services.realizer.service import PULSE
+from engage_hri.services.realizer.together import planning
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.stage import block, stage
 
@@ -56,11 +57,14 @@ def test_what_is_documented_as_noticed_late_or_stalled_holds_of_the_defaults() -
 
 
 @pytest.mark.parametrize("behaviors", [3, 4])
-async def test_a_block_may_be_as_large_as_is_said_and_no_larger(behaviors: int) -> None:
+async def test_a_block_may_be_as_large_as_is_said_and_no_larger(
+    behaviors: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planning, "MOST_BEHAVIORS", 3)
     large = block([Wait(id=f"w{number}", duration=1.0) for number in range(behaviors)])
-    async with stage(config=RealizerConfig(most=3)) as seen:
+    async with stage() as seen:
         if behaviors == 3:
             assert (await seen.perform(large)).status == "done"
         else:
-            with pytest.raises(RequestRefused, match=r"4 behaviors.*; at most 3 are planned in time.*realizer\.most"):
+            with pytest.raises(RequestRefused, match=r"4 behaviors; a block has 3 at most.*cut it into several"):
                 await seen.perform(large)

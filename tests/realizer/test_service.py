@@ -9,8 +9,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech, Timing, Wait
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.performance import BlockPerformance
+from engage_hri.services.realizer.together import planning
 from engage_hri.services.requests.ends import RequestRefused
 from tests.bus.faulty import Faults, FaultyHub
 from tests.realizer.fake_body import FakeBody, Script
@@ -31,8 +31,9 @@ async def test_a_refused_block_moves_nothing_and_the_next_is_performed() -> None
     assert outcome.status == "done"
 
 
-async def test_a_block_too_big_to_be_planned_in_time_is_refused() -> None:
-    async with stage(config=RealizerConfig(most=3)) as seen:
+async def test_a_block_too_big_to_be_planned_in_time_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planning, "MOST", 3)
+    async with stage() as seen:
         wait = Wait(id="w", duration=1.0, timing=(Timing("start", "s:end"),))
         with pytest.raises(RequestRefused, match="big: 4 behaviors, marks and sync references; at most 3"):
             await seen.ask(block((STORY, wait), id="big")).outcome

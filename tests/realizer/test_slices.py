@@ -15,11 +15,11 @@ from engage_hri.schemas.behaviors import Constraint, Gaze, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block, plan_steps
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.together import planning
 from engage_hri.services.runtime.steps import Steps, finished, portions
 from engage_hri.services.runtime.unhurried import SLICE, unhurried
 from tests.realizer.fake_body import FakeBody, Script
@@ -155,9 +155,16 @@ async def turns(until: Callable[[], bool], most: int = 10_000) -> int:
     raise AssertionError("never")
 
 
-async def test_a_sync_point_is_answered_while_another_block_is_planned() -> None:
+@pytest.fixture
+def any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of any size are planned."""
+    monkeypatch.setattr(planning, "MOST_BEHAVIORS", 5000)
+    monkeypatch.setattr(planning, "MOST", 5000)
+
+
+async def test_a_sync_point_is_answered_while_another_block_is_planned(any_size: None) -> None:
     body = FakeBody({"one": Script(stall="end")})
-    async with stage(body, config=RealizerConfig(most=5000)) as seen:
+    async with stage(body) as seen:
         small = seen.ask(TIED)
         await seen.seen("one:start", "small")
         seen.ask(large(references))
@@ -175,9 +182,9 @@ async def test_a_sync_point_is_answered_while_another_block_is_planned() -> None
         seen.requests.cancel("r-large")
 
 
-async def test_a_block_that_is_cancelled_while_it_is_planned_ends_at_once() -> None:
+async def test_a_block_that_is_cancelled_while_it_is_planned_ends_at_once(any_size: None) -> None:
     body = FakeBody()
-    async with stage(body, config=RealizerConfig(most=5000)) as seen:
+    async with stage(body) as seen:
         pending = seen.ask(large(references))
         await turns(lambda: body.asked > 0)
         for _ in range(20):

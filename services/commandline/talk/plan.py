@@ -90,4 +90,4 @@ async def rehearsed(block: Block, world: World, config: Config) -> Plan:
     services = {"simulation": still(world), "control": roster.service("control", config, connects=False)}
     async with in_memory(config, services) as hub:
         await asyncio.sleep(0.1)  # control has seen the world by then
-        return await planned_alone(hub.join("plan"), block, config.realizer)
+        return await planned_alone(hub.join("plan"), block)

@@ -13,7 +13,6 @@ from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
@@ -34,24 +33,30 @@ ESTIMATE: Seconds = 2.0
 """Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
 
 
+MOST_BEHAVIORS = 200
+"""Behaviors of a block. People's blocks have 36 at most. Each report costs in proportion to what is left of its
+block: 0.3 ms with 200 behaviors (decision 0142), and all other blocks wait meanwhile."""
+MOST = 2000
+"""Behaviors, marks and sync references of a block: planning takes 0.1 ms each."""
+
+
 class Planning:
     """Planning of blocks with the body and with what is known of the other live blocks."""
 
-    def __init__(
-        self, bus: Bus, config: RealizerConfig, live_blocks: LiveBlocks, performing: Callable[[], Iterable[Decisions]]
-    ) -> None:
+    def __init__(self, bus: Bus, live_blocks: LiveBlocks, performing: Callable[[], Iterable[Decisions]]) -> None:
         self._bus = bus
-        self._config = config
         self._live_blocks = live_blocks
         self._performing = performing
 
     async def plan(self, live: Live) -> Plan:
         """Plan a block. Of the blocks that it may refer to (`elsewhere`), those stay that it does refer to."""
         block = live.block
-        if (held := extent(block)) > self._config.most:
-            reason = f"{held} behaviors, marks and sync references; at most {self._config.most} are planned in time"
-            advice = "send several (blocks with APPEND, fragments of one turn); `realizer.most` is the limit"
-            raise BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
+        if (count := len(block.behaviors)) > MOST_BEHAVIORS:
+            raise _too_large(block, f"{count} behaviors; a block has {MOST_BEHAVIORS} at most")
+        if (held := extent(block)) > MOST:
+            raise _too_large(
+                block, f"{held} behaviors, marks and sync references; at most {MOST} are planned in time"
+            )
         # Bad references are refused before the body is asked.
         relations = await unhurried(relation_steps(block, live.elsewhere))
         elsewhere = live.elsewhere = {name: live.elsewhere[name] for name in sorted(relations.blocks)}
@@ -171,7 +176,12 @@ class Planning:
         return tuple([each for each in answer.items if each.behavior in asked])  # bodies err
 
 
-async def planned_alone(bus: Bus, block: Block, config: RealizerConfig) -> Plan:
+async def planned_alone(bus: Bus, block: Block) -> Plan:
     """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
     live = Live(PerformBlock(id="plan", block=block), (), Past(bus.now))
-    return await Planning(bus, config, LiveBlocks(bus.now), list).plan(live)
+    return await Planning(bus, LiveBlocks(bus.now), list).plan(live)
+
+
+def _too_large(block: Block, reason: str) -> BlockRefused:
+    advice = "cut it into several: blocks with APPEND, or fragments of one turn"
+    return BlockRefused(Fault(reason=reason, where=block.id, advice=advice))
