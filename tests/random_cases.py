@@ -7,11 +7,8 @@ whole, too.
 
 from hypothesis import settings
 
-SHARE = 3
+SHARE = 6
 """`make test` tries one of so many cases, the first ones."""
-
-DEAREST = 6
-"""The same for the dearest tests, which even with a third of their cases take more than four seconds."""
 
 
 def share_of(whole: int, one_of: int = SHARE) -> int:

@@ -9,7 +9,7 @@ import re
 import subprocess
 from collections import defaultdict
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cache, lru_cache
 from math import inf
 from pathlib import Path, PurePosixPath
 
@@ -293,7 +293,7 @@ def test_a_class_name_means_one_thing() -> None:
     places = defaultdict[str, list[str]](list)
     for name in tracked():
         if name.startswith(("schemas/", "services/")) and name.endswith(".py"):
-            for node in ast.parse((ROOT / name).read_text(encoding="utf-8")).body:
+            for node in _tree(name).body:
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     places[node.name].append(name)
 
@@ -309,10 +309,7 @@ def test_no_module_imports_itself_through_others() -> None:
         place = PurePosixPath(name)
         if place.parts[0] in ("schemas", "services") and place.suffix == ".py":
             modules[".".join(place.with_suffix("").parts).removesuffix(".__init__")] = place
-    imports = {
-        name: {*_imports(place, ast.parse((ROOT / place).read_text()))} & modules.keys() - {name}
-        for name, place in modules.items()
-    }
+    imports = {name: {*_imports(place, _tree(place))} & modules.keys() - {name} for name, place in modules.items()}
     # A package is imported with each of its modules; what it says itself counts, that it is there does not.
     imports = {name: {each for each in found if not name.startswith(each + ".")} for name, found in imports.items()}
     while free := {name for name, found in imports.items() if not found & imports.keys()}:
@@ -334,24 +331,33 @@ def slices(trees: dict[str, ast.Module]) -> list[str]:
 
     A seam has several classes behind it, or one that stands elsewhere; then a Protocol is right. trees: by path.
     """
-    classes = [(PurePosixPath(path).parent, each) for path, tree in trees.items() for each in _classes(tree)]
+    classes = [
+        (
+            PurePosixPath(path).parent,
+            each.name,
+            _members(each),
+            any("Protocol" in ast.unparse(base) for base in each.bases),
+        )
+        for path, tree in trees.items()
+        for each in _classes(tree)
+    ]
     found = []
-    for folder, protocol in classes:
-        if not any("Protocol" in ast.unparse(base) for base in protocol.bases):
-            continue
-        names = _members(protocol)
-        described = [
-            (place, each.name)
-            for place, each in classes
-            if names and names <= _members(each) and not any("Protocol" in ast.unparse(base) for base in each.bases)
-        ]
-        if [place for place, _ in described] == [folder]:
-            found.append(f"{folder}: {protocol.name} describes {described[0][1]} and nothing else: name the class")
+    for folder, protocol, names, is_protocol in classes:
+        if names and is_protocol:
+            described = [(place, name) for place, name, theirs, is_seam in classes if not is_seam and names <= theirs]
+            if [place for place, _ in described] == [folder]:
+                found.append(f"{folder}: {protocol} describes {described[0][1]} and nothing else: name the class")
     return found
 
 
+@cache
+def _tree(name: str | PurePosixPath) -> ast.Module:
+    return ast.parse((ROOT / name).read_text(encoding="utf-8"))
+
+
 def _classes(tree: ast.Module) -> Iterator[ast.ClassDef]:
-    yield from (each for each in _nodes(tree) if isinstance(each, ast.ClassDef))
+    """The classes of a file; those within functions have no Protocol outside."""
+    yield from (each for each in tree.body if isinstance(each, ast.ClassDef))
 
 
 def _members(of: ast.ClassDef) -> set[str]:
@@ -366,7 +372,7 @@ def _members(of: ast.ClassDef) -> set[str]:
 
 def test_no_protocol_describes_one_class_of_its_own_folder() -> None:
     code = [name for name in tracked() if name.split("/")[0] in CODE and name.endswith(".py")]
-    found = slices({name: ast.parse((ROOT / name).read_text()) for name in code})
+    found = slices({name: _tree(name) for name in code})
 
     assert {each.split(" describes ")[0] for each in found} == SEAMS.keys(), "\n".join(found)
 

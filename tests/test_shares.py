@@ -24,10 +24,10 @@ def profile(request: pytest.FixtureRequest):
     settings.load_profile(before)
 
 
-def test_a_third_is_tried_but_at_least_one_unless_all_are_asked_for(profile: str) -> None:
-    told = [share_of(whole) for whole in (1, 3, 4, 300)]
+def test_a_sixth_is_tried_but_at_least_one_unless_all_are_asked_for(profile: str) -> None:
+    told = [share_of(whole) for whole in (1, 6, 7, 300)]
 
-    assert told == ([1, 1, 2, 100] if profile == "same" else [1, 3, 4, 300])
+    assert told == ([1, 1, 2, 50] if profile == "same" else [1, 6, 7, 300])
     assert trials() == (1 if profile == "same" else None)
 
 

@@ -23,11 +23,11 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.random_cases import DEAREST, share_of
+from tests.random_cases import share_of
 from tests.realizer.exact_blocks import OFF, WORLD, Performed, perform, performed
 from tests.realizer.planning import timed
 
-BLOCKS = share_of(300, DEAREST)
+BLOCKS = share_of(300)
 MOST = {False: 0.02, True: 0.02}
 """Share of blocks that may be off, without shifts and with: 0.29 and 0.45 without a rehearsal. docs/realizer.md
 says what is left."""

@@ -16,7 +16,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.random_cases import DEAREST, share_of
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import block, stage
@@ -115,7 +115,7 @@ HELD: Sequence[tuple[str, str]] = [
 ]
 
 
-@settings(max_examples=share_of(150, DEAREST), deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(
     st.integers(0, 10_000),
     st.sampled_from(HELD),

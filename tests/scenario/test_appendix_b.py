@@ -17,11 +17,9 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
-from engage_hri.services.collaboration import plans
 from engage_hri.services.collaboration.relations import Relation, relation
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.virtual_time import run_virtual
-from tests.bus.faulty import Faults
 from tests.scenario.playing import Record, play
 
 PERSON_LOOKS = {
@@ -288,30 +286,6 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events() -> 
     assert [event.at for event in again.robot_initiated()] == [event.at for event in played().robot_initiated()]
     assert by_step(other) == EXPECTED["table"]
     assert [event.at for event in other.robot_initiated()] != [event.at for event in played().robot_initiated()]
-
-
-def test_a_slow_bus_that_delivers_some_messages_twice_gives_the_same_events() -> None:
-    record = played(seed=3, faults=Faults(delay=0.02, duplicate=0.05))
-
-    assert by_step(record) == EXPECTED["table"]
-    assert {outcome.status for outcome in record.outcomes.values()} == {"done"}
-
-
-@pytest.mark.parametrize("resolution", ["table", "object"])
-def test_a_body_that_is_early_or_late_by_a_tenth_gives_the_same_events(resolution: str) -> None:
-    record = played(resolution=resolution, seed=18, noise=0.1)
-
-    assert by_step(record, resolution) == EXPECTED[resolution]
-
-
-@pytest.mark.parametrize("settle", [0.8, 1.8, 2.4])
-def test_how_soon_the_robot_speaks_after_a_placement_changes_no_event(
-    settle: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """1.8 and 2.4 start a turn while the eyes are on the hand: the look that ends it must not fall back there."""
-    monkeypatch.setattr(plans, "SETTLE", settle)
-
-    assert by_step(run_virtual(play())) == EXPECTED["table"]
 
 
 def test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right() -> None:
