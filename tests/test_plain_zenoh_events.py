@@ -52,9 +52,10 @@ class Link:
     def step(self, slot: int, late: bool = False) -> None:
         """The event of this slot goes on: the even ones are ann's, the odd ones bob's.
 
-        late: it still comes through, although it is known already that recognition is away.
+        late: it still comes through, although it is known already that recognition is away; not once its events are
+        lost, which is seconds later.
         """
-        late = late and not self.missed and self.life == self.plain.life
+        late = late and not self.missed and self.life == self.plain.life and self.plain.deadline is not None
         id, states = self.open.get(slot) or (f"{self.life}-dg-{next(self.ids)}", list(COURSES[slot // 2 % 2]))
         known = self.last.get(slot) if slot in self.open else None
         event = ConnectionEvent(

@@ -13,6 +13,7 @@ from engage_hri.schemas.requests import Refused
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.roster import service
+from engage_hri.services.realizer.together import planning
 from engage_hri.services.runtime.service import running
 from tests.realizer.stage import stage
 
@@ -73,7 +74,8 @@ async def test_xml_that_is_too_long_to_be_read_in_time_is_refused_unread_and_by_
     assert "JSON" in refused.fault.advice
 
 
-async def test_the_same_block_may_come_as_json() -> None:
+async def test_the_same_block_may_come_as_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planning, "MOST_BEHAVIORS", 1500)
     behaviors = [_wait(f"wait-{number}", duration=0.0) for number in range(1500)]
     request = {"type": "perform_block", "id": "r", "requester": "me", "block": {"id": "b", "behaviors": behaviors}}
     payload = msgspec.json.encode(request)
