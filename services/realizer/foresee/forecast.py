@@ -86,8 +86,9 @@ class Forecast:
         """Seconds of each arc, as long as nothing gives way."""
         self._seconds: list[Seconds] = []
         """Of each arc, once phases have given way."""
-        self._ends: list[tuple[int, int]] = []
-        """Source and target of each arc, for sweeps; one that moves nothing ends in `_nowhere`."""
+        self._source: list[int] = []
+        self._moves: list[int] = []
+        """Source of each arc, and its target if it may move that, for sweeps; else `_nowhere`."""
         self._forward: list[int] = []
         self._back: list[int] = []
         """Arcs in the order in which one sweep over them is enough."""
@@ -180,7 +181,8 @@ class Forecast:
         self._arcs.append(arc)
         self._asked.append(asked * factor)
         self._seconds.append(asked * factor)
-        self._ends.append((source, target))
+        self._source.append(source)
+        self._moves.append(target)
         self._out[source].append(number)
         self._in[target].append(number)
         return number
@@ -195,21 +197,21 @@ class Forecast:
 
     def _sort(self) -> None:
         """Put the arcs into the order of sweeps. What counts from a fact later on may stay where it is."""
-        rank, ends = self._rank, self._ends
+        rank, arcs = self._rank, self._arcs
         numbers = sorted(
-            (each for each, arc in enumerate(self._arcs) if arc.is_on), key=lambda each: rank.get(ends[each][0], -1)
+            (each for each, arc in enumerate(arcs) if arc.is_on), key=lambda each: rank.get(arcs[each].source, -1)
         )
-        self._forward = [each for each in numbers if rank[ends[each][1]] > rank.get(ends[each][0], -1)]
-        self._back = [each for each in reversed(numbers) if rank[ends[each][1]] <= rank.get(ends[each][0], -1)]
+        is_forward = [rank[arc.target] > rank.get(arc.source, -1) for arc in arcs]
+        self._forward = [each for each in numbers if is_forward[each]]
+        self._back = [each for each in reversed(numbers) if not is_forward[each]]
 
     def _forget(self) -> None:
         """Take the arcs out of the sweeps that move nothing any more: what is past costs nothing."""
-        self._forward = [each for each in self._forward if self._ends[each][1] != self._nowhere]
-        self._back = [each for each in self._back if self._ends[each][1] != self._nowhere]
+        self._forward = [each for each in self._forward if self._moves[each] != self._nowhere]
+        self._back = [each for each in self._back if self._moves[each] != self._nowhere]
 
     def _switch_off(self, number: int) -> None:
-        arc = self._arcs[number]
-        arc.is_on, self._ends[number] = False, (arc.source, self._nowhere)
+        self._arcs[number].is_on, self._moves[number] = False, self._nowhere
         self._on_facts.discard(number)
 
     def _drop_idle_bounds(self) -> None:
@@ -243,7 +245,7 @@ class Forecast:
 
     def _end_on_fact(self, number: int) -> None:
         arc = self._arcs[number]
-        self._ends[number] = (arc.source, self._nowhere)
+        self._moves[number] = self._nowhere
         if arc.is_on and arc.is_bound and not self._is_fact[arc.source]:
             self._on_facts.add(number)
 
@@ -292,7 +294,7 @@ class Forecast:
         arc = self._arcs[number]
         self._out[arc.source].remove(number)
         arc.source = node
-        self._ends[number] = (node, self._ends[number][1])
+        self._source[number] = node
         self._out[node] = [number]
         self._on_facts.discard(number)
 
@@ -431,15 +433,14 @@ class Forecast:
 
         Raises Circle.
         """
-        seconds, ends = self._seconds, self._ends
+        seconds, sources, targets = self._seconds, self._source, self._moves
         times = self.times = self._floor[:]
         causes: dict[int, int] = {}
         sweeps = 0
         while True:
             moved = -1
             for number in self._back if sweeps % 2 else self._forward:
-                source, target = ends[number]
-                at = times[source] + seconds[number]
+                at, target = times[sources[number]] + seconds[number], targets[number]
                 if at > times[target] + FINEST:
                     times[target], causes[target], moved = at, number, target
             sweeps += 1

@@ -164,8 +164,6 @@ class BlockPerformance(Neighbor):
             self._shared.live_blocks.lose(block, behavior)
         self._shared.live_blocks.reach(block, Point(BLOCK_ITSELF, "start"), began)
         self.futures.fired(FINISH).add_done_callback(self._finish)
-        routes = {self.body.id(id): self for id in self._runs}
-        self._shared.routes.update(routes)
         try:
             async with asyncio.TaskGroup() as tasks:
                 self._tasks = {
@@ -414,7 +412,10 @@ class BlockPerformance(Neighbor):
     def apply(self, effect: Effect) -> bool:
         """Carry out one decision; True if there is more to be decided then."""
         match effect:
-            case Begin(behavior=id) | Extend(behavior=id):
+            case Begin(behavior=id):
+                self._shared.routes[self.body.id(id)] = self
+                self._runs[id].command(effect)
+            case Extend(behavior=id):
                 self._runs[id].command(effect)
             case Late():
                 if not self._shared.peers.has_left("control"):
