@@ -27,8 +27,7 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)  # it imports `imp`
     import snakes.nets as snakes
 
-from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Pointing, Speech, Synchronize
-from engage_hri.schemas.blocks import Block
+from benchmarks.running_net import references
 from engage_hri.services.realizer.net.petri_net import PetriNet, Place, Transition, enabled, fire, fire_once_each
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -36,24 +35,6 @@ from engage_hri.services.realizer.plan.planner import plan_block
 Given = TypeVarTuple("Given")
 Made = TypeVar("Made")
 SIZES = (100, 1000, 10000)
-PER_PAIR = 8
-"""Transitions of a pointing gesture and the phrase that begins with its stroke."""
-
-
-def references(transitions: int) -> Block:
-    """One pointed reference after another, of about so many transitions."""
-    behaviors: list[BlockBehavior] = []
-    operators: list[Synchronize | After] = []
-    for number in range(transitions // PER_PAIR):
-        behaviors += (
-            Pointing(id=f"point-{number}", target="can"),
-            Speech(id=f"phrase-{number}", text="this one"),
-        )
-        operators.append(Synchronize(ref=f"point-{number}:stroke_start", syncs=(f"phrase-{number}:start",)))
-        if number:
-            operators.append(After(ref=f"phrase-{number - 1}:end", syncs=(f"point-{number}:start",)))
-            operators.append(After(ref=f"point-{number - 1}:end", syncs=(f"point-{number}:start",)))
-    return Block(id="b", behaviors=tuple(behaviors), constraints=(Constraint(operators=tuple(operators)),))
 
 
 def build(net: PetriNet) -> PetriNet:
