@@ -104,6 +104,34 @@ class ServingAction(TableMember):
 Row = tuple[ServingState, tuple[ServingAction, ...]]
 
 S, E = ServingState, ServingEvent
+
+
+def going_on(
+    state: ServingState,
+    heard: Mapping[ServingEvent, tuple[ServingState, *tuple[ServingAction, ...]]],
+    *without_effect: ServingEvent,
+) -> Mapping[ServingEvent, Row]:
+    """Rows of a request that the service has, decided or not. heard: of the service's own word that it has begun."""
+    return rows(state, {
+        E.CAME: (state, ServingAction.RENEW, ServingAction.REPEAT),
+        E.CHANGED: (state, ServingAction.RENEW, ServingAction.HAND),
+        E.DIFFERED: (state, ServingAction.RENEW, ServingAction.WARN_DIFFERENT, ServingAction.REPEAT),
+        E.CANCEL: (S.CANCELLED, ServingAction.HAND_CANCEL),
+        E.NAMED: (state, ServingAction.RENEW),
+        E.EXTENDED: (state, ServingAction.RENEW, ServingAction.HAND_EXTENDED, ServingAction.SAY_OUTDATED),
+        **heard,
+        E.ACCEPT: (S.ACCEPTED, ServingAction.ANSWER),
+        E.REFUSE: (S.ENDED, ServingAction.ANSWER),
+        E.END: (S.ENDED, ServingAction.ANSWER),
+        E.GONE: (state, ServingAction.WAIT_GRACE, ServingAction.HOLD),
+        E.BACK: (state, ServingAction.STOP_GRACE),
+        E.REBORN: (S.CANCELLED, ServingAction.HAND_REBORN),
+        E.GRACE_OVER: (S.CANCELLED, ServingAction.HAND_GONE),
+        E.UNHEARD: (state, ServingAction.HOLD),
+        E.LEASE_OVER: (S.CANCELLED, ServingAction.HAND_LAPSED),
+    }, *without_effect)  # fmt: skip
+
+
 TABLE: Mapping[ServingState, Mapping[ServingEvent, Row]] = {
     S.UNKNOWN: rows(S.UNKNOWN, {
         E.CAME: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND),
@@ -117,41 +145,8 @@ TABLE: Mapping[ServingState, Mapping[ServingEvent, Row]] = {
         E.REFUSE: (S.UNKNOWN, ServingAction.WARN_ENDED),
         E.END: (S.UNKNOWN, ServingAction.WARN_ENDED),
     }, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
-    S.TAKEN: rows(S.TAKEN, {
-        E.CAME: (S.TAKEN, ServingAction.RENEW, ServingAction.REPEAT),
-        E.CHANGED: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND),
-        E.DIFFERED: (S.TAKEN, ServingAction.RENEW, ServingAction.WARN_DIFFERENT, ServingAction.REPEAT),
-        E.CANCEL: (S.CANCELLED, ServingAction.HAND_CANCEL),
-        E.NAMED: (S.TAKEN, ServingAction.RENEW),
-        E.EXTENDED: (S.TAKEN, ServingAction.RENEW, ServingAction.HAND_EXTENDED, ServingAction.SAY_OUTDATED),
-        E.HEAR: (S.TAKEN, ServingAction.ANSWER),
-        E.ACCEPT: (S.ACCEPTED, ServingAction.ANSWER),
-        E.REFUSE: (S.ENDED, ServingAction.ANSWER),
-        E.END: (S.ENDED, ServingAction.ANSWER),
-        E.GONE: (S.TAKEN, ServingAction.WAIT_GRACE, ServingAction.HOLD),
-        E.BACK: (S.TAKEN, ServingAction.STOP_GRACE),
-        E.REBORN: (S.CANCELLED, ServingAction.HAND_REBORN),
-        E.GRACE_OVER: (S.CANCELLED, ServingAction.HAND_GONE),
-        E.UNHEARD: (S.TAKEN, ServingAction.HOLD),
-        E.LEASE_OVER: (S.CANCELLED, ServingAction.HAND_LAPSED),
-    }),
-    S.ACCEPTED: rows(S.ACCEPTED, {
-        E.CAME: (S.ACCEPTED, ServingAction.RENEW, ServingAction.REPEAT),
-        E.CHANGED: (S.ACCEPTED, ServingAction.RENEW, ServingAction.HAND),
-        E.DIFFERED: (S.ACCEPTED, ServingAction.RENEW, ServingAction.WARN_DIFFERENT, ServingAction.REPEAT),
-        E.CANCEL: (S.CANCELLED, ServingAction.HAND_CANCEL),
-        E.NAMED: (S.ACCEPTED, ServingAction.RENEW),
-        E.EXTENDED: (S.ACCEPTED, ServingAction.RENEW, ServingAction.HAND_EXTENDED, ServingAction.SAY_OUTDATED),
-        E.ACCEPT: (S.ACCEPTED, ServingAction.ANSWER),
-        E.REFUSE: (S.ENDED, ServingAction.ANSWER),
-        E.END: (S.ENDED, ServingAction.ANSWER),
-        E.GONE: (S.ACCEPTED, ServingAction.WAIT_GRACE, ServingAction.HOLD),
-        E.BACK: (S.ACCEPTED, ServingAction.STOP_GRACE),
-        E.REBORN: (S.CANCELLED, ServingAction.HAND_REBORN),
-        E.GRACE_OVER: (S.CANCELLED, ServingAction.HAND_GONE),
-        E.UNHEARD: (S.ACCEPTED, ServingAction.HOLD),
-        E.LEASE_OVER: (S.CANCELLED, ServingAction.HAND_LAPSED),
-    }, E.HEAR),
+    S.TAKEN: going_on(S.TAKEN, {E.HEAR: (S.TAKEN, ServingAction.ANSWER)}),
+    S.ACCEPTED: going_on(S.ACCEPTED, {}, E.HEAR),
     S.CANCELLED: rows(S.CANCELLED, {
         E.CAME: (S.CANCELLED, ServingAction.REPEAT),
         E.CHANGED: (S.CANCELLED, ServingAction.REPEAT),
