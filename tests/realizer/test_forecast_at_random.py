@@ -101,6 +101,8 @@ def test_a_forecast_from_scratch_takes_all_facts_at_once(seed: int) -> None:
         story.case.plan, BEGAN, factor, foreseen, {**reached, **stranger}, {**arrived, **stranger, **reached},
         model.facts, prolonged,
     )  # fmt: skip
+    found.update()
+
     assert found.times[: model.size] == pytest.approx(expected, abs=CLOSE)
 
 

@@ -19,8 +19,10 @@ def full_forecast(
     prolonged: Iterable[tuple[int, int, Seconds]] = (),
     heard: Mapping[str, Seconds] = {},
 ) -> Forecast:
-    """Forecast of a block that keeps none. instants: those that are over. prolonged, heard: see `prolong` and
-    `shift` of `Forecast`."""
+    """Forecast of a block that keeps none, which has yet to be asked (`update`, `as_of`).
+
+    instants: those that are over. prolonged, heard: see `prolong` and `shift` of `Forecast`.
+    """
     forecast = Forecast(plan, began, factor, foreseen)
     for source, target, seconds in prolonged:
         forecast.prolong(source, target, seconds)
@@ -34,7 +36,6 @@ def full_forecast(
         forecast.shift(behavior, at)
     for transition, at in instants.items():
         forecast.fix(transition, at)
-    forecast.update()
     return forecast
 
 
