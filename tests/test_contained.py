@@ -42,7 +42,7 @@ def breaking(attribute: str) -> Callable[..., Any]:
         ("engage_hri.services.generation.fragment_runner.FragmentRunner.admit", "perform"),
         ("engage_hri.services.generation.pipeline.weigh", "perform"),
         ("engage_hri.services.generation.fragment_runner.planning", "perform"),
-        ("engage_hri.services.realizer.together.planning.plan_steps", "realize"),
+        ("engage_hri.services.realizer.together.planning.plan_tries", "realize"),
         ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.reach", "realize"),
