@@ -65,7 +65,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the long share before `-m` is judged. Long files first: whoever gets the last ends soon after others."""
     for item in items:
-        if is_long(item.path, real_time=item.get_closest_marker("real_time") is not None):
+        test = item.nodeid.partition("::")[2]
+        if is_long(item.path, test, real_time=item.get_closest_marker("real_time") is not None):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))

@@ -49,7 +49,7 @@ LONG = {
     "test_skips.py": "each test runs pytest; it guards a tool and not the robot",
     "control/mujoco/test_pictures.py": "it draws films of physics, and has ffmpeg write them",
 }
-"""Files and folders whose tests are long though they are not marked `real_time`, with the reason."""
+"""Folders, files and single tests that are long though they are not marked `real_time`, with the reason."""
 
 SMOKE = "cli/test_smoke.py"
 """The one file of real processes that stays short: without it a robot that does not start at all would pass."""
@@ -71,10 +71,12 @@ SHORT_PROCESSES: dict[str, str] = {
 """Files of the short share that may start processes, with the reason."""
 
 
-def is_long(path: Path, *, real_time: bool) -> bool:
-    """Whether a test in this file belongs to the long share."""
-    name = path.relative_to(TESTS).as_posix()
-    return name != SMOKE and (real_time or any(name == each or name.startswith(f"{each}/") for each in LONG))
+def is_long(path: Path, test: str, *, real_time: bool) -> bool:
+    """Whether a test belongs to the long share. test: its name in the file, perhaps with its case in brackets."""
+    file = path.relative_to(TESTS)
+    one = f"{file.as_posix()}::{test}"
+    named = {one, one.partition("[")[0], *(each.as_posix() for each in (file, *file.parents))}
+    return file.as_posix() != SMOKE and (real_time or not named.isdisjoint(LONG))
 
 
 def _is_importing() -> bool:

@@ -1,6 +1,7 @@
 """How many random cases are tried, which tests are long, and which files begin first."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -44,21 +45,36 @@ def test_make_asks_for_a_share_or_for_all(goal: str, name: str, short: bool) -> 
 @pytest.mark.parametrize(
     ("name", "real_time", "long"),
     [
-        ("bus/test_cuts.py", True, True),
-        ("bus/test_order.py", False, False),
-        ("lab/test_lab.py", False, True),
-        ("test_wheel.py", False, True),
-        (SMOKE, True, False),
+        ("bus/test_cuts.py::test_it", True, True),
+        ("bus/test_order.py::test_it", False, False),
+        ("lab/test_lab.py::test_it", False, True),
+        ("test_wheel.py::test_it", False, True),
+        ("a.py::test_whole", False, True),
+        ("a.py::test_whole[case]", False, True),
+        ("a.py::test_whole_part", False, False),
+        ("a.py::test_some[raw]", False, True),
+        ("a.py::test_some[plain]", False, False),
+        (f"{SMOKE}::test_it", True, False),
     ],
 )
-def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(name: str, real_time: bool, long: bool) -> None:
-    assert is_long(TESTS / name, real_time=real_time) is long
+def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(
+    monkeypatch: pytest.MonkeyPatch, name: str, real_time: bool, long: bool
+) -> None:
+    for each in ("a.py::test_whole", "a.py::test_some[raw]"):
+        monkeypatch.setitem(LONG, each, "a test")
+    file, _, test = name.partition("::")
+
+    assert is_long(TESTS / file, test, real_time=real_time) is long
 
 
 def test_what_the_long_share_names_is_there_and_has_a_reason() -> None:
     named = {**LONG, **SHORT_PROCESSES}
+    split = [each.partition("[")[0].split("::") for each in named]
 
-    assert [name for name in named if not (TESTS / name).exists()] == []
+    assert [file for file, *_ in split if not (TESTS / file).exists()] == []
+    assert [
+        test for file, *rest in split for test in rest if not re.search(rf"\b{test}\b", (TESTS / file).read_text())
+    ] == []
     assert all(named.values())
 
 
