@@ -11,6 +11,7 @@ from engage_hri.services.realizer.plan.instants import Classes, instants
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
 from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 
 POINTS = [Point("b", f"p{number}") for number in range(7)]
 Graph = dict[Point, dict[Point, tuple[float, int]]]
@@ -69,7 +70,7 @@ TIES = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(TIES, st.booleans())
 def test_what_is_tied_is_so_far_apart_and_a_contradiction_tells_how_far_and_why(
     said: list[Said], is_tried: bool
@@ -129,7 +130,7 @@ def check_contradiction(
     assert named == sorted({*said, line})
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(TIES)
 def test_instants_are_points_at_no_distance_and_the_lines_between_lead_there(said: list[Said]) -> None:
     classes, graph = Classes(), dict[Point, dict[Point, tuple[float, int]]]()
