@@ -90,6 +90,9 @@ LONG_TESTS = {
     "control/test_composed.py": {
         "TestApart": "the same body in other parts; TestComposedBody has all laws",
     },
+    "control/test_silent_voice.py": {
+        "TestTorsoWithSilentVoice": "the laws of the torso again, with another voice",
+    },
     "control/test_liars.py": {
         "test_who_breaks_a_law_is_caught_by_it": "a body for each law; it guards the suite",
     },
