@@ -17,6 +17,7 @@ Graph = dict[Point, dict[Point, tuple[float, int]]]
 
 Said = tuple[int, int, float, float]
 """Two points by number (one less than 0 is the block's start), and the offsets that they are written with."""
+from tests.random_cases import share_of
 
 
 def point(number: int) -> Point:
@@ -68,7 +69,7 @@ TIES = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(TIES, st.booleans())
 def test_what_is_tied_is_so_far_apart_and_a_contradiction_tells_how_far_and_why(
     said: list[Said], is_tried: bool
@@ -128,7 +129,7 @@ def check_contradiction(
     assert named == sorted({*said, line})
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(TIES)
 def test_instants_are_points_at_no_distance_and_the_lines_between_lead_there(said: list[Said]) -> None:
     classes, graph = Classes(), dict[Point, dict[Point, tuple[float, int]]]()

@@ -19,6 +19,7 @@ from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Order, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.random_cases import share_of
 from tests.realizer.oracle import SEVEN, estimate, phases_of, points_of, relaxed
 from tests.realizer.way_round import closed, read
 
@@ -44,7 +45,7 @@ def planned(block: Block) -> Plan:
 # -- too little time ---------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=share_of(120), deadline=None)
 @given(st.data())
 def test_what_takes_too_long_is_told_with_both_times_and_the_way_round(data: st.DataObject) -> None:
     """Two points of one behavior are so close together that its phases, as short as can be, take longer."""
@@ -170,7 +171,7 @@ def is_too_late(earlier: Chain, sync: str, later: Chain, ties: list[tuple[str, s
     return relaxed(names, lags) is None
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.data())
 def test_who_cannot_wait_for_a_part_is_lost_or_who_has_it_and_then_the_other_keeps_it(data: st.DataObject) -> None:
     draw = data.draw
@@ -328,7 +329,7 @@ def may_go(known: Relations, relation: Equal | Order, point: Point) -> bool:
     return point in points_in(relation) and by not in known.required
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(
     relations(),
     st.lists(st.sampled_from([Point(id, sync) for id in "st" for sync in ("start", "end")]), max_size=3, unique=True),

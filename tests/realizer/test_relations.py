@@ -35,6 +35,7 @@ from engage_hri.services.realizer.plan.relations import (
     relations_of,
 )
 from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.random_cases import share_of
 
 
 class Ref(NamedTuple):
@@ -187,7 +188,7 @@ def said(draw: st.DrawFn) -> Said:
     return Said(block, Relations(tuple(equals), tuple(orders), frozenset(required), told, frozenset(unusable)))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(said())
 def test_what_a_block_says_is_read_as_it_was_meant(case: Said) -> None:
     found = relations_of(case.block, OTHERS)
@@ -213,7 +214,7 @@ def test_what_a_block_says_is_read_as_it_was_meant(case: Said) -> None:
     assert extent(case.block) == elements
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(said())
 def test_what_needs_a_point_of_another_block_is_required_and_tied_to_it(case: Said) -> None:
     points = [Point("other:x", "stroke"), Point("dark:y", "nobody_knows")]

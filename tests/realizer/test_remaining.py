@@ -13,6 +13,7 @@ from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.random_cases import share_of
 from tests.realizer.oracle import estimate
 
 IDS = "abcd"
@@ -45,7 +46,7 @@ def ties(draw: st.DrawFn, at: dict[Point, float]) -> list[Equal]:
     return found
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=share_of(120), deadline=None)
 @given(st.data())
 def test_what_was_tied_through_a_dropped_behavior_stays_tied(data: st.DataObject) -> None:
     at = {each: data.draw(st.sampled_from((0.0, 0.25, 1.0, 3.0))) for each in POINTS} | {ORIGIN: 0.0}
@@ -122,7 +123,7 @@ def test_a_later_stroke_is_a_point_that_is_told_or_a_share_of_all_strokes(stroke
     assert [each.offset - 0.5 for each in found] == pytest.approx(shares)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(st.data())
 def test_what_is_untied_from_other_blocks_says_nothing_of_these_points(data: st.DataObject) -> None:
     points = [Point("a", "start"), Point("b", "end"), Point("o:x", "start"), Point("o:y", "end"), Point("p:x", "end")]

@@ -20,6 +20,7 @@ from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solut
 
 QUARTERS = st.integers(-8, 8).map(lambda each: each / 4)
 Arcs = Iterable[tuple[int, int, float]]
+from tests.random_cases import share_of
 
 
 def earliest(size: int, arcs: Arcs, start: Mapping[int, float] = {}) -> list[float] | None:
@@ -52,7 +53,7 @@ def check_cycles(cycles: Sequence[Sequence[Lag]], known: Sequence[Lag]) -> None:
     assert all(count == 1 for count in seen.values())
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(lags(), st.dictionaries(st.integers(1, 7), st.integers(-8, 0).map(lambda each: each / 4), max_size=2))
 def test_a_schedule_is_the_earliest_or_a_cycle_forbids_it(
     asked: tuple[int, list[Lag]], past: dict[int, float]
@@ -152,7 +153,7 @@ def arcs(net: PetriNet, *, extreme: bool) -> list[tuple[int, int, float]]:
     return [(each.source, each.target, least(each) if extreme else each.lag) for each in ties]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(nets(), st.dictionaries(st.integers(1, 5), st.integers(0, 12).map(lambda each: each / 4), max_size=2))
 def test_phases_give_way_only_where_they_must_and_only_as_far_as_they_can(
     net: PetriNet, known: dict[int, float]

@@ -20,6 +20,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import Tries, plan_block, plan_tries
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.together.planning import MOST_BEHAVIORS
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
 from tests.realizer.stage import Stage, block, stage, together
@@ -84,7 +85,7 @@ def test_no_try_is_long(shape: Callable[[int], Parts]) -> None:
     assert plan == plan_block(large(shape), known=Known(blocks=elsewhere))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(st.lists(random_blocks(12) | possible_blocks(12), min_size=2, max_size=3), st.randoms(use_true_random=False))
 def test_blocks_that_are_planned_in_turns_get_the_plans_they_get_alone(blocks: list[Block], chance) -> None:  # type: ignore[no-untyped-def]
     alone = [tried(plan_tries(each, [estimate(one) for one in each.behaviors])) for each in blocks]
