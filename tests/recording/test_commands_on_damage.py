@@ -133,13 +133,13 @@ class Commands:
         return self._made("console", "--recording", path)
 
     def record(self, path: Path) -> Made:
-        """Repair a copy: it is whole then, and has all that could be read before."""
-        copy = path.with_name("copy.mcap")
-        copy.write_bytes(path.read_bytes())
-        made = self._made("record", copy, "--repair")
-        if made.code == 0:
+        """Repair it: the copy is whole, and has all that could be read."""
+        copy = path.with_suffix(".repaired.mcap")
+        copy.unlink(missing_ok=True)
+        made = self._made("record", path, "--repair")
+        if made.code == 0 and copy.exists():
             repaired = read(copy)
-            assert repaired.is_whole
+            assert (repaired.is_whole, repaired.damaged) == (True, [])
             assert all_of(repaired) == all_of(read(path))
             assert "nothing to repair" in self._run("record", copy, "--repair").out
         return Made(made.code, [], made.err or str(made.things[0]))
