@@ -110,15 +110,11 @@ class Commands:
         return Made(result.code, [result.out, *self._seen], result.err)
 
     def export(self, path: Path) -> Made:
-        kinds = ("--elan", "--textgrid", "--csv", "--lines", "--settings")
+        kinds = ("--elan", "--csv", "--lines", "--settings")
         made = self._made("export", path, *kinds, "--overwrite")
         if made.code == 0:
             made.things.extend(Path(name).read_bytes() for name in str(made.things[0]).split())
         return made
-
-    def pictures(self, path: Path) -> Made:
-        made = self._made("export", path, "--sheet", "--overwrite")
-        return made._replace(things=made.things[:1])  # pictures of one scene need not be equal to the byte
 
     def analyse(self, path: Path) -> Made:
         return self._made("analyse", path)
@@ -203,13 +199,3 @@ def test_every_command_reads_a_damaged_recording_or_refuses_it_and_tells_of_what
     usual = made_of(commands, QUICK, path, whole)
     for seed in range(share_of(60, 20)):
         check(commands, QUICK, path, damage(whole, Random(seed)), usual, (damage.__name__, seed))
-
-
-def test_pictures_of_damaged_recordings_are_drawn_or_refused(
-    commands: Commands, whole: bytes, tmp_path: Path
-) -> None:
-    path = tmp_path / "a.mcap"
-    usual = made_of(commands, ["pictures"], path, whole)
-    for seed in range(share_of(45, 15)):
-        damage = ALL[seed % len(ALL)]
-        check(commands, ["pictures"], path, damage(whole, Random(seed)), usual, (damage.__name__, seed))
