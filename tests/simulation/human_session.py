@@ -22,7 +22,7 @@ from engage_hri.schemas.recognition import RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.simulation.chance import Chance
-from engage_hri.services.simulation.table_2_1 import TABLE
+from tests.simulation.table_2_1 import TABLE
 
 Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | SignalTurn
 
