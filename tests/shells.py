@@ -40,7 +40,6 @@ SHELLS = {
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
-    "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from engage_hri.services.realizer.plan.instants import Classes, instants
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
+from tests.random_cases import share_of
 
 POINTS = [Point("b", f"p{number}") for number in range(7)]
 Graph = dict[Point, dict[Point, tuple[float, int]]]
@@ -17,7 +18,6 @@ Graph = dict[Point, dict[Point, tuple[float, int]]]
 
 Said = tuple[int, int, float, float]
 """Two points by number (one less than 0 is the block's start), and the offsets that they are written with."""
-from tests.random_cases import share_of
 
 
 def point(number: int) -> Point:

@@ -17,10 +17,10 @@ from engage_hri.services.realizer.plan.cycles import components
 from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.prediction import Foresight, Impossible, predict
 from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, critical_path, solve
+from tests.random_cases import share_of
 
 QUARTERS = st.integers(-8, 8).map(lambda each: each / 4)
 Arcs = Iterable[tuple[int, int, float]]
-from tests.random_cases import share_of
 
 
 def earliest(size: int, arcs: Arcs, start: Mapping[int, float] = {}) -> list[float] | None:
