@@ -18,7 +18,9 @@ from engage_hri.services.control.reachy_mini.estimates import FRAME, _settling
 from engage_hri.services.control.reachy_mini.moving import SHORTEST, Moves
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.reachy_mini.tracks import NEAR
-from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
+from engage_hri.services.control.testing import WORLD, Stage, performed
+from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.suite import ON_AXIS
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 
