@@ -23,8 +23,8 @@ Added = Callable[[Seconds], Array]
 
 
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
-    phases = _phases((WalkPoint("start"), WalkPoint("end", "end")), {"start": 0.0, "end": duration})
-    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
+    told = phases((WalkPoint("start"), WalkPoint("end", "end")), {"start": 0.0, "end": duration})
+    return Estimate(behavior=behavior.id, feasible=True, phases=told, pose_after=pose, pose_end=pose)
 
 
 def motion_estimate(
@@ -43,8 +43,8 @@ def motion_estimate(
     if is_gaze(course) or is_arm(course):
         until = path.marks.get("stroke", path.length)
         degrees = math.degrees(path.travel(until) if added is None else _travel(path, until, added))
-    phases = _phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake)
-    return replace(posture_estimate(behavior, course, degrees, (pose, pose_end)), phases=phases)
+    told = phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake)
+    return replace(posture_estimate(behavior, course, degrees, (pose, pose_end)), phases=told)
 
 
 def posture_estimate(
@@ -110,7 +110,7 @@ def _travel(path: Path, until: Seconds, added: Added) -> float:
     return sum(float(np.sum(np.abs(after - before))) for before, after in pairwise(seen))
 
 
-def _phases(
+def phases(
     points: Sequence[WalkPoint],
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
@@ -127,7 +127,7 @@ def _phases(
         Phase(
             since=since.sync,
             to=to.sync,
-            shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
+            shortest=max(0.0, min(least[to.sync] - least[since.sync], natural)),
             natural=natural,
             longest=None
             if to.held_with or not natural
@@ -135,6 +135,7 @@ def _phases(
             hold=to.held_with == to.sync,
         )
         for since, to in pairwise(points)
+        for natural in [max(0.0, times[to.sync] - times[since.sync])]
     )
 
 

@@ -21,15 +21,14 @@ from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, refuse, told
-from engage_hri.services.control.mujoco.film import Frame, filmed
-from engage_hri.services.control.mujoco.filming import film_of, finish, framed
+from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb
 from engage_hri.services.control.mujoco.motors import Motor
 from engage_hri.services.control.mujoco.physics import Physics
 from engage_hri.services.control.mujoco.robot import PREFIX, assembled
 from engage_hri.services.control.mujoco.settings import MujocoSettings
-from engage_hri.services.control.mujoco.stage import Stage, limits_of
+from engage_hri.services.control.mujoco.stage import DescribedStage, limits_of
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.tangram.table import tangram_table
@@ -53,8 +52,7 @@ class DescribedBody(ComposedBody):
         limits = {name: limits_of(name, part, ranges) for name, part in described.parts.items()}
         own = {limit.joint: limit for each in limits.values() for limit in each}
         physics = Physics(copy(model), motors, own, at=0.0, prefix=PREFIX, seed=self._settings.seed)
-        self.stage = Stage(described, physics, limits)
-        physics.time = self.stage.pulse.now()
+        self.stage = DescribedStage(described, physics, limits)
         self._limbs = _limbs(described, self.stage)
         super().__init__([Member(limb.part, limb, (limb.part,)) for limb in self._limbs])
         self.capabilities = _capabilities(described, self.stage, self.capabilities)
@@ -63,16 +61,9 @@ class DescribedBody(ComposedBody):
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
-        """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
-        async with super().connected():
-            film = film_of(self.stage.physics.model, self._settings)
-            try:
-                async with filmed(film, self.frame):
-                    yield
-            finally:
-                self.stage.pulse.stop()
-                if film is not None:
-                    finish(film, self._settings)
+        film = filming(self.stage.physics.model, self._settings, self.frame, self.stage.pulse)
+        async with super().connected(), film:
+            yield
 
     def frame(self) -> Frame:
         """The robot as a film shows it now."""
@@ -144,7 +135,7 @@ def _shoulder(body: Body, target: tuple[float, float, float]) -> Seconds:
     return math.dist(body.axis(body.rest).origin, target)
 
 
-def _limbs(described: Description, stage: Stage) -> list[Limb]:
+def _limbs(described: Description, stage: DescribedStage) -> list[Limb]:
     """The parts that move on their own. Joints of a torso only hold."""
     model, found = stage.physics.model, list[Limb]()
     if (head := described.head) is not None:
@@ -159,7 +150,7 @@ def _limbs(described: Description, stage: Stage) -> list[Limb]:
     return found
 
 
-def _capabilities(described: Description, stage: Stage, of_parts: Capabilities) -> Capabilities:
+def _capabilities(described: Description, stage: DescribedStage, of_parts: Capabilities) -> Capabilities:
     joints = tuple(
         replace(
             limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=MEASURED_SPEED * limit.speed,
