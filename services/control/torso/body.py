@@ -41,7 +41,6 @@ from engage_hri.services.control.figure.repertoire_files import repertoire_of
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.torso.mouth import Mouth
-from engage_hri.services.control.torso.postures import is_brief, postures
 from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.torso import Torso
@@ -112,7 +111,9 @@ class SimulatedBody(WalkingBody[Run]):
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         return self._estimate(self.moves, behavior, pose, world)
 
-    def _estimate(self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+    def _estimate(
+        self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World, only: str = ""
+    ) -> Estimate:
         match behavior:
             case Speech() if self._deviations.of("voiceless"):
                 return Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak").estimate(behavior)
@@ -120,7 +121,7 @@ class SimulatedBody(WalkingBody[Run]):
                 return speech_estimate(behavior, uttered(behavior), torso.pose(world, pose))
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
-        estimate = torso.estimate(behavior, pose, world)
+        estimate = torso.estimate(behavior, pose, world, only)
         is_beneath = pose is None and choreography.is_shift(behavior) and torso.is_overlaid()
         return beneath_a_look(estimate) if is_beneath else estimate
 
@@ -147,12 +148,10 @@ class SimulatedBody(WalkingBody[Run]):
             going = ClockOfCopy(clock.at)
             copy = beside(self.moves, going, world)
             told |= zip(map(id, moving), (yield from rehearsed(copy, going, moving, others)), strict=True)
-        brief = [item for item in items if is_mine and is_brief(item) and id(item) not in told]
-        told |= zip(map(id, brief), (yield from postures(still, brief, world)), strict=True)
         for item in items:
             if id(item) not in told:
                 asked = (item.behavior, item.pose, world)
-                told[id(item)] = self._estimate(still, *asked) if is_mine else self.estimate(*asked)
+                told[id(item)] = self._estimate(still, *asked, item.only) if is_mine else self.estimate(*asked)
                 yield ELEMENTS
         return [told[id(item)] for item in items]
 

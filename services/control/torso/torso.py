@@ -20,7 +20,7 @@ from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.figure.course import Course, Situation
-from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate, poses
+from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate
 from engage_hri.services.control.figure.laid_paths import laid_path
 from engage_hri.services.control.figure.pace import return_time
 from engage_hri.services.control.figure.repertoire import Repertoire
@@ -63,14 +63,16 @@ class Torso(ClearOfTable):
 
     # -- planning -----------------------------------------------------------------------------------------------
 
-    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        """Estimate a movement by itself, from `pose` or from where its parts are."""
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World, only: str = "") -> Estimate:
+        """Estimate a movement by itself, from `pose` or from where its parts are. only: what is asked of a look or a
+        point, as of `EstimateItem`."""
         try:
             situation = self.situation(world, pose)
             course = choreography.plan(behavior, situation)
             is_moving = pose is None and not self.misbelieved
             path = self.path(course, None if is_moving else situation)
-            return self.told(behavior, course, path, situation, moving=is_moving)
+            only = only if isinstance(behavior, Gaze | Pointing) else ""
+            return self.told(behavior, course, path, situation, moving=is_moving, only=only)
         except Impossible as impossible:
             return impossible.estimate(behavior)
 
@@ -79,13 +81,14 @@ class Torso(ClearOfTable):
         return kinematics.pose_message(self.situation(world, pose).pose)
 
     def told(
-        self, behavior: BlockBehavior, course: Course, path: Path, situation: Situation, *, moving: bool = True
-    ) -> Estimate:
+        self, behavior: BlockBehavior, course: Course, path: Path, situation: Situation, *, moving: bool = True,
+        only: str = "",
+    ) -> Estimate:  # fmt: skip
         """Estimate a movement along a path that was laid for it. moving: it begins now, from where its parts are."""
         added = self._added(course) if moving else None
-        estimate = motion_estimate(behavior, course, path, *poses(course, situation.pose), added)
+        estimate = motion_estimate(behavior, course, path, situation.pose, added, only)
         leaves = next((point.sync for point in course.points if is_last_on_target(behavior, point.sync)), "")
-        if added is None or not leaves:
+        if added is None or not leaves or only:
             return estimate
         # The trunk has the part elsewhere by then, so its way home is another one.
         now, run = self.clock.time(), Run(behavior, course, MovementAuthority(behavior, leaves), Deviations(), 0)
