@@ -29,7 +29,7 @@ from contextlib import aclosing
 from math import inf
 from typing import Generic
 
-from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.bases.moving_parts import MovingParts, R
 from engage_hri.services.control.bases.watch import PATIENCE, Watch
@@ -45,6 +45,7 @@ from engage_hri.services.control.contract.body import (
 )
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.voice import speaking
 
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
@@ -107,6 +108,9 @@ class WalkingBody(Body, Generic[R]):
         return None if self._loop.time() >= until - EARLY else until
 
     # -- the walk -----------------------------------------------------------------------------------------------
+
+    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         going, watches, bell = (

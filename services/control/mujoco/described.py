@@ -12,13 +12,14 @@ import mujoco
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Phase
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.composed import ComposedBody
 from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
+from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, refuse, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
@@ -74,10 +75,7 @@ class DescribedBody(ComposedBody):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if isinstance(behavior, Wait):
-            seconds = behavior.duration or 0.0
-            phase = Phase(since="start", to="end", shortest=seconds, natural=seconds, hold=True)
-            here = pose or self.state().pose
-            return Estimate(behavior=behavior.id, feasible=True, phases=(phase,), pose_after=here, pose_end=here)
+            return wait_estimate(behavior, behavior.duration or 0.0, pose or self.state().pose)
         return super().estimate(behavior, pose, world)
 
     def rehearse_in_steps(

@@ -5,7 +5,7 @@ plan has come there *and* the daemon measures the joints there: never because a 
 """
 
 from collections import defaultdict
-from collections.abc import AsyncGenerator, Collection, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import AbstractAsyncContextManager
 from math import inf, radians
 from typing import ClassVar, Self
@@ -26,7 +26,6 @@ from engage_hri.services.control.contract.body import (
     BodyFailed,
     BodyState,
     MovementAuthority,
-    Progress,
 )
 from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.control.contract.refusals import Impossible
@@ -39,7 +38,6 @@ from engage_hri.services.control.reachy_mini.link import GAP, Connect, Daemon, L
 from engage_hri.services.control.reachy_mini.messages import Measured
 from engage_hri.services.control.reachy_mini.moves import Moves, Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
-from engage_hri.services.control.voice import speaking
 
 STANDING = {"right_antenna": radians(4.0), "left_antenna": radians(4.0)}
 """How far a joint may be off once it has come to stand: an antenna is a long lever on a small motor."""
@@ -64,9 +62,8 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         """
         LinkedBody.__init__(self, settings or ReachyMiniSettings(), connect or _over_the_network)
         WalkingBody.__init__(self)
-        types = (*courses.TYPES_OF_BEHAVIORS, Wait)
         self.capabilities = Capabilities(
-            body="reachy_mini", types=tuple(map(type_name, types)), parts=("head", "torso", "face"),
+            body="reachy_mini", types=tuple(map(type_name, courses.TYPES)), parts=("head", "torso", "face"),
             joints=joints.LIMITS,
         )  # fmt: skip
         self.patience = self.settings.patience
@@ -115,9 +112,6 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
             return self.moves.estimate(behavior, around, is_resting=pose is not None)
         except Impossible as impossible:
             return impossible.estimate(behavior)
-
-    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
 
     def state(self) -> BodyState:
         pose = self.moves.measured

@@ -11,20 +11,7 @@ from math import radians
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-    Face,
-    FaceFacs,
-    FaceLexeme,
-    FaceShift,
-    Gaze,
-    GazeShift,
-    Head,
-    HeadDirectionShift,
-    Pose,
-    Posture,
-    PostureShift,
-)
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, HeadDirectionShift, Pointing, Speech
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.vocabulary import normal
@@ -38,10 +25,8 @@ from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.joints import Angles, Mounting
 
 Looks = Gaze | GazeShift | HeadDirectionShift
-TYPES_OF_BEHAVIORS: tuple[type[BlockBehavior], ...] = (
-    Gaze, GazeShift, HeadDirectionShift, Head, Face, FaceLexeme, FaceFacs, FaceShift, Posture, PostureShift, Pose,
-)  # fmt: skip
-"""Types of behaviors that move it."""
+TYPES = tuple(each for each in choreography.TYPES if each not in (Pointing, Gesture, Speech))
+"""Types of behaviors that it performs."""
 LEAST = {"head": radians(0.3), "nod": 0.0, "torso": radians(0.4), "face": radians(1.5)}
 """A track that has less to go stays."""
 ANTENNAS: Mapping[str, tuple[float, float]] = {
@@ -65,7 +50,7 @@ def course(behavior: BlockBehavior, now: Circumstances) -> Course:
     """Work out a behavior. Raises Impossible."""
     if isinstance(behavior, Looks):
         return _look(behavior, now)
-    if not isinstance(behavior, TYPES_OF_BEHAVIORS):
+    if not isinstance(behavior, TYPES):
         raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type_name(behavior)}")
     made = choreography.plan(behavior, Situation(kinematics.HOME, kinematics.HOME, now.world))
     if made.parts == ("nod",):

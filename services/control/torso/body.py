@@ -44,7 +44,6 @@ from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.torso import Torso
-from engage_hri.services.control.voice import speaking
 from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
 from engage_hri.services.control.voice.timeline import uttered
@@ -156,13 +155,9 @@ class SimulatedBody(WalkingBody[Run]):
         return [told[id(item)] for item in items]
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        match behavior:
-            case Speech():
-                return self._speak(behavior, authority)
-            case Wait():
-                return speaking.wait(behavior, authority)
-            case _:
-                return self.walk(behavior, authority)
+        if isinstance(behavior, Speech):
+            return self._speak(behavior, authority)
+        return super().perform(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         if not parts or "voice" in parts:
