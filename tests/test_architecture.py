@@ -60,7 +60,7 @@ LAYERS = {
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
     "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often sight"
     " > config journal keyring",
-    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating figure serving voice"
+    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",
     "services/commandline": "look robot > study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > hearing > studied > faulting > feeds people > chunking event_stream"
@@ -357,7 +357,6 @@ def test_no_module_imports_itself_through_others() -> None:
 
 SEAMS = {
     "services/recording: Records": "a list fulfils it, too",
-    "services/control/torso: Parts": "known: the torso is still cut in slices",
 }
 """Protocols of which there is one class in their folder, and why they stand all the same."""
 
