@@ -6,9 +6,10 @@ there, one step at a time, and what comes out is carried out here.
 
 import asyncio
 import logging
-from collections import deque
 from contextlib import aclosing, nullcontext
 from functools import partial
+
+from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
@@ -38,6 +39,8 @@ from engage_hri.services.control.serving.state_publisher import Shown
 from engage_hri.services.control.serving.warnings_told import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
+from engage_hri.services.runtime.noted import BusClock, NotedIntake
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -71,14 +74,14 @@ async def embody(
             "control: the body %s has no voice: %s", body.capabilities.body, VOICE_ADVICE
         )
     async with body.connected() if connects else nullcontext(), asyncio.TaskGroup() as tasks:
-        control = _Control(bus, config, body, tasks, covered_for)
+        control = _Control(bus, config, body, tasks)
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.questions.estimate)
             bus.answer(keys.DESCRIBE, control.questions.describe)
             tell_settings(bus, "control", told, config.files, covered_for=covered_for)
             ready()
             try:
-                control.begin()
+                control.begin(covered_for)
                 async for received in inbox:
                     with bus.containing(received):
                         control.take(received)
@@ -108,38 +111,35 @@ class _Stream:
 class _Control:
     """Hands what `embody` receives, and what the driver tells, to the intake, and carries out what comes of it."""
 
-    def __init__(
-        self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, covered_for: Seconds
-    ) -> None:
+    def __init__(self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup) -> None:
         self.desk = RequestDesk(
-            bus, "control", partial(self._serve, is_orphaned=True), on_extend=self._serve, on_hold=self._hand,
+            bus, "control", partial(self._serve, is_orphaned=True), on_extend=self._serve, on_hold=self._take,
             term=DEAD_MAN,
         )  # fmt: skip
         self._bus = bus
         self._body = body
         self._tasks = tasks
-        self._intake = ControlIntake(bus.robot, bus.clock, config, covered_for)
+        self._intake = ControlIntake(bus.robot, config, bus.clock)
         self._timer = Timer(self._advance)
-        self._steps = deque[steps.ControlStep | None]()
-        """Steps that have come while another is carried out; None: what is due by now."""
-        self._is_busy = False
+        self._steps = NotedIntake(bus, "control", self._intake, BusClock(bus), self._carry_out_safely)
         self._streams: dict[str, _Stream] = {}
         """Behaviors under way, by the names of their requests."""
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the names of the requests for it."""
-        self._known: steps.BodyKnown | None = None
-        """The body as it was told to the intake."""
+        self._faults = body.faults
+        """Faults that the body plays, as the intake was told."""
         self._looking_at = ""
-        """What the eyes rest on, as it was told to the intake."""
+        """What the eyes rest on, as the intake was told."""
         body.on_fault = self._complain
         body.on_recovery = partial(recovered, bus)
         calibration = calibrated(body, config.calibration)
         self.questions = Questions(bus, config, body, calibration, self._intake)
         self._shown = Shown(bus, body, config.state_rate, self._note_eyes, calibration)
 
-    def begin(self) -> None:
+    def begin(self, covered_for: Seconds) -> None:
         """Tell that nothing goes on yet, and look at the body for the first time."""
-        self._note_body()
+        begun = steps.ControlBegan(able=self._body.capabilities, covered_for=covered_for, faults=self._faults)
+        self._take(begun)
         self._shown.look()
 
     def close(self) -> None:
@@ -152,7 +152,9 @@ class _Control:
     def take(self, received: Received) -> None:
         """Take a message."""
         if isinstance(received.message, World):
-            self._hand(received.message)
+            world = Input(received.key, received.message, received.source, received.at, received.past, received.life)
+            self._steps.take(world, received.number)
+            self._timer.set(self._steps.deadline)
         elif (request := self.desk.take(received)) is not None:
             self._serve(request)
 
@@ -160,53 +162,41 @@ class _Control:
         """Hand over a request of the desk. is_orphaned: it is the end of one that has lost its requester."""
         with self.desk.serving(request):
             id = self.desk.asked(request.id).id
-            self._note_body()
+            self._note_faults()
             handed = steps.RequestHanded(request=request, asked=id, is_orphaned=is_orphaned)  # type: ignore[arg-type]
-            self._hand(handed)
+            self._take(handed)
+
+    def _take(self, step: steps.ControlStep) -> None:
+        """Take a step that comes by no bus."""
+        self._steps.take_own(step)
+        self._timer.set(self._steps.deadline)
+        if not isinstance(step, steps.ControlBegan | steps.EyesMoved | steps.RequestHanded):
+            self._shown.look_soon()
 
     def _advance(self) -> None:
         with self._bus.containing("what is due by now"):
-            self._hand(None)
+            self._steps.advance()
+        self._timer.set(self._steps.deadline)
 
     def _complain(self, fault: Fault) -> None:
+        """Take a fault of the body outside of any behavior."""
         with self._bus.containing("a fault of the body"):
-            self._hand(steps.BodyComplained(fault))
+            self._take(steps.BodyComplained(fault))
 
-    def _hand(self, step: steps.ControlStep | None) -> None:
-        """Hand a step to the intake, and carry out what comes of it.
+    def _carry_out_safely(self, output: Struct) -> None:
+        """Carry out an effect. An error of a driver that it meets keeps none of the others from it."""
+        with self._bus.containing(output):
+            self._carry_out(output)
 
-        Whatever follows at once, as from a driver that breaks as it is told to end, is the next step: the intake is
-        never asked in the middle of one.
-        """
-        self._steps.append(step)
-        if self._is_busy:
-            return
-        self._is_busy = True
-        try:
-            while self._steps:
-                self._step(self._steps.popleft())
-        finally:
-            self._is_busy = False
-            self._timer.set(self._intake.deadline)
-
-    def _step(self, step: steps.ControlStep | None) -> None:
-        now = self._bus.now()
-        outputs = self._intake.advance(now) if step is None else self._intake.take(step, now)
-        for output in outputs:
-            with self._bus.containing(output):
-                self._carry_out(output)
-        if not isinstance(step, World | steps.EyesMoved | steps.RequestHanded | steps.BodyKnown):
-            self._shown.look_soon()
-
-    def _carry_out(self, output: effects.Effect) -> None:
+    def _carry_out(self, output: Struct) -> None:
         match output:
-            case effects.Announce(key=key, message=message):
+            case PublishMessage(key=key, message=message):
                 self._bus.publish(key, message)
-            case effects.Reply(answer=Accepted(id=id)):
+            case AnswerRequest(answer=Accepted(id=id)):
                 self.desk.accept(id)
-            case effects.Reply(answer=Refused(id=id, fault=fault)):
+            case AnswerRequest(answer=Refused(id=id, fault=fault)):
                 self.desk.refuse(id, fault)
-            case effects.Reply(answer=outcome):
+            case AnswerRequest(answer=outcome):
                 self.desk.end(outcome)
             case effects.Alert(fault=fault):
                 warn(self._bus, fault)
@@ -256,7 +246,7 @@ class _Control:
         """Take note that the body itself has revoked an authority."""
         if (how := stream.authority.revoked) is not None and not stream.is_revoked:
             stream.is_revoked = True
-            self._hand(steps.AuthorityRevoked(request=id, how=how))
+            self._take(steps.AuthorityRevoked(request=id, how=how))
 
     async def _perform(self, begun: effects.BeginBehavior, stream: _Stream) -> None:
         """Let the driver perform a behavior, and pass on what it tells."""
@@ -282,12 +272,12 @@ class _Control:
             ended = steps.StreamEnded(request=id, how="broken", fault=fault)
         del self._streams[id]
         self._look()
-        self._hand(ended)
+        self._take(ended)
 
     def _note_progress(self, id: str, stream: _Stream, told: object) -> None:
-        self._note_body()
+        self._note_faults()
         progress = sound(told)
-        self._hand(steps.BodyTold(request=id, progress=progress))
+        self._take(steps.BodyTold(request=id, progress=progress))
         if not stream.is_left and not isinstance(progress, steps.Nonsense | Spoke):
             self._look(id, progress.at)
 
@@ -304,7 +294,7 @@ class _Control:
             fault = self._bus.failed(error, f"way home {why}")
             ended = steps.HomeEnded(request=id, parts=parts, fault=fault, is_told=True)
         self._look()
-        self._hand(ended)
+        self._take(ended)
 
     def _play(self, request: SwitchFaults, faults: tuple[BodyFault, ...]) -> None:
         fault = None
@@ -314,18 +304,17 @@ class _Control:
             fault = error.fault
         except Exception as error:
             fault = self._bus.failed(error, request)
-        self._note_body()
-        by, faults = request.requester, self._body.faults
-        self._hand(steps.FaultsPlayed(request=request.id, by=by, faults=faults, fault=fault))
+        self._note_faults()
+        played = steps.FaultsPlayed(request=request.id, by=request.requester, faults=self._faults, fault=fault)
+        self._take(played)
 
     # -- what the body is ---------------------------------------------------------------------------------------
 
-    def _note_body(self) -> None:
-        """Tell the intake what the body can do, and which faults it plays, if that has changed."""
-        known = steps.BodyKnown(able=self._body.capabilities, faults=self._body.faults)
-        if known != self._known:
-            self._known = known
-            self._hand(known)
+    def _note_faults(self) -> None:
+        """Tell the intake which faults the body plays, if that has changed."""
+        if (faults := self._body.faults) != self._faults:
+            self._faults = faults
+            self._take(steps.FaultsChanged(faults))
 
     def _look(self, id: str = "", at: Seconds | None = None) -> None:
         """Look at what the eyes rest on. id: name of the request whose behavior has told of its progress, `at`."""
@@ -336,4 +325,4 @@ class _Control:
         """Tell the intake what the eyes rest on, if that has changed."""
         if on != self._looking_at:
             self._looking_at = on
-            self._hand(steps.EyesMoved(on=on, at=self._bus.now() if at is None else at, request=id))
+            self._take(steps.EyesMoved(on=on, at=self._bus.now() if at is None else at, request=id))

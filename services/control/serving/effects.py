@@ -1,30 +1,14 @@
-"""Effects of a step of control: what its service is to carry out. Pure."""
+"""Effects of a step of control, besides messages and answers: what its service is to carry out. Pure."""
 
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import BehaviorAborted, BehaviorOutcome, HomeReached, PerformBehavior, PlannedInstant
-from engage_hri.schemas.body_faults import BodyFault, FaultsSwitched, SwitchFaults
+from engage_hri.schemas.body import PerformBehavior, PlannedInstant
+from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.messages import Message
-from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Revocation
-
-Answer = Accepted | Refused | BehaviorOutcome | BehaviorAborted | HomeReached | FaultsSwitched
-
-
-class Announce(Struct, frozen=True):
-    """Publish this message under this key."""
-
-    key: str
-    message: Message
-
-
-class Reply(Struct, frozen=True):
-    """Answer a request."""
-
-    answer: Answer
+from engage_hri.services.runtime.intake import AnswerRequest, PublishMessage
 
 
 class Alert(Struct, frozen=True):
@@ -106,6 +90,6 @@ class StopHome(Struct, frozen=True):
 
 
 Effect = (
-    Announce | Reply | Alert | Reassure | ShowWorld | PlayFaults | BeginBehavior | GiveAuthority | HoldBehavior
-    | RevokeAuthority | LeaveStream | TakeHome | StopHome
+    PublishMessage | AnswerRequest | Alert | Reassure | ShowWorld | PlayFaults | BeginBehavior | GiveAuthority
+    | HoldBehavior | RevokeAuthority | LeaveStream | TakeHome | StopHome
 )  # fmt: skip

@@ -1,12 +1,12 @@
 """Control between bus and body, pure: requests, time and what the driver tells come in; what is to be done comes out.
 
     intake = ControlIntake("robot", "clock", config)
-    effects = intake.take(step, now)            # one of `ControlStep`
+    effects = intake.take(input, now)           # a step: one of `ControlStep`
     effects = intake.advance(now)               # whenever `deadline` has been reached
 
-Given the same steps in the same order, at the same instants, the effects are the same (`again.py`). So nothing in
-here reads a clock or asks the body: what the service learns of the body it hands in, and what the body is to do it
-reads from the effects.
+Given the same steps in the same order, at the same instants, the effects are the same. So nothing in here reads a
+clock or asks the body (services/runtime/intake.py says why): what the service learns of the body it hands in, and
+what the body is to do it reads from the effects.
 
 A body is moved by several hands at once: requesters that extend, hold, abort and die, a driver that tells of its
 points and may break, other behaviors that take a part over. All of them change one table, `_live`, one at a time.
@@ -65,6 +65,7 @@ from engage_hri.services.control.serving.live_behavior import LiveBehavior
 from engage_hri.services.control.serving.words_for_voice import progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.requests.serving_effects import HoldRequest
+from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
 
 REVOKED_WITHIN: Seconds = 4.0
 """Seconds after which a behavior that was told to end is broken off; before the realizer gives it up."""
@@ -75,17 +76,17 @@ BROKEN_OFF_WITHIN: Seconds = 0.5
 class ControlIntake:
     """All of control but the lives of its requests, the calls of the driver, and the stream of its measurements."""
 
-    def __init__(self, robot: str, clock: str, config: ControlConfig, covered_for: Seconds = COVERED_FOR) -> None:
-        """clock: the one that `now` is read from. covered_for: see `CoveredObjects`."""
+    def __init__(self, robot: str, config: ControlConfig, clock: str) -> None:
+        """clock: name of the one that `now` is read from."""
         self.world = World(entities=())
         """The world as it is known now."""
         self._robot = robot
         self._clock = clock
         self._config = config
-        self._objects = CoveredObjects(covered_for)
+        self._objects = CoveredObjects(COVERED_FOR)
         self._able = Capabilities(body="", types=(), parts=())
-        self._faults: tuple[BodyFault, ...] | None = None
-        """Faults that the body plays; None: nothing is known of it yet."""
+        self._faults: tuple[BodyFault, ...] = ()
+        """Faults that the body plays."""
         self._live: dict[str, LiveBehavior] = {}
         """Behaviors under way, by the names of their requests."""
         self._holds: dict[str, Hold] = {}
@@ -118,10 +119,10 @@ class ControlIntake:
                 self._give_up(live) if live.is_broken_off else self._break_off(live)
         return self._take()
 
-    def take(self, step: steps.ControlStep, now: Seconds) -> list[effects.Effect]:
+    def take(self, input: Input[steps.ControlStep], now: Seconds) -> list[effects.Effect]:
         """Take a step."""
         self._now = now
-        match step:
+        match step := input.message:
             case World():
                 self.world = self._objects.see(step, now)
                 self._do(effects.ShowWorld(self.world))
@@ -129,8 +130,10 @@ class ControlIntake:
                 self._serve(step)
             case HoldRequest():
                 self._hold_unheard(step)
-            case steps.BodyKnown():
-                self._know(step)
+            case steps.ControlBegan():
+                self._open(step)
+            case steps.FaultsChanged(faults=faults):
+                self._faults = faults
             case steps.BodyTold(request=request, progress=progress) if (live := self._live.get(request)) is not None:
                 if isinstance(progress, steps.Nonsense):
                     self._leave(live, f"tells {progress.what}")
@@ -163,10 +166,10 @@ class ControlIntake:
         return Stamp(self._clock, self._now if at is None else at)
 
     def _publish(self, key: str, message: Message) -> None:
-        self._do(effects.Announce(key, message))
+        self._do(PublishMessage(key, message))
 
-    def _reply(self, answer: effects.Answer) -> None:
-        self._do(effects.Reply(answer))
+    def _reply(self, answer: Message) -> None:
+        self._do(AnswerRequest(answer))
 
     def _refuse(self, name: str, fault: Fault) -> None:
         self._reply(Refused(id=name, fault=fault))
@@ -322,7 +325,7 @@ class ControlIntake:
     def _tell(self, message: SyncPointArrived | SyncPointReached | WordSpoken) -> None:
         """Publish a message about a sync point, unless the fault `lost` is on and loses it."""
         self._sent += 1
-        on = Deviations(self._config.variability.seed, self._faults or ())
+        on = Deviations(self._config.variability.seed, self._faults)
         if not is_lost(on, self._sent, message.at.seconds):
             self._publish(keys.SYNC_POINT, message)
 
@@ -434,12 +437,13 @@ class ControlIntake:
 
     # -- what the body is, and faults that it plays ------------------------------------------------------------------
 
-    def _know(self, known: steps.BodyKnown) -> None:
-        is_first, self._able, self._faults = self._faults is None, known.able, known.faults
-        if is_first:
-            self._tell_held()
-            self._tell_faults(known.faults)
-            self._publish(keys.ROBOT_ONGOING, OngoingActions(actor=self._robot, at=self._stamp()))
+    def _open(self, begun: steps.ControlBegan) -> None:
+        """Take in what the body is, and tell that nothing goes on yet."""
+        self._able, self._faults = begun.able, begun.faults
+        self._objects = CoveredObjects(begun.covered_for)
+        self._tell_held()
+        self._tell_faults(begun.faults)
+        self._publish(keys.ROBOT_ONGOING, OngoingActions(actor=self._robot, at=self._stamp()))
 
     def _switch(self, request: SwitchFaults) -> None:
         try:
@@ -447,7 +451,7 @@ class ControlIntake:
                 if reason := flaw(fault, self._able):
                     advice = "`engage fault list` tells of all that it can play"
                     raise InputRefused(Fault(reason=reason, where=fault.kind, advice=advice, service="control"))
-            faults = switched(self._faults or (), request)
+            faults = switched(self._faults, request)
         except InputRefused as error:
             self._refuse(request.id, error.fault)
         else:

@@ -36,11 +36,22 @@ class RequestHanded(Struct, frozen=True, kw_only=True, tag="request_handed", omi
     is_orphaned: bool = False
 
 
-class BodyKnown(Struct, frozen=True, kw_only=True, tag="body_known", omit_defaults=True):
-    """The body says what it can do, and which faults it plays; at the beginning, and when that has changed."""
+class ControlBegan(Struct, frozen=True, kw_only=True, tag="control_began", omit_defaults=True):
+    """The service begins; always the first step.
+
+    able: what the body can do. faults: those that it plays. covered_for: see `CoveredObjects`; it is no setting of
+    control alone.
+    """
 
     able: Capabilities
+    covered_for: Seconds
     faults: tuple[BodyFault, ...] = ()
+
+
+class FaultsChanged(Struct, frozen=True, tag="faults_changed"):
+    """The body plays other faults than it did."""
+
+    faults: tuple[BodyFault, ...]
 
 
 class BodyTold(Struct, frozen=True, kw_only=True, tag="body_told", omit_defaults=True):
@@ -117,7 +128,7 @@ class BodyComplained(Struct, frozen=True, tag="body_complained"):
 
 
 ControlStep = (
-    World | RequestHanded | HoldRequest | BodyKnown | BodyTold | StreamEnded | AuthorityRevoked | EyesMoved
-    | HomeEnded | FaultsPlayed | BodyComplained
+    World | RequestHanded | HoldRequest | ControlBegan | FaultsChanged | BodyTold | StreamEnded | AuthorityRevoked
+    | EyesMoved | HomeEnded | FaultsPlayed | BodyComplained
 )  # fmt: skip
 """Everything by which control decides, but for the time."""
