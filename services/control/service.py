@@ -14,7 +14,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.covered import COVERED_FOR
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.requests import Accepted, Refused, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -130,7 +130,7 @@ class _Control:
         """Faults that the body plays, as the intake was told."""
         self._looking_at = ""
         """What the eyes rest on, as the intake was told."""
-        body.on_fault = self._complain
+        body.on_fault = lambda fault: self._take(steps.BodyComplained(fault))
         body.on_recovery = partial(recovered, bus)
         calibration = calibrated(body, config.calibration)
         self.questions = Questions(bus, config, body, calibration, self._intake)
@@ -164,24 +164,21 @@ class _Control:
             id = self.desk.asked(request.id).id
             self._note_faults()
             handed = steps.RequestHanded(request=request, asked=id, is_orphaned=is_orphaned)  # type: ignore[arg-type]
-            self._take(handed)
+            self._steps.take_own(handed)
+        self._timer.set(self._steps.deadline)
 
     def _take(self, step: steps.ControlStep) -> None:
         """Take a step that comes by no bus."""
-        self._steps.take_own(step)
+        with self._bus.containing(step):
+            self._steps.take_own(step)
         self._timer.set(self._steps.deadline)
-        if not isinstance(step, steps.ControlBegan | steps.EyesMoved | steps.RequestHanded):
+        if not isinstance(step, steps.ControlBegan | steps.EyesMoved):
             self._shown.look_soon()
 
     def _advance(self) -> None:
         with self._bus.containing("what is due by now"):
             self._steps.advance()
         self._timer.set(self._steps.deadline)
-
-    def _complain(self, fault: Fault) -> None:
-        """Take a fault of the body outside of any behavior."""
-        with self._bus.containing("a fault of the body"):
-            self._take(steps.BodyComplained(fault))
 
     def _carry_out_safely(self, output: Struct) -> None:
         """Carry out an effect. An error of a driver that it meets keeps none of the others from it."""

@@ -1,6 +1,6 @@
 """Control between bus and body, pure: requests, time and what the driver tells come in; what is to be done comes out.
 
-    intake = ControlIntake("robot", "clock", config)
+    intake = ControlIntake("robot", config, "clock")
     effects = intake.take(input, now)           # a step: one of `ControlStep`
     effects = intake.advance(now)               # whenever `deadline` has been reached
 
@@ -61,7 +61,7 @@ from engage_hri.services.control.contract.refusals import refusal
 from engage_hri.services.control.contract.variability import Deviations, is_lost
 from engage_hri.services.control.serving import effects, steps
 from engage_hri.services.control.serving.actions import ActionMessage, ActionReporter
-from engage_hri.services.control.serving.live_behavior import LiveBehavior
+from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status
 from engage_hri.services.control.serving.words_for_voice import progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.requests.serving_effects import HoldRequest
@@ -362,53 +362,49 @@ class ControlIntake:
     def _give_up(self, live: LiveBehavior) -> None:
         """End a behavior without its driver, which goes on with it whatever is done."""
         live.status = "failed"
-        self._finish(live)
+        self._finish(live, self._outcome(live))
         self._take_home(f"after {live.label} was given up")
 
     def _stream_ended(self, live: LiveBehavior, ended: steps.StreamEnded) -> None:
         """End a behavior as its driver has ended it."""
         if ended.how == "refused" and ended.fault is not None:
-            self._forget(live)
-            self._refuse(live.request.id, ended.fault)
-            self._end_aborts(live)
+            self._finish(live, Refused(id=live.request.id, fault=ended.fault))
             return
         if ended.how == "ended" and not live.is_broken and (missing := live.told.missing()):
             live.is_broken, live.fault = True, self._broken(live, f"tells {missing}")
         is_broken = live.is_broken or ended.how == "broken"
         if is_broken or ended.how == "failed":
             live.status, live.fault = "failed", ended.fault or live.fault
-        elif live.status == "aborted" and live.authority.revoked == "taken_over":
-            reason, where, by = "another behavior took its part", live.request.behavior.id, live.request.requester
-            live.status = "taken_over"
-            live.fault = Fault(reason=reason, where=where, cause="replaced", whose=by)
         elif live.status == "aborted":
-            live.status, live.fault = "lapsed" if live.lapses else "aborted", live.why
+            live.status, live.fault = self._end_of(live)
         if is_broken:
             self._take_home(f"after {live.label} broke")  # nobody knows where its parts are
-        self._finish(live)
+        self._finish(live, self._outcome(live))
+
+    def _end_of(self, live: LiveBehavior) -> tuple[Status, Fault | None]:
+        """Name the end of a behavior that was ended before its last sync point, and say why."""
+        if live.authority.revoked == "taken_over":
+            reason, where, by = "another behavior took its part", live.request.behavior.id, live.request.requester
+            return "taken_over", Fault(reason=reason, where=where, cause="replaced", whose=by)
+        return "lapsed" if live.lapses else "aborted", live.why
 
     def _broken(self, live: LiveBehavior, what: str) -> Fault:
         return Fault(reason=f"the body {self._able.body} {what}", where=live.label, service="control")
 
-    def _finish(self, live: LiveBehavior) -> None:
-        """Tell the end of a behavior."""
-        request = live.request
-        self._forget(live)
-        self._act(self._actions.ended(request.id, self._now))
-        outcome = BehaviorOutcome(
-            id=request.id, block=request.block, behavior=request.behavior.id, status=live.status, at=self._stamp(),
-            passed=live.passed, spoken=live.spoken, fault=live.fault,
+    def _outcome(self, live: LiveBehavior) -> BehaviorOutcome:
+        return BehaviorOutcome(
+            id=live.request.id, block=live.request.block, behavior=live.request.behavior.id, status=live.status,
+            at=self._stamp(), passed=live.passed, spoken=live.spoken, fault=live.fault,
         )  # fmt: skip
-        self._reply(outcome)
-        self._end_aborts(live)
 
-    def _forget(self, live: LiveBehavior) -> None:
-        del self._live[live.request.id]
-        if self._holds.pop(live.request.id, None) is not None:
+    def _finish(self, live: LiveBehavior, answer: Refused | BehaviorOutcome) -> None:
+        """Forget a behavior; answer its request, and the abort requests that waited for it and for no other one."""
+        name = live.request.id
+        del self._live[name]
+        if self._holds.pop(name, None) is not None:
             self._tell_held()
-
-    def _end_aborts(self, live: LiveBehavior) -> None:
-        """Answer the abort requests that waited for this behavior and wait for no other one."""
+        self._act(self._actions.ended(name, self._now))
+        self._reply(answer)
         awaited = {id for other in self._live.values() for id in other.aborts}
         for id in live.aborts:
             if id not in awaited:
