@@ -14,7 +14,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.covered import COVERED_FOR
-from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Accepted, Refused, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -182,8 +182,12 @@ class _Control:
 
     def _carry_out_safely(self, output: Struct) -> None:
         """Carry out an effect. An error of a driver that it meets keeps none of the others from it."""
-        with self._bus.containing(output):
+        with self._bus.containing(output, partial(self._undone, output)):
             self._carry_out(output)
+
+    def _undone(self, output: Struct, fault: Fault) -> None:
+        if isinstance(output, effects.BeginBehavior):
+            self._take(steps.StreamEnded(request=output.request.id, how="broken", fault=fault))
 
     def _carry_out(self, output: Struct) -> None:
         match output:
@@ -274,7 +278,9 @@ class _Control:
     def _note_progress(self, id: str, stream: _Stream, told: object) -> None:
         self._note_faults()
         progress = sound(told)
-        self._take(steps.BodyTold(request=id, progress=progress))
+        self._steps.take_own(steps.BodyTold(request=id, progress=progress))  # an error in it ends this behavior
+        self._timer.set(self._steps.deadline)
+        self._shown.look_soon()
         if not stream.is_left and not isinstance(progress, steps.Nonsense | Spoke):
             self._look(id, progress.at)
 
