@@ -126,8 +126,6 @@ class _Control:
         """Behaviors under way, by the names of their requests."""
         self._homeward: dict[str, asyncio.Task[None]] = {}
         """Tasks that take the body home, by the names of the requests for it."""
-        self._faults = body.faults
-        """Faults that the body plays, as the intake was told."""
         self._looking_at = ""
         """What the eyes rest on, as the intake was told."""
         body.on_fault = lambda fault: self._take(steps.BodyComplained(fault))
@@ -138,7 +136,7 @@ class _Control:
 
     def begin(self, covered_for: Seconds) -> None:
         """Tell that nothing goes on yet, and look at the body for the first time."""
-        begun = steps.ControlBegan(able=self._body.capabilities, covered_for=covered_for, faults=self._faults)
+        begun = steps.ControlBegan(able=self._body.capabilities, covered_for=covered_for, faults=self._body.faults)
         self._take(begun)
         self._shown.look()
 
@@ -162,7 +160,6 @@ class _Control:
         """Hand over a request of the desk. is_orphaned: it is the end of one that has lost its requester."""
         with self.desk.serving(request):
             id = self.desk.asked(request.id).id
-            self._note_faults()
             handed = steps.RequestHanded(request=request, asked=id, is_orphaned=is_orphaned)  # type: ignore[arg-type]
             self._steps.take_own(handed)
         self._timer.set(self._steps.deadline)
@@ -276,7 +273,6 @@ class _Control:
         self._take(ended)
 
     def _note_progress(self, id: str, stream: _Stream, told: object) -> None:
-        self._note_faults()
         progress = sound(told)
         self._steps.take_own(steps.BodyTold(request=id, progress=progress))  # an error in it ends this behavior
         self._timer.set(self._steps.deadline)
@@ -307,17 +303,10 @@ class _Control:
             fault = error.fault
         except Exception as error:
             fault = self._bus.failed(error, request)
-        self._note_faults()
-        played = steps.FaultsPlayed(request=request.id, by=request.requester, faults=self._faults, fault=fault)
+        played = steps.FaultsPlayed(request=request.id, by=request.requester, faults=self._body.faults, fault=fault)
         self._take(played)
 
-    # -- what the body is ---------------------------------------------------------------------------------------
-
-    def _note_faults(self) -> None:
-        """Tell the intake which faults the body plays, if that has changed."""
-        if (faults := self._body.faults) != self._faults:
-            self._faults = faults
-            self._take(steps.FaultsChanged(faults))
+    # -- what the eyes rest on ----------------------------------------------------------------------------------
 
     def _look(self, id: str = "", at: Seconds | None = None) -> None:
         """Look at what the eyes rest on. id: name of the request whose behavior has told of its progress, `at`."""

@@ -243,7 +243,7 @@ async def test_all_that_can_happen_to_a_behavior_happens(hub: MemoryHub) -> None
         )
 
     assert steps.keys() >= {
-        "control_began", "request_handed", "hold_request", "faults_changed", "body_told", "stream_ended",
+        "control_began", "request_handed", "hold_request", "body_told", "stream_ended",
         "authority_revoked", "eyes_moved", "home_ended", "faults_played", "body_complained",
     }  # fmt: skip
     assert did.keys() >= {

@@ -132,8 +132,6 @@ class ControlIntake:
                 self._hold_unheard(step)
             case steps.ControlBegan():
                 self._open(step)
-            case steps.FaultsChanged(faults=faults):
-                self._faults = faults
             case steps.BodyTold(request=request, progress=progress) if (live := self._live.get(request)) is not None:
                 if isinstance(progress, steps.Nonsense):
                     self._leave(live, f"tells {progress.what}")
@@ -438,7 +436,7 @@ class ControlIntake:
         self._able, self._faults = begun.able, begun.faults
         self._objects = CoveredObjects(begun.covered_for)
         self._tell_held()
-        self._tell_faults(begun.faults)
+        self._tell_faults()
         self._publish(keys.ROBOT_ONGOING, OngoingActions(actor=self._robot, at=self._stamp()))
 
     def _switch(self, request: SwitchFaults) -> None:
@@ -454,13 +452,14 @@ class ControlIntake:
             self._do(effects.PlayFaults(request, faults))
 
     def _faults_played(self, played: steps.FaultsPlayed) -> None:
+        self._faults = played.faults
         if played.fault is not None:
             self._refuse(played.request, played.fault)
             return
         self._reply(Accepted(id=played.request))
-        self._tell_faults(played.faults, played.by)
+        self._tell_faults(played.by)
         self._reply(FaultsSwitched(id=played.request, faults=played.faults))
 
-    def _tell_faults(self, faults: tuple[BodyFault, ...], by: str = "") -> None:
+    def _tell_faults(self, by: str = "") -> None:
         """Publish the faults that are on. by: who has switched them; they stay on when it goes, or is killed."""
-        self._publish(keys.BODY_FAULTS, BodyFaults(at=self._stamp(), faults=faults, by=by))
+        self._publish(keys.BODY_FAULTS, BodyFaults(at=self._stamp(), faults=self._faults, by=by))

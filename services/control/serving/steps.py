@@ -48,12 +48,6 @@ class ControlBegan(Struct, frozen=True, kw_only=True, tag="control_began", omit_
     faults: tuple[BodyFault, ...] = ()
 
 
-class FaultsChanged(Struct, frozen=True, tag="faults_changed"):
-    """The body plays other faults than it did."""
-
-    faults: tuple[BodyFault, ...]
-
-
 class BodyTold(Struct, frozen=True, kw_only=True, tag="body_told", omit_defaults=True):
     """The driver tells of a behavior. request: name of the request for it."""
 
@@ -109,7 +103,7 @@ class HomeEnded(Struct, frozen=True, kw_only=True, tag="home_ended", omit_defaul
 
 
 class FaultsPlayed(Struct, frozen=True, kw_only=True, tag="faults_played", omit_defaults=True):
-    """The body plays the faults that it was told to play, or refuses.
+    """The body plays the faults that it was told to play, or refuses. It changes them by nothing else.
 
     request: name of the request for it. by: participant that has asked. faults: all that it plays now. fault: why it
     refuses.
@@ -128,7 +122,7 @@ class BodyComplained(Struct, frozen=True, tag="body_complained"):
 
 
 ControlStep = (
-    World | RequestHanded | HoldRequest | ControlBegan | FaultsChanged | BodyTold | StreamEnded | AuthorityRevoked
-    | EyesMoved | HomeEnded | FaultsPlayed | BodyComplained
+    World | RequestHanded | HoldRequest | ControlBegan | BodyTold | StreamEnded | AuthorityRevoked | EyesMoved
+    | HomeEnded | FaultsPlayed | BodyComplained
 )  # fmt: skip
 """Everything by which control decides, but for the time."""
