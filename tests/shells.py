@@ -6,11 +6,9 @@ SHELLS = {
     "services/realizer/perform/presence.py",  # wakes who waits for a service
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
-    "services/control/serving/behavior_task.py",  # breaks off what a body does not end
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/serving/estimates.py",  # publishes mistakes of the body
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
-    "services/control/serving/fault_switch.py",  # publishes the faults that are on
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report/feedback.py",  # publishes feedback
     "services/realizer/perform/behavior_run.py",  # awaits sync points
