@@ -32,8 +32,7 @@ from engage_hri.services.control.motion.path import JointMotion, Leg, Path, rest
 from engage_hri.services.control.torso import postures
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.outlines import Asked, outlines
-from engage_hri.services.runtime.steps import finished
-from engage_hri.services.runtime.unhurried import SLICE
+from engage_hri.services.runtime.steps import SLICE, finished
 
 ROUNDING = 1e-9
 """Degrees by which an estimate of a posture may differ from a full one. Seen: 1e-12."""

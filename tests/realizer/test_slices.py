@@ -20,8 +20,8 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block, plan_steps
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.together import planning
-from engage_hri.services.runtime.steps import Steps, finished, portions
-from engage_hri.services.runtime.unhurried import SLICE, unhurried
+from engage_hri.services.runtime.steps import SLICE, Steps, finished, portions
+from engage_hri.services.runtime.unhurried import unhurried
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
 from tests.realizer.stage import Stage, block, stage, together
