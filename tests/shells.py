@@ -19,8 +19,6 @@ SHELLS = {
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/together/live.py",  # resolved when a block has ended
-    "services/generation/body_link.py",  # asks the body
-    "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/contract/body.py",  # the interface of bodies: coroutines
     "services/control/bases/one_part_motion.py",  # a body that moves on the loop's clock
     "services/control/bases/setpoints.py",  # set points on the loop's clock

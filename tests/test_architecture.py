@@ -65,7 +65,7 @@ LAYERS = {
     "services/commandline": "look robot > study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > hearing > studied > faulting > feeds people > chunking event_stream"
     " inputs results steering",
-    "services/generation": "service > fragment_runner > performance > body_link choosing_again"
+    "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config points",

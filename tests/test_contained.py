@@ -39,9 +39,9 @@ def breaking(attribute: str) -> Callable[..., Any]:
 @pytest.mark.parametrize(
     ("place", "what"),
     [
-        ("engage_hri.services.generation.fragment_runner.FragmentRunner.admit", "perform"),
+        ("engage_hri.services.generation.fragments.Fragments.admit", "perform"),
         ("engage_hri.services.generation.pipeline.weigh", "perform"),
-        ("engage_hri.services.generation.fragment_runner.planning", "perform"),
+        ("engage_hri.services.generation.fragments.planning", "perform"),
         ("engage_hri.services.realizer.together.planning.plan_tries", "realize"),
         ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),
