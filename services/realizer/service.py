@@ -36,13 +36,11 @@ from engage_hri.services.realizer.perform.performance import BlockPerformance, S
 from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
-from engage_hri.services.realizer.plan.past import LASTING, Past
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.plan.relations import LASTING, BlockRefused
 from engage_hri.services.realizer.together.live import Ending, Live, absence, told
-from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past, WaitingBlock
 from engage_hri.services.realizer.together.planning import Planning
-from engage_hri.services.realizer.together.waiting_block import WaitingBlock
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.requests.silence import unfinished
 from engage_hri.services.runtime.service import Ready

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.realizer.plan.instants import Classes, instants
-from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
+from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Term, instants
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.random_cases import share_of
 

@@ -18,8 +18,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.dependence import needed_by, waiting_for
-from engage_hri.services.realizer.together.live_blocks import LiveBlocks
-from engage_hri.services.realizer.together.waiting_block import WaitingBlock
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks, WaitingBlock
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.services.realizer.perform import performance as executor
-from engage_hri.services.realizer.plan.again import planned_again
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import planned_again
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together

@@ -4,8 +4,8 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gesture, Speech
-from engage_hri.services.realizer.plan.given_up import Times
 from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.losses import Times
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point

@@ -11,13 +11,11 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Pointing, Posture, Speech, Timing, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.services.realizer.plan.deadlocks import clashes
-from engage_hri.services.realizer.plan.given_up import Times
-from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import Holder, Known, qualified
+from engage_hri.services.realizer.plan.losses import Times, clashes
 from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
-from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Order, Relations, Term
+from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Order, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.random_cases import share_of
 from tests.realizer.oracle import SEVEN, estimate, phases_of, points_of, relaxed

@@ -16,8 +16,8 @@ from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.services.realizer.net.petri_net import PetriNet, Place, Transition
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from engage_hri.services.realizer.plan.schedule import Circle
 from engage_hri.services.realizer.plan.speaking_order import SpeakingOrder
 from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of

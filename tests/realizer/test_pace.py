@@ -11,8 +11,8 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.effects import Begin, Extend
 from engage_hri.services.realizer.foresee.expected_times import differ_noticeably
+from engage_hri.services.realizer.plan.plan import BRIEF, slack
 from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.realizer.plan.slack import BRIEF, slack
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import SEVEN, FakeBody, Script
 from tests.realizer.planning import elastic, timed

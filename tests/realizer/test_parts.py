@@ -8,13 +8,12 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Gesture, Head, Speech
 from engage_hri.services.realizer.plan import planner
-from engage_hri.services.realizer.plan.deadlocks import clashes
-from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import Known
+from engage_hri.services.realizer.plan.losses import clashes
 from engage_hri.services.realizer.plan.phases import chain
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.realizer.plan.relations import Equal, Term
+from engage_hri.services.realizer.plan.relations import Classes, Equal, Term
 from engage_hri.services.realizer.plan.schedule import Solution
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody

@@ -11,11 +11,10 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Pointing, Posture, Speech, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, Estimate, JointAngle, Phase
-from engage_hri.services.realizer.plan.agreement import between, difference
+from engage_hri.services.realizer.plan.agreement import between, difference, planned_times, poses_before
 from engage_hri.services.realizer.plan.known import Holder, Known, qualified
 from engage_hri.services.realizer.plan.phases import chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
-from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pytest
 
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
-from engage_hri.services.realizer.plan.prediction import Impossible, predict
+from engage_hri.services.realizer.plan.schedule import Impossible, predict
 
 
 def net(size: int, places: tuple[Place, ...], bounds: tuple[Bound, ...] = ()) -> PetriNet:

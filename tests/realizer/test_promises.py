@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.behaviors import FaceLexeme, Gesture, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.services.realizer.plan.promises import broken_by
+from engage_hri.services.realizer.plan.plan import broken_by
 from engage_hri.services.realizer.plan.relations import Relations, relations_of
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.fake_body import FakeBody, Script

@@ -17,12 +17,12 @@ from engage_hri.services.realizer.net.clocks import Clocks
 from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.perform.futures import SyncPointFutures
 from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
-from engage_hri.services.realizer.plan.past import Past
-from engage_hri.services.realizer.plan.unsupported import kind_of
+from engage_hri.services.realizer.plan.remaining import kind_of
 from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.realizer.report.outcome import completed
 from engage_hri.services.realizer.report.spoken import Spoken
 from engage_hri.services.realizer.together.live import Ending, Live
+from engage_hri.services.realizer.together.live_blocks import Past
 from tests.random_cases import share_of
 from tests.realizer.planning import plan
 from tests.realizer.stage import block

@@ -13,10 +13,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
-from engage_hri.services.realizer.plan.cycles import components
-from engage_hri.services.realizer.plan.numbering import numbered
-from engage_hri.services.realizer.plan.prediction import Foresight, Impossible, predict
-from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, critical_path, solve
+from engage_hri.services.realizer.plan.assembly import components, numbered
+from engage_hri.services.realizer.plan.schedule import (
+    Foresight,
+    Impossible,
+    Lag,
+    PositiveCycle,
+    Solution,
+    critical_path,
+    predict,
+    solve,
+)
 from tests.random_cases import share_of
 
 QUARTERS = st.integers(-8, 8).map(lambda each: each / 4)

@@ -8,8 +8,8 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, Estimate, JointAngle, Phase
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.control.config import Variability
+from engage_hri.services.realizer.plan.agreement import poses_before
 from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.realizer.plan.poses import poses_before
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, stage

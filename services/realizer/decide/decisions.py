@@ -18,11 +18,10 @@ from engage_hri.services.realizer.decide.held_up import HeldUp
 from engage_hri.services.realizer.decide.lateness import LatenessWatch
 from engage_hri.services.realizer.decide.stopped import stopped
 from engage_hri.services.realizer.foresee.expected_times import Foresight, differ_noticeably
+from engage_hri.services.realizer.net.clocks import NO_STOPS, Stops
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
-from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.promises import Broken, Promises
+from engage_hri.services.realizer.plan.plan import Broken, Plan, Promises
 from engage_hri.services.realizer.points import ORIGIN, Point, performer
 
 

@@ -14,8 +14,7 @@ from engage_hri.services.realizer.decide.stuck import Stuck, fixed_times
 from engage_hri.services.realizer.foresee.expected_times import Foresight
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.slack import BRAKING, UNNOTICED, slack
+from engage_hri.services.realizer.plan.plan import BRAKING, UNNOTICED, Plan, slack
 from engage_hri.services.realizer.points import EPSILON, WITH_STROKE, Member, Point, frozen
 
 LEAD: Seconds = 0.3

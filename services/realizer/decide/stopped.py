@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.held_up import HeldUp
+from engage_hri.services.realizer.net.clocks import Stops
 from engage_hri.services.realizer.net.facts import Facts
-from engage_hri.services.realizer.net.stops import Stops
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.points import ORIGIN, Point, stands_soon
 

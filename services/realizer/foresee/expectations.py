@@ -1,7 +1,7 @@
 """Expectations of a running block as its news come: what was measured, said, held, and what other blocks expect.
 
 They say "not before"; who is released by a measured event need not ask them. So they may fall behind: what they are
-told waits until `update`. What is asked of them is in `foresight.py`.
+told waits until `update`. What is asked of them is in `Foresight`.
 """
 
 import heapq
@@ -16,8 +16,7 @@ from engage_hri.services.realizer.foresee.from_scratch import is_predictive
 from engage_hri.services.realizer.foresee.utterances import Interval, Utterances
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.slack import BRAKING
+from engage_hri.services.realizer.plan.plan import BRAKING, Plan
 from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point, frozen, performer, stands_soon
 
 SURPRISE: Seconds = 0.008

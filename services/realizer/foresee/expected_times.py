@@ -10,7 +10,7 @@ from engage_hri.services.realizer.foresee.forecast import Forecast
 from engage_hri.services.realizer.foresee.from_scratch import full_forecast
 from engage_hri.services.realizer.foresee.outlook import Outlook
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
-from engage_hri.services.realizer.plan.slack import slack
+from engage_hri.services.realizer.plan.plan import slack
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point
 
 

@@ -9,8 +9,8 @@ from functools import partial
 from math import inf, isfinite
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.net.clocks import Hold
 from engage_hri.services.realizer.net.running import RunningNet
-from engage_hri.services.realizer.net.stops import Hold
 from engage_hri.services.realizer.points import Point, frozen
 
 STANDING: Seconds = 0.5

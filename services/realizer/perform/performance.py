@@ -37,10 +37,10 @@ from engage_hri.services.realizer.perform.futures import PointPassed, SyncPointF
 from engage_hri.services.realizer.perform.net_stream import NetStream
 from engage_hri.services.realizer.perform.presence import Presence
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
-from engage_hri.services.realizer.plan.again import planned_again, reestimated
 from engage_hri.services.realizer.plan.known import Known, is_named_in
-from engage_hri.services.realizer.plan.needs import events_needing, without
 from engage_hri.services.realizer.plan.plan import Plan
+from engage_hri.services.realizer.plan.planner import planned_again, reestimated
+from engage_hri.services.realizer.plan.remaining import events_needing, without
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point, frozen
 from engage_hri.services.realizer.report.feedback import News, Reporter

@@ -1,20 +1,24 @@
-"""Relations between points, assembled into a Petri net: the middle part of planning."""
+"""Relations between points, assembled into a Petri net: the middle part of planning.
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+The transitions are numbered in an order in which they can fire, the same for any order of elements: two blocks that
+say the same get the same net. Points that wait for each other in a circle come last; these circles are the strongly
+connected components of the ties.
+"""
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+from math import inf
+from typing import TypeVar
 
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import SERIES, TYPES
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
-from engage_hri.services.realizer.plan.cycles import components
 from engage_hri.services.realizer.plan.handover import Arrangement, is_tied
-from engage_hri.services.realizer.plan.instants import Classes, Instant, instants
-from engage_hri.services.realizer.plan.numbering import numbered
-from engage_hri.services.realizer.plan.phases import RESERVE, Chain
-from engage_hri.services.realizer.plan.relations import Order, Relations
-from engage_hri.services.realizer.plan.stops import prolonged
+from engage_hri.services.realizer.plan.phases import RESERVE, Chain, prolonged
+from engage_hri.services.realizer.plan.relations import Classes, Instant, Order, Relations, instants
 from engage_hri.services.realizer.points import (
     EPSILON,
     ORIGIN,
@@ -26,6 +30,113 @@ from engage_hri.services.realizer.points import (
     gate_point,
     performer,
 )
+
+
+def components(size: int, out: Mapping[int, Sequence[int]]) -> list[list[int]]:
+    """The strongly connected components of a graph of `size` nodes. Kosaraju, without recursion."""
+    into: dict[int, list[int]] = {}
+    for source, targets in out.items():
+        for target in targets:
+            into.setdefault(target, []).append(source)
+    groups = []
+    taken = bytearray(size)
+    for root in reversed(_left(size, out)):
+        if taken[root]:
+            continue
+        taken[root] = 1
+        group = [root]
+        for here in group:  # which grows meanwhile
+            for source in into.get(here, ()):
+                if not taken[source]:
+                    taken[source] = 1
+                    group.append(source)
+        groups.append(sorted(group))
+    return groups
+
+
+def _left(size: int, out: Mapping[int, Sequence[int]]) -> list[int]:
+    """Nodes in the order in which a depth-first search leaves them."""
+    finished: list[int] = []
+    seen = bytearray(size)
+    for root in range(size):
+        stack = [] if seen[root] else [(root, iter(out.get(root, ())))]
+        seen[root] = 1
+        while stack:
+            here, rest = stack[-1]
+            for step in rest:
+                if not seen[step]:
+                    seen[step] = 1
+                    stack.append((step, iter(out.get(step, ()))))
+                    break
+            else:
+                finished.append(here)
+                stack.pop()
+    return finished
+
+
+_Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], tuple[Seconds, str]]
+TieT = TypeVar("TieT", Place, Bound)
+
+
+def numbered(
+    transitions: Sequence[Transition], places: Sequence[Place], bounds: Sequence[Bound]
+) -> tuple[PetriNet, list[int], bool]:
+    """The net, the former number of each transition, and whether they can all fire in this order.
+
+    Transitions that wait for each other come last, before the end.
+    """
+    ranked = _firing_order(len(transitions), places)
+    is_ordered = len(ranked) == len(transitions)
+    if not is_ordered:
+        known = set(ranked)
+        ranked += [each for each in range(len(transitions)) if each not in known]
+    number = [0] * len(ranked)
+    for new, old in enumerate(ranked):
+        number[old] = new
+    ties = _renumbered(places, number, lambda place: (place.shortest, place.after))
+    limits = _renumbered(bounds, number, lambda bound: (inf if bound.stretch is None else bound.stretch, ""))
+    placed = [
+        Place(kind, source, target, lag, shortest, behavior, lines, after)
+        for source, target, kind, lag, behavior, lines, (shortest, after) in _in_order(ties)
+    ]
+    bounded = [
+        Bound(kind, source, target, lag, None if stretch == inf else stretch, behavior, lines)
+        for source, target, kind, lag, behavior, lines, (stretch, _) in _in_order(limits)
+    ]
+    net = PetriNet(tuple([transitions[each] for each in ranked]), tuple(placed), tuple(bounded))
+    return net, ranked, is_ordered
+
+
+def _renumbered(
+    ties: Sequence[TieT], number: Sequence[int], last: Callable[[TieT], tuple[Seconds, str]]
+) -> list[_Tie]:
+    """Each place or bound as a tuple that can be sorted, with the new numbers of its ends."""
+    return [(number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, last(it)) for it in ties]
+
+
+def _firing_order(size: int, places: Sequence[Place]) -> list[int]:
+    """The transitions as they can fire, but the last one and those that wait for each other."""
+    out: list[list[int]] = [[] for _ in range(size)]
+    missing = [0] * size
+    for place in places:
+        if place.kind != "idle":
+            out[place.source].append(place.target)
+            missing[place.target] += 1
+    ready = [each for each in range(size - 1) if not missing[each]]
+    found: list[int] = []
+    while ready:
+        found.append(here := heapq.heappop(ready))
+        for target in out[here]:
+            missing[target] -= 1
+            if not missing[target]:
+                heapq.heappush(ready, target)
+    return found
+
+
+def _in_order(ties: list[_Tie]) -> list[_Tie]:
+    """The ties in order, without repetitions."""
+    ties.sort()
+    return [tie for tie, before in zip(ties, [None, *ties], strict=False) if tie != before]
 
 
 class Assembly(Struct, frozen=True):

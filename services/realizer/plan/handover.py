@@ -14,10 +14,10 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
-from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.net.clocks import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.phases import ARMS, Chain
-from engage_hri.services.realizer.plan.relations import Relations
+from engage_hri.services.realizer.plan.relations import Classes, Relations
+from engage_hri.services.realizer.plan.schedule import Circle
 from engage_hri.services.realizer.points import EPSILON, ON_TARGET, SHIFTS, WITH_STROKE, Point
 
 _OTHER: Mapping[str, tuple[str, Hand]] = {
@@ -397,3 +397,18 @@ def with_hands(block: Block, hands: Mapping[str, Hand]) -> Block:
         return block
     chosen = [replace(each, mode=hand) if (hand := hands.get(each.id)) else each for each in block.behaviors]
     return replace(block, behaviors=tuple(chosen))
+
+
+Ends = tuple[int, int]
+"""Transitions of the point that is waited for, and of the start of who waits."""
+
+
+def by_ends(turns: Iterable[Turn], at: Mapping[Point, int]) -> dict[Ends, Turn]:
+    """Turns by where they stand in a net. at: the transition of each point."""
+    return {(at[point], at[Point(id, "start")]): (id, point) for id, point in sorted(turns)}
+
+
+def turns_in(ends: Mapping[Ends, Turn], *circles: Circle) -> Iterator[Turn]:
+    """The turns that circles of ties go through, in their order."""
+    ties = ((tie.source, tie.target) for circle in circles for tie, _ in circle if tie.kind == "series")
+    yield from (ends[each] for each in ties if each in ends)

@@ -32,7 +32,7 @@ from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.handover import Turn, least
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.plan.spare_time import distances, spare_times
+from engage_hri.services.realizer.plan.schedule import distances, spare_times
 from engage_hri.services.realizer.points import EPSILON, SHIFTS
 
 

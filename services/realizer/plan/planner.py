@@ -3,6 +3,8 @@
 Refused here, before anything moves: references to nothing, contradictions, and circles of waiting. Dropped here,
 each with a warning: behaviors that the body cannot do, and those that cannot be on time. Document order decides only
 between equals; any other permutation of a block gives the same net.
+
+A block that is being performed is planned again when something was dropped, others came, or motions take longer.
 """
 
 from collections.abc import Collection, Container, Generator, Iterable, Mapping
@@ -16,30 +18,28 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
-from engage_hri.services.realizer.plan import points_of_others, unsupported
+from engage_hri.services.realizer.plan import other_blocks
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly
-from engage_hri.services.realizer.plan.comparison import compared
-from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
-from engage_hri.services.realizer.plan.given_up import Times
 from engage_hri.services.realizer.plan.handover import (
     Arrangement,
     Conflict,
     Hands,
     Turn,
     arrange,
+    by_ends,
     kept_points,
+    turns_in,
     with_hands,
 )
-from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
-from engage_hri.services.realizer.plan.manner import AT_EASE, Late, Manner, eased, standing
-from engage_hri.services.realizer.plan.needs import falling, without
+from engage_hri.services.realizer.plan.losses import Loss, Losses, Times, clashes, judge
+from engage_hri.services.realizer.plan.other_blocks import naming_others, needless_turns, share, waits_elsewhere
 from engage_hri.services.realizer.plan.part_order import PartOrder
-from engage_hri.services.realizer.plan.phases import Chain, chain, natural_ends, unawaited_events
-from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.prediction import Impossible, predict
+from engage_hri.services.realizer.plan.phases import ARMS, Chain, as_run, chain, natural_ends, unawaited_events
+from engage_hri.services.realizer.plan.plan import AT_EASE, Late, Manner, Plan, compared, eased, standing
 from engage_hri.services.realizer.plan.relations import (
     BlockRefused,
+    Classes,
     Equal,
     Problem,
     Relations,
@@ -48,11 +48,9 @@ from engage_hri.services.realizer.plan.relations import (
     at_line,
     relations_of,
 )
-from engage_hri.services.realizer.plan.remaining import remaining, untied
-from engage_hri.services.realizer.plan.schedule import Solution, critical_path
-from engage_hri.services.realizer.plan.sharing import naming_others, needless_turns, share, waits_elsewhere
+from engage_hri.services.realizer.plan.remaining import falling, refused, remaining, unknown, untied, without
+from engage_hri.services.realizer.plan.schedule import Impossible, Solution, critical_path, predict
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder, may_speak_at_once
-from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
 
@@ -159,12 +157,12 @@ class _Planner:
 
     def _read(self, behavior: BlockBehavior) -> None:
         if isinstance(behavior, Unknown):
-            self._drop(behavior.id, *unsupported.unknown(behavior))
+            self._drop(behavior.id, *unknown(behavior))
         elif behavior.id in self.relations.unusable:
             self._refuse_if_required(behavior.id, "its timing names a sync point it does not have", "PARSING_FAILURE")
             self.dropped[behavior.id] = None
         elif (estimate := self.estimates.get(behavior.id)) and not estimate.feasible:
-            kind, reason, advice = unsupported.refused(estimate, self.block.id)
+            kind, reason, advice = refused(estimate, self.block.id)
             self._refuse_if_required(behavior.id, reason, kind, advice)
             self._drop(behavior.id, kind, f"{reason} ({advice})" if advice else reason)
         else:
@@ -295,8 +293,8 @@ class _Planner:
             arranged, conflicts = arrange(
                 self.chains, present, arrangement, everywhere, rounds, hands, self.known.begun
             )
-            undated = points_of_others.without_date(assembly, self.known) if given else ()
-            waits = points_of_others.waits(assembly, self.known)
+            undated = other_blocks.without_date(assembly, self.known) if given else ()
+            waits = other_blocks.waits(assembly, self.known)
             arranged, others = share(self.chains, present, self.known, arranged, everywhere, hands, undated, waits)
             conflicts = [
                 each for each in (*conflicts, *others) if each.is_open(self.known.begun, self.overlaps | self.turns)
@@ -370,8 +368,8 @@ class _Planner:
                 classes.tie(Equal(terms), self.block.id)
             assembler = Assembler(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
-            times = points_of_others.foreseen(assembly, self.known, self.doubted)
-            behind = tuple(points_of_others.awaited(assembly, self.known, self.waived))
+            times = other_blocks.foreseen(assembly, self.known, self.doubted)
+            behind = tuple(other_blocks.awaited(assembly, self.known, self.waived))
             is_custom, may_be_late = (lambda ties: bool(assembly.waits(ties))), self.manner.may_be_late
             solution = predict(net, is_custom, times, behind, may_be_late)
             if may_be_late:
@@ -388,26 +386,26 @@ class _Planner:
             if self.order.refute(impossible.circles, assembly.net):
                 self.parts.begin_anew()
                 raise Misordered from None
-            if tied := points_of_others.ties_within_turns(
+            if tied := other_blocks.ties_within_turns(
                 impossible, assembly, arrangement.turns, self.relations.constrained
             ).difference(self.untied):
                 self.untied |= tied
                 raise Misordered from None
-            if taken := points_of_others.losses_to_others(
+            if taken := other_blocks.losses_to_others(
                 impossible, assembly, arrangement.turns, self.chains, self.known, self.spelling
             ):
                 raise Losses(taken) from None
-            if early := points_of_others.lasting_for_ever(impossible, assembly, arrangement.lasting):
+            if early := other_blocks.lasting_for_ever(impossible, assembly, arrangement.lasting):
                 self.early |= early
                 raise Misordered from None
-            if futile := points_of_others.futile(impossible):
+            if futile := other_blocks.futile(impossible):
                 self.waived |= futile
-            elif late := points_of_others.too_late(impossible, assembly) - self.doubted:
+            elif late := other_blocks.too_late(impossible, assembly) - self.doubted:
                 self.doubted |= late
                 if foreign := {point for point in late if is_foreign(point.behavior)}:
                     self.untied |= foreign
                     raise Misordered from None
-            elif idle := points_of_others.idle(impossible, assembly, self.places):
+            elif idle := other_blocks.idle(impossible, assembly, self.places):
                 self.customs |= idle
                 assembler.waive(self.customs)
             else:
@@ -427,3 +425,49 @@ class _Planner:
         id, hand = conflict.hand
         self.hands[id] = hand
         self.chains[id] = chain(replace(self.chains[id].behavior, mode=hand), self.estimates.get(id))
+
+
+def planned_again(so_far: Plan, known: Known, gone: Iterable[str]) -> Plan:
+    """A plan of a block as if the behaviors that are gone had never been written. Raises BlockRefused."""
+    known = _still_untied(so_far, known)
+    plan = plan_block(
+        so_far.block,
+        so_far.estimates.values(),
+        dropped=gone,
+        known=known,
+        barred=_chosen(so_far, known),
+        manner=so_far.manner,
+    )
+    return replace(plan, net=as_run(plan.net))
+
+
+def reestimated(so_far: Plan, known: Known, gone: Collection[str], estimates: Iterable[Estimate]) -> Plan | None:
+    """The plan with other estimates; None if these would cost a behavior, or a part that somebody else has.
+
+    A motion that takes another time is no reason for that: blocks that plan with each other would never agree.
+    """
+    known = _still_untied(so_far, known)
+    try:
+        plan = plan_block(
+            so_far.block,
+            estimates,
+            dropped=gone,
+            known=known,
+            barred=_chosen(so_far, known),
+            turns=so_far.turns,
+            manner=so_far.manner,
+        )
+    except BlockRefused:
+        return None
+    costs = {*plan.dropped} - {*gone, *so_far.dropped} or plan.takes.items() - so_far.takes.items()
+    return None if costs else replace(plan, net=as_run(plan.net))
+
+
+def _chosen(so_far: Plan, known: Known) -> set[tuple[str, Hand]]:
+    """Hands that are not to be chosen: blocks that came later were planned around the arms that this one uses."""
+    return {(id, hand) for id in so_far.chains.keys() - known.due for hand in ARMS}
+
+
+def _still_untied(so_far: Plan, known: Known) -> Known:
+    """Knowledge with the ties that were given up: others were planned with that in mind."""
+    return replace(known, untied=known.untied | so_far.untied) if so_far.untied else known

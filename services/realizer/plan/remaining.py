@@ -1,17 +1,77 @@
-"""Relations of the behaviors that are left when others are dropped."""
+"""Behaviors that are not performed, and what remains of a block without them.
 
-from collections.abc import Collection, Container, Mapping
+Not performed are those that nobody here knows or that the body refuses, and those that mean nothing without others
+which are not performed (`Behavior.needs`). What the block says of them is taken out of its relations: else points
+that never come would keep the others waiting.
+"""
+
+from collections.abc import Collection, Container, Iterable, Mapping
 from functools import partial
+from typing import get_args
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import Head
-from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.schemas.behaviors import UNDECLARED, Event, Head, Unknown
+from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Estimate
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.feedback import WarningKind
+from engage_hri.schemas.vocabulary import unperformed
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
+from engage_hri.services.realizer.plan.relations import Classes, Equal, Order, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point, frozen
+
+
+def without(needed: str) -> str:
+    """Reason why a behavior is dropped that needs another one. needed: id of that."""
+    return f"it needs {needed}, which is not performed"
+
+
+def falling(chains: Mapping[str, Chain], lost: Iterable[str], begun: Container[str]) -> dict[str, str]:
+    """Behaviors that fall because others are lost, each with the one that it needs. What has begun is finished."""
+    needing: dict[str, list[str]] = {}
+    for id, chain in chains.items():
+        for needed in chain.behavior.needs if id not in begun else ():
+            needing.setdefault(needed, []).append(id)
+    found: dict[str, str] = {}
+    todo = list(lost) if needing else []
+    for needed in todo:  # it grows
+        fresh = [id for id in needing.get(needed, ()) if id not in found]
+        found |= dict.fromkeys(fresh, needed)
+        todo += fresh
+    return found
+
+
+def events_needing(lost: str, block: Block) -> list[Event]:
+    """Connection events of the block that need a behavior: they are withdrawn with it, even if they have begun."""
+    return [each for each in block.behaviors if isinstance(each, Event) and lost in each.needs]
+
+
+def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
+    """Kind and reason of the warning about a behavior that nobody here knows, or that does not say what to do."""
+    if behavior.namespace.startswith(UNDECLARED):
+        return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"the prefix of <{behavior.element}> is not declared"
+    if behavior.namespace:
+        return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"<{behavior.element}> is of namespace {behavior.namespace!r}"
+    if behavior.lacks:
+        return (
+            "CANNOT_CREATE_BEHAVIOR",
+            f"<{behavior.element}> has no {behavior.lacks}, so there is nothing to perform",
+        )
+    return "BEHAVIOR_TYPE_NOT_SUPPORTED", unperformed(behavior.element)
+
+
+def kind_of(warning: str) -> WarningKind:
+    """Kind of the warning that a body gives as the reason why it cannot do a behavior."""
+    return warning if warning in get_args(WarningKind) else "CANNOT_CREATE_BEHAVIOR"  # type: ignore[return-value]
+
+
+def refused(estimate: Estimate, block: str) -> tuple[WarningKind, str, str]:
+    """Kind, reason and advice of the warning about a behavior that the body cannot do."""
+    fault = estimate.fault or Fault(reason="the body cannot do it")
+    return kind_of(estimate.warning), replace(fault, advice="").within(block, estimate.behavior), fault.advice
 
 
 def remaining(

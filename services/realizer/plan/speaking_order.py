@@ -13,9 +13,8 @@ from typing import Literal
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.plan.spare_time import distances, spare_times
+from engage_hri.services.realizer.plan.schedule import Circle, distances, spare_times
 from engage_hri.services.realizer.points import EPSILON, Point
 
 WORK = 400

@@ -13,10 +13,9 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
-from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import ARMS, Chain
-from engage_hri.services.realizer.plan.prediction import Circle
-from engage_hri.services.realizer.plan.relations import Elsewhere, Order, Relations
+from engage_hri.services.realizer.plan.relations import Classes, Elsewhere, Order, Relations
+from engage_hri.services.realizer.plan.schedule import Circle
 from engage_hri.services.realizer.points import EPSILON, FINISH, ORIGIN, Point
 
 Tie = Place | Bound

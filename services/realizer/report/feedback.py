@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from math import inf
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import dialect_sync
@@ -21,13 +21,37 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.lateness import Late
 from engage_hri.services.realizer.plan.known import is_foreign
-from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.promises import Broken
+from engage_hri.services.realizer.plan.plan import UNNOTICED, Broken, Plan
 from engage_hri.services.realizer.plan.relations import at_line
-from engage_hri.services.realizer.plan.slack import UNNOTICED
-from engage_hri.services.realizer.plan.waiting import waited_for
-from engage_hri.services.realizer.plan.words import Spelling
+from engage_hri.services.realizer.plan.words import Spelling, taken
 from engage_hri.services.realizer.points import Point, as_told, frozen
+
+AT_ONCE: Seconds = 0.1
+"""Seconds within which a behavior begins after what it waited for; if later, it waited for something else, too."""
+
+
+def waited_for(
+    plan: Plan, behavior: str, times: Mapping[Point, Seconds], spelling: Spelling, *, is_past: bool
+) -> str:
+    """Say for whom a behavior waits before it begins, and for which part; empty: for nobody, or for more than that.
+
+    times: of points, those of other blocks among them. is_past: it has begun.
+    """
+    start = plan.chains[behavior].points[0]
+    if (began := times.get(start)) is None:
+        return ""
+    found = []
+    for place in plan.net.places:
+        if place.kind == "series" and place.after and (place.behavior, place.target) == (behavior, plan.at[start]):
+            holder = plan.chains.get(place.after)
+            held = plan.holders.get(place.after, ()) if holder is None else holder.parts
+            parts = tuple(part for part in plan.chains[behavior].parts if part in held)
+            until = next(each for each in plan.net.transitions[place.source].points if each.behavior == place.after)
+            if parts and (at := times.get(until)) is not None and began - at <= AT_ONCE:
+                verb: Literal["has", "had"] = "had" if is_past else "has"
+                found.append((at, taken(place.after, parts, until, spelling, verb=verb)))
+    return f"it {'waited' if is_past else 'waits'} for its turn: {max(found)[1]}" if found else ""
+
 
 SKEW: Seconds = 0.1
 """Time by which a point may miss its instant before it is reported as LATE: below it people notice nothing."""

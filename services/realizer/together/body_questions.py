@@ -6,10 +6,10 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import BodyPose, EstimateBehaviors, EstimateItem, PlannedTime
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.plan.agreement import behavior_times
 from engage_hri.services.realizer.plan.known import Known, is_foreign
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.poses import behavior_times
 from engage_hri.services.realizer.points import performer
 
 CROWD = 48

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.suggestion import suggestion
-from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.points import as_told
+from engage_hri.services.realizer.together.live_blocks import Past
 
 Status = Literal["done", "failed", "interrupted"]
 

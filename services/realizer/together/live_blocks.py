@@ -1,20 +1,74 @@
-"""Sync points of live blocks that other live blocks refer to: expected, reached or lost; and those of the past."""
+"""Live blocks as others see them: their sync points, expected, reached or lost; and blocks that have ended.
+
+Points of one block may be tied to points of another. So each that is performed, or waits for its turn, tells here
+when its points are expected, and hears of those that it follows.
+
+A manager that streams blocks cannot know whether the one that it names still runs when its message arrives. So what
+has ended stays known for a while; the time and the number are bounded, so that nothing grows.
+"""
 
 from abc import ABC, abstractmethod
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from math import inf
+from typing import Generic, TypeVar
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.references import with_names
 from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.plan.known import at_home, block_of, qualified
-from engage_hri.services.realizer.plan.past import Past
+from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, at_home, block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.relations import extent
+from engage_hri.services.realizer.plan.relations import LASTING, extent
 from engage_hri.services.realizer.points import EPSILON, LIFE, Point, frozen
+
+MOST = 20_000
+"""Greatest size of all that is known of the past; a block counts as its elements. Ten of the largest blocks."""
+
+Ended = TypeVar("Ended")
+
+
+class Past(Generic[Ended]):
+    """Blocks that have ended, by id: the latest of each, for `LASTING` seconds, and no more than `MOST` in all."""
+
+    def __init__(self, now: Callable[[], Seconds]) -> None:
+        self._now = now
+        self._ended: OrderedDict[str, tuple[Seconds, int, Ended]] = OrderedDict()
+        """When it ended, its size, and itself; in the order of the ends."""
+        self._size = 0
+
+    def add(self, id: str, thing: Ended, size: int = 1) -> list[Ended]:
+        """Remember what ends now, in place of another of its id; returns what is forgotten for it."""
+        self.take_out(id)
+        self._ended[id] = (self._now(), size, thing)
+        self._size += size
+        gone = list[Ended]()
+        while self._ended:
+            oldest, (at, _, before) = next(iter(self._ended.items()))
+            if at >= self._now() - LASTING and self._size <= MOST:
+                break
+            self.take_out(oldest)
+            gone.append(before)
+        return gone
+
+    def take_out(self, id: str) -> Ended | None:
+        """Forget what has this id, and return it."""
+        if (found := self._ended.pop(id, None)) is None:
+            return None
+        self._size -= found[1]
+        return found[2]
+
+    def get(self, id: str) -> Ended | None:
+        """The block of this id; None: nothing is known of it."""
+        found = self._ended.get(id)
+        return found[2] if found is not None and found[0] >= self._now() - LASTING else None
+
+    def all(self) -> dict[str, Ended]:
+        """All that is known, by id."""
+        since = self._now() - LASTING
+        return {id: thing for id, (at, _, thing) in self._ended.items() if at >= since}
+
 
 MOST_TELLINGS = 20
 """Most changes of one expected time that are told in a row. Blocks that wait for each other, by a tie and by a part
@@ -329,3 +383,86 @@ class LiveBlocks:
         for id, tracked in homes.items():
             if tracked.performance is not None and self._tracked.get(id) is tracked:
                 tracked.performance.follow(tracked.named)
+
+
+class WaitingBlock(Neighbor):
+    """A block that begins when others have ended: no earlier than the last of these is expected to end.
+
+    It follows their ends, and is followed itself (see `LiveBlocks`). So dates pass from block to block, always from
+    one that came earlier to one that came later: they never go round in a circle.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        live_blocks: LiveBlocks,
+        now: Callable[[], Seconds],
+        leaders: Collection[str] = (),
+        is_held: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """leaders: blocks that have to end first. is_held: whether it is held itself."""
+        self.leaders = leaders
+        self._is_held = is_held
+        self._plan = plan
+        self._live_blocks = live_blocks
+        self._now = now
+        self._ends: dict[str, Seconds] = {}
+        """When each of the other blocks is expected to end."""
+        self._followed: set[Point] = set()
+
+    def follow(self, points: Iterable[Point]) -> None:
+        """Tell from now on when these points are expected: other blocks are tied to them."""
+        self._followed.update(points)
+        self._tell()
+
+    def hear(self, point: Point, at: Seconds) -> None:
+        """Take the news that a point of another block is reached: its end, perhaps."""
+        self.foresee(point, at)
+
+    def foresee(self, point: Point, at: Seconds) -> None:
+        """Take the news that another block is expected to end at another time than before.
+
+        Points of it that others are tied to are told, too.
+        """
+        if point == qualified(block_of(point), BLOCK_END):
+            self._ends[block_of(point)] = at
+            self._tell()
+
+    def stuck(self, elsewhere: Set[Point], standing: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that do not come before what is held goes on."""
+        waits = not elsewhere.isdisjoint(qualified(block, BLOCK_END) for block in self.leaders)
+        return self._followed if waits or self._is_held() else frozenset()
+
+    def running(self, elsewhere: Set[Point], running: Set[Point]) -> Set[Point]:
+        """Points that others are tied to and that come nearer: others that have to end first go on."""
+        standing = elsewhere - running
+        goes_on = any(qualified(block, BLOCK_END) not in standing for block in self.leaders)
+        return self._followed if goes_on else frozenset()
+
+    def stick(self, elsewhere: Set[Point], standing: Set[Point]) -> None:
+        """Take the news which points of other blocks do not come before what is held goes on."""
+
+    def miss(self, behaviors: Iterable[str]) -> None:
+        """Take the news that another block is gone."""
+        lost = set(behaviors)
+        for end in [qualified(block, BLOCK_END) for block in self._ends]:
+            if end.behavior in lost:
+                del self._ends[block_of(end)]
+
+    @property
+    def newest_plan(self) -> Plan:
+        """The plan that it had before it had to wait."""
+        return self._plan
+
+    def _tell(self) -> None:
+        times = self.times()
+        self._live_blocks.foresee(
+            self._plan.block.id, {each: times[each] for each in self._followed if each in times}
+        )
+
+    def times(self) -> Mapping[Point, Seconds]:
+        """Expected time of each of its points, if it is performed as planned before it had to wait."""
+        begins = max((self._now(), *self._ends.values()))
+        schedule = self._plan.schedule
+        times = {point: begins + schedule[at] for point, at in self._plan.at.items()}
+        return {**times, BLOCK_START: begins, BLOCK_END: begins + schedule[-1]}

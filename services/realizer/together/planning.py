@@ -14,19 +14,17 @@ from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.plan.agreement import Rounds
+from engage_hri.services.realizer.plan.agreement import Rounds, planned_times, poses_before
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
-from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import Tries, plan_tries
-from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relations_of
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.body_questions import is_crowd, meanwhile, parts_moved, question_about
 from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
-from engage_hri.services.realizer.together.live_blocks import LiveBlocks
+from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past
 
 ESTIMATE: Seconds = 2.0
 """Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""

@@ -16,10 +16,9 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Containing
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.plan.agreement import STRAIGHT, between, difference
+from engage_hri.services.realizer.plan.agreement import NOTICEABLE, STRAIGHT, between, difference, poses_before
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.poses import NOTICEABLE, poses_before
 from engage_hri.services.realizer.points import frozen
 from engage_hri.services.realizer.together.body_questions import (
     meanwhile,

@@ -1,6 +1,11 @@
-"""Blame for points that wait for each other in a circle: a behavior is dropped, or the whole block refused."""
+"""Losses: who is to blame for what cannot be on time, and what is given up for it.
 
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+Points that wait for each other in a circle, or that have too little time, cost a behavior; only if there is none that
+may be lost, the whole block is refused. Words are not lost for the sake of a time: a speech gives up the times that
+cannot be kept, one after the other, before it is dropped.
+"""
+
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence, Set
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -11,13 +16,10 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
-from engage_hri.services.realizer.plan.given_up import Times
-from engage_hri.services.realizer.plan.handover import Turn
-from engage_hri.services.realizer.plan.instants import Classes
+from engage_hri.services.realizer.plan.handover import Turn, by_ends, turns_in
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.prediction import Circle, Impossible
-from engage_hri.services.realizer.plan.relations import BlockRefused, Order, Relations
-from engage_hri.services.realizer.plan.turns import by_ends, turns_in
+from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Order, Relations
+from engage_hri.services.realizer.plan.schedule import Circle, Impossible
 from engage_hri.services.realizer.plan.words import (
     AS_IN_DRAFTS,
     LATER,
@@ -32,6 +34,82 @@ from engage_hri.services.realizer.plan.words import (
     way_round,
 )
 from engage_hri.services.realizer.points import EPSILON, Point
+
+
+class Times:
+    """The relations of a block, of which some that place its speeches are given up."""
+
+    def __init__(self, relations: Relations, speeches: Container[str]) -> None:
+        """speeches: those whose times may be given up."""
+        self._relations = relations
+        self._equals: dict[int, Equal | None] = dict(enumerate(relations.equals))
+        """By number; None: given up. The numbers of the orders are negative."""
+        self._orders: dict[int, Order | None] = {-n: order for n, order in enumerate(relations.orders, 1)}
+        self._naming: dict[Point, list[int]] = {}
+        """Numbers of the relations that name a point."""
+        named = [(n, [term.point for term in each.terms]) for n, each in enumerate(self._relations.equals)]
+        named += [(-n, [each.earlier.point, each.later.point]) for n, each in enumerate(self._relations.orders, 1)]
+        for number, points in named:
+            for point in dict.fromkeys(points):
+                if point.behavior in speeches:
+                    self._naming.setdefault(point, []).append(number)
+
+    def give_up(
+        self, points: Sequence[Point], among: Container[Point], dropped: Container[str]
+    ) -> tuple[Point, str] | None:
+        """Give up one relation of a speech; returns the point and what the relation said of it: `s:end = 2`.
+
+        It is one of the last point that has any, the speech's own timing before what others say; what a required
+        behavior says is never given up. None: there is none left.
+
+        points: of speeches, that cannot all be on time. among: points to which the relation ties it, if there is such
+        a one. dropped: behaviors that are gone; what is tied to them is tied through them, and given up last.
+        """
+        for is_enough in (
+            lambda others: any(each in among and each.behavior not in dropped for each in others),
+            lambda others: any(each.behavior not in dropped for each in others),
+            bool,
+        ):
+            for point in reversed(points):
+                naming = self._naming.get(point, ())
+                for number in sorted(naming, key=lambda each: (each < 0, not self._is_own(each, point))):
+                    if is_enough(self._others(number, point)):
+                        return point, self._without(number, point)
+        return None
+
+    def _is_own(self, number: int, point: Point) -> bool:
+        equal = self._equals.get(number)
+        return equal is not None and equal.behavior == point.behavior
+
+    def _others(self, number: int, point: Point) -> list[Point]:
+        """Points to which a relation ties the point; none if it is given up already, or must be kept."""
+        if number < 0:
+            order = self._orders[number]
+            return [] if order is None else [end.point for end in (order.earlier, order.later) if end.point != point]
+        equal = self._equals[number]
+        if equal is None or equal.behavior in self._relations.required:
+            return []
+        named = [term.point for term in equal.terms]
+        return [each for each in named if each != point] if point in named else []
+
+    def _without(self, number: int, point: Point) -> str:
+        """Give up what a relation says of the point; returns what it said."""
+        if number < 0:
+            order, self._orders[number] = self._orders[number], None
+            return f"{order.earlier.text} <= {order.later.text}" if order is not None else ""
+        equal = self._equals[number]
+        assert equal is not None
+        others = tuple([term for term in equal.terms if term.point != point])
+        self._equals[number] = Equal(others) if not equal.behavior and len(others) > 1 else None
+        return " = ".join([term.text for term in equal.terms])
+
+    @property
+    def left(self) -> Relations:
+        """The relations that are left."""
+        equals = tuple([each for each in self._equals.values() if each is not None])
+        orders = tuple([each for each in self._orders.values() if each is not None])
+        return replace(self._relations, equals=equals, orders=orders)
+
 
 FACES = types_with(family="face", lasts=True)
 
