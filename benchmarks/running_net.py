@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Pointing, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.running import RunningNet
-from engage_hri.services.realizer.perform.futures import SyncPointFutures
+from engage_hri.services.realizer.perform.behavior_run import SyncPointFutures
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 

@@ -2,20 +2,16 @@
 
 SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
-    "services/realizer/perform/control_link.py",  # asks the body
-    "services/realizer/perform/presence.py",  # wakes who waits for a service
-    "services/realizer/perform/recognition_link.py",  # asks recognition
+    "services/realizer/perform/links.py",  # asks the body and recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/serving/estimates.py",  # publishes mistakes of the body
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report/feedback.py",  # publishes feedback
-    "services/realizer/perform/behavior_run.py",  # awaits sync points
-    "services/realizer/perform/futures.py",  # resolves them
+    "services/realizer/perform/behavior_run.py",  # awaits sync points, resolves them, and awaits the ends of behaviors
     "services/realizer/together/planning.py",  # asks the body
     "services/realizer/together/rehearsal.py",  # asks it again
-    "services/realizer/perform/ends_of_runs.py",  # awaits the ends of behaviors
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/together/live.py",  # resolved when a block has ended

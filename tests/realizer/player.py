@@ -4,8 +4,7 @@ import heapq
 from collections.abc import Callable
 
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.effects import Begin, Extend
+from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend
 from engage_hri.services.realizer.plan.plan import Plan
 
 

@@ -8,7 +8,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body import Estimate, Estimates, HomeReached, Phase, SyncPointReached, WordSpoken
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.realizer.perform.ends_of_runs import ABORT
+from engage_hri.services.realizer.perform.behavior_run import ABORT
 from engage_hri.services.requests.ends import RequestRefused
 from tests.realizer.puppet import BML_1_0, Puppet, bml, puppet
 

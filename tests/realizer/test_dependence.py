@@ -17,7 +17,7 @@ from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, Know
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.together.dependence import needed_by, waiting_for
+from engage_hri.services.realizer.together.knowledge import needed_by, waiting_for
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, WaitingBlock
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from engage_hri.schemas.behaviors import After, Constraint, Mark, Pointing, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.foresee.experience import Experience
-from engage_hri.services.realizer.foresee.from_scratch import full_forecast
+from engage_hri.services.realizer.foresee.forecast import full_forecast
+from engage_hri.services.realizer.foresee.pace import Experience
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused

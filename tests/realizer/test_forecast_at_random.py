@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from engage_hri.services.realizer.foresee import forecast
-from engage_hri.services.realizer.foresee.forecast import Forecast
-from engage_hri.services.realizer.foresee.from_scratch import full_forecast, is_predictive
+from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.points import Member, Point
 from tests.random_cases import share_of

@@ -9,13 +9,13 @@ from engage_hri.schemas.behaviors import Head, Speech, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.nets import Fired
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.realizer.export import described, firings, tokens
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known
 from engage_hri.services.realizer.plan.other_blocks import coming_with, is_behind
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.report.net_message import described, firings, tokens
 from tests.realizer.oracle import estimate
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, before, block, together

@@ -9,8 +9,8 @@ from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.held_up import STANDING, HeldUp
-from engage_hri.services.realizer.foresee.outlook import Outlook
+from engage_hri.services.realizer.decide.lateness import STANDING, HeldUp
+from engage_hri.services.realizer.foresee.expectations import Outlook
 from engage_hri.services.realizer.net.clocks import Stops
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.planning import elastic, plan, timed

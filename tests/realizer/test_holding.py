@@ -17,7 +17,7 @@ from engage_hri.schemas.blocks import (
 )  # fmt: skip
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform import steering
-from engage_hri.services.realizer.together.holds import Holds
+from engage_hri.services.realizer.perform.steering import Holds
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.random_cases import share_of

@@ -7,7 +7,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gesture, Speech
 from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.services.realizer.decide.effects import Begin, Extend
+from engage_hri.services.realizer.decide.decisions import Begin, Extend
 from engage_hri.services.realizer.perform.behavior_run import BehaviorRun
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.realizer.fake_body import FakeBody

@@ -11,8 +11,7 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body import Estimate, Phase, WordTime
-from engage_hri.services.realizer.foresee.experience import Experience
-from engage_hri.services.realizer.foresee.utterances import Utterances
+from engage_hri.services.realizer.foresee.pace import Experience, Utterances
 from engage_hri.services.realizer.plan.phases import chain
 from tests.random_cases import share_of
 

@@ -8,9 +8,8 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.control.config import Variability
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.effects import Begin, Extend
-from engage_hri.services.realizer.foresee.expected_times import differ_noticeably
+from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend
+from engage_hri.services.realizer.foresee.expectations import differ_noticeably
 from engage_hri.services.realizer.plan.plan import BRIEF, slack
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point

@@ -1,28 +1,83 @@
 """Decisions of the realizer, without a clock: how far each behavior may go, given the sync points measured so far.
 
-Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them, `deadline` when to ask again. What is
-decided comes from the marking of the net (grants.py) and from what is expected (foresee/expected_times.py).
+Facts go in (`arrive`, `reach`), `advance(now)` says what to do about them (`Effect`), `deadline` when to ask again.
+What is decided comes from the marking of the net (grants.py) and from what is expected (foresee/expectations.py). For
+another plan of the block they tell what holds have stopped of it (`stopped`).
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
 from math import isfinite
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
 from engage_hri.services.realizer.decide.grants import Grants
-from engage_hri.services.realizer.decide.held_up import HeldUp
-from engage_hri.services.realizer.decide.lateness import LatenessWatch
-from engage_hri.services.realizer.decide.stopped import stopped
-from engage_hri.services.realizer.foresee.expected_times import Foresight, differ_noticeably
+from engage_hri.services.realizer.decide.lateness import HeldUp, Late, LatenessWatch, Stalled
+from engage_hri.services.realizer.foresee.expectations import Foresight, Pace, differ_noticeably
 from engage_hri.services.realizer.net.clocks import NO_STOPS, Stops
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Broken, Plan, Promises
-from engage_hri.services.realizer.points import ORIGIN, Point, performer
+from engage_hri.services.realizer.points import ORIGIN, Point, performer, stands_soon
+
+
+class Begin(Struct, frozen=True):
+    """Start `behavior`; it may go through `through` without asking."""
+
+    behavior: str
+    through: str
+    pace: Pace = ()
+
+
+class Extend(Struct, frozen=True):
+    """Let `behavior` go through `through` now, and come to its points as `pace` says.
+
+    held: wait where it next can, whatever `through` says.
+    """
+
+    behavior: str
+    through: str
+    pace: Pace = ()
+    held: bool = False
+
+
+Effect = Begin | Extend | Late | Stalled
+
+
+def stopped(plan: Plan, facts: Facts, held_up: HeldUp, times: Mapping[Point, Seconds], now: Seconds) -> Stops:
+    """Tell what holds have stopped. times: of all points, measured or expected, by the loop's clock."""
+    began = facts.began
+
+    def cost(late: Point, early: Point, allowed: Seconds, by: Seconds) -> Seconds:
+        return held_up.between(late, early, allowed, by, max(times.get(late, now), times.get(early, now)))
+
+    return Stops(
+        holds=facts.holds_so_far(now),
+        phases={point: seconds for point, seconds in _stood(plan, facts, now) if seconds},
+        reached={point: at - began for point, at in facts.reached.items()},
+        times={ORIGIN: 0.0} | {point: at - began for point, at in times.items()},
+        cost=cost,
+    )
+
+
+def _stood(plan: Plan, facts: Facts, now: Seconds) -> Iterator[tuple[Point, Seconds]]:
+    """Seconds for which behaviors stood on their way to each point that they have come to, and to the next.
+
+    A voice stands between two words, a clock at once; a movement goes on to where it can wait, and stands there.
+    """
+    for behavior in facts.begun:
+        if (chain := plan.chains.get(behavior)) is None:
+            continue
+        stands = stands_soon(chain.behavior)
+        for before, point in zip(chain.points, chain.points[1 : facts.next_number(behavior) + 1], strict=False):
+            until = facts.reached.get(point, now)
+            if stands:
+                yield point, facts.stood_between(facts.reached[before], until, behavior)
+            elif point in facts.arrived:
+                yield point, facts.held_between(facts.arrived[point], until, behavior)
 
 
 class Decisions:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Set
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.decide.stuck import Stuck, fixed_times
-from engage_hri.services.realizer.foresee.expected_times import Foresight
+from engage_hri.services.realizer.foresee.expectations import Foresight
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import BRAKING, UNNOTICED, Plan, slack

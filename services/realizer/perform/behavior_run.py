@@ -1,8 +1,14 @@
-"""One behavior of a live block: an asyncio task that awaits its sync points, and talks to what performs it."""
+"""One behavior of a live block: an asyncio task that awaits its sync points, and talks to what performs it.
+
+The running net resolves a future for each sync point and each instant that is awaited (`SyncPointFutures`).
+
+The body may end it early: handed over, with all that matters done, or lost. When the block ends first, the body is
+told to stop what still runs, and is given time to do so (`all_ended`).
+"""
 
 import asyncio
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Container, Mapping, Sequence
+from typing import NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
@@ -12,18 +18,126 @@ from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.effects import Begin, Extend
-from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.futures import PointPassed, SyncPointFutures
-from engage_hri.services.realizer.perform.handed_over import has_lost_nothing, loss
-from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
+from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend
+from engage_hri.services.realizer.net.running import Observer, RunningNet
+from engage_hri.services.realizer.perform.links import ControlLink, RecognitionLink
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.words import Spelling
-from engage_hri.services.realizer.points import EPSILON, Point, performer
-from engage_hri.services.realizer.report.spoken import Spoken
+from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
+from engage_hri.services.realizer.points import EPSILON, FINISH, Point, performer
+from engage_hri.services.realizer.report.outcome import Spoken
+from engage_hri.services.realizer.together.live import Ending
 from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
+from engage_hri.services.requests.silence import unfinished
+
+T = TypeVar("T")
+
+
+class PointPassed(NamedTuple):
+    """A behavior has passed `point`. arrived: when it had come there, if it waited. by_body: told by the body."""
+
+    point: Point
+    at: Seconds
+    arrived: Seconds | None = None
+    by_body: bool = False
+
+
+class SyncPointFutures(Observer):
+    """Futures by sync point, each made when first awaited. They outlive the net."""
+
+    def __init__(self) -> None:
+        self._granted: dict[Point, asyncio.Future[None]] = {}
+        self._fired: dict[Point, asyncio.Future[Seconds]] = {}
+        self._reached: dict[Point, asyncio.Future[Seconds]] = {}
+        self._reported: dict[Point, asyncio.Future[PointPassed | None]] = {}
+
+    def adopt(self, net: RunningNet) -> "SyncPointFutures":
+        """Observe another net of the same block from now on."""
+        self._net = net
+        for transition in net.instants if self._fired else ():
+            self.on_fired(transition, net.instants[transition])
+        return self
+
+    def granted(self, point: Point) -> "asyncio.Future[None]":
+        """Resolved when the behavior may pass `point`; of its start: when it is to begin."""
+        return _future(self._granted, point)
+
+    def fired(self, point: Point) -> "asyncio.Future[Seconds]":
+        """Resolved when the transition of `point` fires, with the time. `FINISH`: when the block is over."""
+        future = _future(self._fired, point)
+        transition = self._net.end if point == FINISH else self._net.at[point]
+        if transition in self._net.instants:
+            _resolve(self._fired, point, self._net.instants[transition])
+        return future
+
+    def grant(self, point: Point) -> None:
+        """Let the behavior pass `point`."""
+        if not (future := self.granted(point)).done():  # done: its task was cancelled
+            future.set_result(None)
+
+    def reached(self, point: Point) -> "asyncio.Future[Seconds]":
+        """Resolved when the behavior itself has passed `point`, with the time, whatever else is of that instant."""
+        return _future(self._reached, point)
+
+    def reach(self, point: Point, at: Seconds) -> None:
+        """Note that the behavior has passed `point`."""
+        _resolve(self._reached, point, at)
+
+    def reported(self, point: Point) -> "asyncio.Future[PointPassed | None]":
+        """Resolved with the report of the body about `point`; with None if it was lost, or there will be none."""
+        return _future(self._reported, point)
+
+    def report(self, point: Point, news: PointPassed | None) -> None:
+        """Note what the body has reported of `point`; what comes after the first is ignored."""
+        if not (future := _future(self._reported, point)).done():
+            future.set_result(news)
+
+    def cancel(self) -> None:
+        """Cancel all that is still awaited: the block has ended."""
+        for futures in (self._granted, self._fired, self._reached, self._reported):
+            for future in futures.values():
+                future.cancel()
+
+    # -- what happens (see `Observer`) ---------------------------------------------------------------------------
+
+    def on_fired(self, transition: int, at: Seconds) -> None:
+        if self._fired:
+            for point in self._net.net.transitions[transition].points or (FINISH,):
+                _resolve(self._fired, point, at)
+
+
+def _future(futures: dict[Point, "asyncio.Future[T]"], point: Point) -> "asyncio.Future[T]":
+    if (future := futures.get(point)) is None:
+        future = futures[point] = asyncio.get_running_loop().create_future()
+    return future
+
+
+def _resolve(futures: dict[Point, "asyncio.Future[Seconds]"], point: Point, at: Seconds) -> None:
+    if (future := futures.get(point)) is not None and not future.done():
+        future.set_result(at)
+
+
+_TAKEN = Fault(reason="", cause="replaced")
+
+
+def has_lost_nothing(plan: Plan, outcome: BehaviorOutcome, reached: Container[Point]) -> bool:
+    """True if a behavior is done, or was taken over when it had nothing left to do but its way home.
+
+    reached: points that were measured.
+    """
+    id = outcome.behavior
+    if outcome.status != "taken_over" or id not in plan.kept:
+        return outcome.status == "done"
+    points = plan.chains[id].points
+    return all(point in reached for point in points[: points.index(plan.kept[id]) + 1])
+
+
+def loss(outcome: BehaviorOutcome, spelling: Spelling = AS_IN_DRAFTS) -> Fault:
+    """Reason why a behavior has not come to its end."""
+    if outcome.status == "taken_over":
+        passed = spelling.sync(Point(outcome.behavior, outcome.passed)) if outcome.passed else "nothing of it"
+        return replace(outcome.fault or _TAKEN, reason=f"another behavior took its part after {passed}", where="")
+    return outcome.fault or Fault(reason=f"the body {outcome.status} it")
 
 
 class PointHeld(NamedTuple):
@@ -253,3 +367,28 @@ class BehaviorRun:
         else:
             end = Point(event.id, "end")
             block.tell(PointPassed(end, max(began, decision.at), by_body=decision.by_recognition))
+
+
+ABORT: Seconds = 5.0
+"""Time that the body may take to end what was aborted before the block ends without it. Ours."""
+
+
+async def all_ended(
+    runs: Mapping[str, BehaviorRun],
+    tasks: Mapping[str, asyncio.Task[None]],
+    body: ControlLink,
+    ending: Ending,
+    bus: Bus,
+) -> None:
+    """Cancel what still runs, and return when all that the body does has ended, or `ABORT` is over."""
+    moving = dict[asyncio.Task[None], str]()
+    for id, run in runs.items():
+        if run.pending is None or tasks[id].done():
+            continue
+        if run.is_by_body:
+            moving[tasks[id]] = id
+        if ending.status != "done" and not run.pending.outcome.done():
+            body.cancel(id, ending.fault or f"block {ending.status}")
+    for task in await unfinished(moving, ABORT, bus):
+        # Its request is not to be kept alive: it is over, though the body does not say so.
+        body.cancel(moving[task], "its block has ended")

@@ -14,10 +14,10 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.nets import NetMarked, NetWaiting
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
+from engage_hri.services.realizer.export import described, firings
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
-from engage_hri.services.realizer.report.net_message import described, firings
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.runtime.alarm import Timer
 

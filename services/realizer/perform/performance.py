@@ -19,8 +19,7 @@ from engage_hri.schemas.syncref import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.effects import Begin, Effect, Extend
+from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Effect, Extend
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import (
@@ -28,15 +27,14 @@ from engage_hri.services.realizer.perform.behavior_run import (
     BehaviorRun,
     BodyLost,
     PointHeld,
+    PointPassed,
     RunNews,
     Stage,
+    SyncPointFutures,
+    all_ended,
 )
-from engage_hri.services.realizer.perform.control_link import ControlLink
-from engage_hri.services.realizer.perform.ends_of_runs import all_ended
-from engage_hri.services.realizer.perform.futures import PointPassed, SyncPointFutures
+from engage_hri.services.realizer.perform.links import ControlLink, Presence, RecognitionLink
 from engage_hri.services.realizer.perform.net_stream import NetStream
-from engage_hri.services.realizer.perform.presence import Presence
-from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.known import Known, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import planned_again, reestimated
@@ -44,12 +42,10 @@ from engage_hri.services.realizer.plan.remaining import events_needing, without
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point, frozen
 from engage_hri.services.realizer.report.feedback import News, Reporter
-from engage_hri.services.realizer.report.outcome import completed, reasons
-from engage_hri.services.realizer.report.spoken import Spoken
-from engage_hri.services.realizer.together.body_questions import is_crowd, parts_moved
+from engage_hri.services.realizer.report.outcome import Spoken, completed, reasons
 from engage_hri.services.realizer.together.live import Ending, Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Neighbor
-from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing
+from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing, is_crowd, parts_moved
 from engage_hri.services.realizer.together.ties import Ties
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer

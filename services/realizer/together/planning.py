@@ -21,10 +21,10 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import Tries, plan_tries
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relations_of
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.together.body_questions import is_crowd, meanwhile, parts_moved, question_about
 from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past
+from engage_hri.services.realizer.together.rehearsal import is_crowd, meanwhile, parts_moved, question_about
 
 ESTIMATE: Seconds = 2.0
 """Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
