@@ -9,7 +9,7 @@ SHELLS = {
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report/feedback.py",  # publishes feedback
-    "services/realizer/perform/behavior_run.py",  # awaits sync points, resolves them, and awaits the ends of behaviors
+    "services/realizer/perform/behavior_run.py",  # awaits and resolves sync points, awaits ends
     "services/realizer/together/planning.py",  # asks the body
     "services/realizer/together/rehearsal.py",  # asks it again
     "services/realizer/perform/net_stream.py",  # publishes the marking
