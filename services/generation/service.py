@@ -30,8 +30,7 @@ from engage_hri.services.generation.exchange import (
     SendRequest,
 )
 from engage_hri.services.generation.intake import NAME, GenerationIntake, reads
-from engage_hri.services.requests.ends import RequestDesk, Requester
-from engage_hri.services.requests.pending import News
+from engage_hri.services.requests.ends import News, RequestDesk, Requester
 from engage_hri.services.runtime.alarm import Alarm
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake
 from engage_hri.services.runtime.noted import BusClock, NotedIntake

@@ -3,6 +3,10 @@
 What becomes of one request is `TABLE` in asking_table.py. `Asking` keeps any number of requests and their
 deadlines, and follows the table.
 
+A server has a limited number of them before it without an answer (`SendWindow`). Who asks for ten thousand things at
+once would else fill the links and the queue of the server, which are the others' too, and would send again what only
+has not come yet.
+
     effects = asking.send(keys.BLOCK, request, now)
     effects = asking.hear(answer, now)                 # and server_gone, server_there, cancel
     effects = asking.tick(now)                         # whenever `asking.deadline` has come
@@ -13,6 +17,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -39,21 +44,78 @@ from engage_hri.schemas.requests import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
-from engage_hri.services.requests.asked import SentRequest, Server
-from engage_hri.services.requests.asking_effects import (
+from engage_hri.services.requests.asking_table import (
+    TABLE,
+    AskingAction,
+    AskingEvent,
     AskingFault,
+    AskingState,
     Effect,
     PublishCommand,
     Renew,
+    SentRequest,
+    Server,
     TellAccepted,
     TellEnd,
 )
-from engage_hri.services.requests.asking_table import TABLE, AskingAction, AskingEvent, AskingState
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.records import ANEW, unwieldy
-from engage_hri.services.requests.window import SendWindow
+from engage_hri.services.requests.serving_table import ANEW, unwieldy
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
+
+
+class SendWindow:
+    """Requests to one server that are on their way without an answer; those that wait for that, in their order."""
+
+    def __init__(self, size: int) -> None:
+        """size: number of requests that may be on their way."""
+        self._size = size
+        self._on_their_way: set[str] = set()
+        self._waiting: dict[str, None] = {}
+
+    def has_waiting(self, id: str) -> bool:
+        """True for a request that has not been sent, and waits for others."""
+        return id in self._waiting
+
+    def enter(self, id: str) -> bool:
+        """Tell whether a request may be sent, also again; it waits if not."""
+        if id not in self._on_their_way and len(self._on_their_way) >= self._size:
+            self._waiting[id] = None
+            return False
+        self._waiting.pop(id, None)
+        self._on_their_way.add(id)
+        return True
+
+    def leave(self, id: str) -> str | None:
+        """Take the news that a request has been answered, or is given up; returns the one that may be sent now."""
+        self._waiting.pop(id, None)
+        if id not in self._on_their_way:
+            return None
+        self._on_their_way.discard(id)
+        return next(iter(self._waiting), None)
+
+
+class Patience(Struct, frozen=True, kw_only=True):
+    """Limits of a requester, times in seconds.
+
+    first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
+    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By
+    then it has ended them, if it lives: it misses us a silent link's lease later than we miss it, and has its grace.
+    pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
+    cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
+    leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.
+    window: number of requests that a server may have before it without an answer; more wait here.
+    """
+
+    first_resend: Seconds = 0.3
+    longest_resend: Seconds = 2.0
+    grace: Seconds = 4.0
+    pulse: Seconds = 1.0
+    lease: Seconds = 5.0
+    cancel: Seconds = 30.0
+    silence: Seconds = 30.0
+    swallow: Seconds = 60.0
+    window: int = 64
+
 
 _Said = Answer | None
 """The answer of the server that is the event; None with all other events."""

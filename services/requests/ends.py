@@ -10,9 +10,9 @@ robot must not say and do things twice. A server leaves commands from history to
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Self
+from typing import Any, Self, TypeVar
 
 from msgspec.structs import replace
 
@@ -27,7 +27,7 @@ from engage_hri.schemas.faults import (
     RunFailed,
     ServerRestarted,
 )
-from engage_hri.schemas.messages import Message
+from engage_hri.schemas.messages import COMMANDS, Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import (
     Accepted,
@@ -39,19 +39,106 @@ from engage_hri.schemas.requests import (
     Refused,
     Request,
     Unreadable,
+    is_life_of,
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received, Subscription
 from engage_hri.services.bus.samples import sender_of
-from engage_hri.services.requests import asking_effects, serving_effects
-from engage_hri.services.requests.admission import borrowed, misplaced
-from engage_hri.services.requests.asking import Asking
+from engage_hri.services.requests import asking_table, serving_table
+from engage_hri.services.requests.asking import Asking, Patience
 from engage_hri.services.requests.asking_table import AskingState
-from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.pending import News, Pending
-from engage_hri.services.requests.records import unwieldy
+from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving import Serving
+from engage_hri.services.requests.serving_table import unwieldy
 from engage_hri.services.runtime.alarm import Alarm
+
+
+def borrowed(life: str, received: Received, server: str) -> Fault | None:
+    """A fault if a command names a life that is that of another process than its own; None otherwise."""
+    if is_life_of(life, received.life):
+        return None
+    where = f"{received.key} from {received.source or 'a stranger'}"
+    return Fault(reason=f"{life!r} is the life of another process; ignored", where=where, service=server)
+
+
+def misplaced(request: Request, key: str) -> Fault | None:
+    """A fault if this request must not be sent on this key, or has no id; None otherwise."""
+    expression = keys.expression_of(key)
+    expected = COMMANDS.get(expression, ())
+    if request.id and (isinstance(request, expected) or (expression and isinstance(request, Cancel))):
+        return None
+    server, name = keys.server_of(key), type(request).__name__
+    if not request.id:
+        return Fault(reason=f"{name} without an id", where=key, service=server, advice="make one up: `id`")
+    home = next((known for known, kinds in COMMANDS.items() if isinstance(request, kinds)), keys.cancel(server))
+    takes = f"takes {' and '.join(kind.__name__ for kind in expected)}" if expected else "is no command"
+    sender = key.split("/")[4:6] if expression else ["<role>", "<requester>"]
+    advice = f"send it on {home.replace('*/*', '/'.join(sender))}" if home else ""
+    return Fault(reason=f"{name} came on {key}, which {takes}", where=request.id, service=server, advice=advice)
+
+
+F = TypeVar("F", bound=asyncio.Future[Any])
+
+
+async def unfinished(awaited: Iterable[F], within: Seconds, bus: Bus) -> set[F]:
+    """Wait until all of these are done, or their time is over. Returns those that are not."""
+    left, time = {*awaited}, Silences[str](bus.sight)
+    time.set("over", bus.now() + within)
+    while left and time.due(bus.now()) is None:
+        assert time.earliest is not None
+        _, left = await asyncio.wait(left, timeout=time.earliest - bus.now())
+    return left
+
+
+News = Accepted | Outcome | EngageError | None
+"""News of a request: its acceptance, None if that was lost and its end has come; its end."""
+
+
+class Pending:
+    """A request on its way. Both futures raise RequestRefused, or RunFailed if the server died or does not answer.
+
+    Cancelling a future only stops waiting; `Requester.cancel` ends the request.
+    """
+
+    def __init__(self, key: str, request: Request, tell: Callable[[News], None] | None = None) -> None:
+        """tell: called with the acceptance and with the end, each at once: in order with what else is heard."""
+        loop = asyncio.get_running_loop()
+        self._tell = tell or (lambda news: None)
+        self.key = key
+        self.request = request
+        self.accepted: asyncio.Future[Accepted | None] = loop.create_future()
+        self.outcome: asyncio.Future[Outcome] = loop.create_future()
+
+    @property
+    def server(self) -> str:
+        return keys.server_of(self.key)
+
+    @property
+    def within(self) -> Seconds | None:
+        """Time in which the server has promised to decide (see `Accepted`); None if it has promised none so far."""
+        is_known = self.accepted.done() and not self.accepted.cancelled() and self.accepted.exception() is None
+        answer = self.accepted.result() if is_known else None
+        return answer.within if answer is not None else None
+
+    def accept(self, answer: Accepted | None = None) -> None:
+        """Note that the server has accepted the request. answer: None if that was lost, and its end has come."""
+        if not self.accepted.done():
+            self.accepted.set_result(answer)
+            self._tell(answer)
+
+    def end(self, end: Outcome | EngageError) -> None:
+        if isinstance(end, Outcome):
+            self.accept()
+            if not self.outcome.done():
+                self.outcome.set_result(end)
+            self._tell(end)
+            return
+        for future in (self.accepted, self.outcome):
+            if not future.done():
+                future.set_exception(end)
+                future.exception()  # marked as seen: a caller may await only one of the two
+        self._tell(end)
+
 
 __all__ = ["NeverEnded", "Patience", "Pending", "RequestDesk", "RequestRefused", "Requester", "ServerRestarted"]
 _COMMANDS = (Request, KeepAlive)
@@ -99,7 +186,7 @@ class Requester:
             self._listen()
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
-            case [asking_effects.TellEnd(end=EngageError() as error)]:
+            case [asking_table.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error, tell)
         if (pending := self._pending.get(request.id)) is None:
             pending = self._pending[request.id] = Pending(key, request, tell)
@@ -139,21 +226,21 @@ class Requester:
     def _tick(self) -> None:
         self._carry_out(self._asking.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
+    def _carry_out(self, effects: list[asking_table.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
-            if isinstance(effect, asking_effects.PublishCommand):
+            if isinstance(effect, asking_table.PublishCommand):
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
                     # At the end of this very list: it may be long.
                     effects += self._could_not_send(effect.message.id, error)
-            elif isinstance(effect, asking_effects.TellAccepted):
+            elif isinstance(effect, asking_table.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
                     pending.accept(effect.answer)
-            elif isinstance(effect, asking_effects.TellEnd):
+            elif isinstance(effect, asking_table.TellEnd):
                 if (ended := self._pending.pop(effect.id, None)) is not None:
                     ended.end(effect.end)
-            elif isinstance(effect, asking_effects.Renew):
+            elif isinstance(effect, asking_table.Renew):
                 at, name = self._bus.stamp(), self._bus.name
                 still = KeepAlive(live=effect.live, at=at, requester=name, life=self._life)
                 self._publish(keys.keep_alive(effect.server), still)
@@ -161,7 +248,7 @@ class Requester:
                 self._bus.publish(keys.fault(self._bus.name), effect.fault)
         self._alarm.set(self._asking.deadline)
 
-    def _could_not_send(self, id: str, error: Exception) -> list[asking_effects.Effect]:
+    def _could_not_send(self, id: str, error: Exception) -> list[asking_table.Effect]:
         """End a request that has no encoded form (half a character in its text, for instance); the others go on."""
         fault = Fault(
             reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
@@ -254,7 +341,7 @@ class RequestDesk:
         on_cancel: Callable[[Cancel], None],
         *,
         on_extend: Callable[[Request], None] | None = None,
-        on_hold: Callable[[serving_effects.HoldRequest], None] | None = None,
+        on_hold: Callable[[serving_table.HoldRequest], None] | None = None,
         term: Seconds | None = None,
     ) -> None:
         self._bus = bus
@@ -357,18 +444,18 @@ class RequestDesk:
     def _tick(self) -> None:
         self._carry_out(self._serving.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
+    def _carry_out(self, effects: list[serving_table.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
-            if isinstance(effect, serving_effects.PublishAnswer):
+            if isinstance(effect, serving_table.PublishAnswer):
                 self._bus.publish(self._answers, effect.answer, again=effect.again)  # type: ignore[arg-type]
-            elif isinstance(effect, serving_effects.Hand):
+            elif isinstance(effect, serving_table.Hand):
                 if effect.is_asked:
                     handed = effect.request
                 else:
                     self._call_back(effect.request)
-            elif isinstance(effect, serving_effects.HoldRequest):
+            elif isinstance(effect, serving_table.HoldRequest):
                 if self._on_hold is not None:
                     with self._bus.containing(f"request {effect.name}, which nobody renews"):
                         self._on_hold(effect)

@@ -1,12 +1,14 @@
 """The serving side of long requests, pure: commands, the service's answers, presence and time in; messages out.
 
 What becomes of one request is `TABLE` in serving_table.py. `Serving` knows requests by requester, life, kind
-and id, and calls each by a name that no other request of this server has or had lately.
+and id, and calls each by a name that no other request of this server has or had lately (`Names`). What has ended is
+remembered, so that none of it is performed again (`EndedRequests`).
 
     effects = serving.take(request, now)               # a command; keep_alive, requester_gone, requester_there, tick
     effects = serving.answer(name, Accepted(id=name), now)      # what the service decides
 """
 
+from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from math import inf
 
@@ -32,11 +34,116 @@ from engage_hri.schemas.requests import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.requests.ended import EndedRequests
-from engage_hri.services.requests.names import Names
-from engage_hri.services.requests.records import ANEW, Key, Record, content_of, event_of, key_of
-from engage_hri.services.requests.serving_effects import Effect, Hand, HoldRequest, PublishAnswer, ServingFault
-from engage_hri.services.requests.serving_table import TABLE, ServingAction, ServingEvent, ServingState
+from engage_hri.services.requests.serving_table import (
+    ANEW,
+    TABLE,
+    Effect,
+    Hand,
+    HoldRequest,
+    Key,
+    PublishAnswer,
+    Record,
+    ServingAction,
+    ServingEvent,
+    ServingFault,
+    ServingState,
+    content_of,
+    event_of,
+    key_of,
+)
+from engage_hri.services.runtime.absent import Absent
+
+KEPT = 4096
+
+
+class Names:
+    """Names that were not given lately: the id itself, then `ask~2`, `ask~3`. kept: ids that are remembered."""
+
+    def __init__(self, kept: int = KEPT) -> None:
+        self._kept = kept
+        self._used: OrderedDict[str, int] = OrderedDict()
+
+    def unique(self, id: str) -> str:
+        """A name for `id` that no other has."""
+        while (count := self._used.pop(id, 0) + 1) > 1:
+            self._used[id] = count
+            id = f"{id}~{count}"
+        self._used[id] = count
+        while len(self._used) > self._kept:
+            self._used.popitem(last=False)
+        return id
+
+
+MOST = 8 * 1024 * 1024
+"""Bytes of the requests that are remembered, of all senders together."""
+EACH = 1024
+"""Bytes that a request takes beside its text and that of its answer: names, and its place in tables. Measured."""
+
+
+class EndedRequests:
+    """Requests that have ended, by sender, until nobody has spoken of them for `FORGOTTEN_AFTER`.
+
+    Who sends many makes room for them himself: it forgets nobody else's. bytes: what all of them take.
+    """
+
+    def __init__(self, most: int = MOST) -> None:
+        """most: bytes that they may have together. The last of all is remembered whatever its size."""
+        self._most = most
+        self._of = defaultdict[str, dict[str, Record]](dict)
+        """By sender and name; of each the oldest first."""
+        self._bytes: dict[str, int] = {}
+        self.bytes = 0
+        self._quiet: Absent[Record] = Absent()
+
+    def __len__(self) -> int:
+        return len(self._quiet)
+
+    def add(self, record: Record, now: Seconds) -> list[Record]:
+        """Remember a request that has ended, as `Record.pack` leaves it.
+
+        Returns those that are forgotten for want of room.
+        """
+        sender, size = record.sender, EACH + record.pack()
+        self._of[sender][record.name] = record
+        self._bytes[sender] = self._bytes.get(sender, 0) + size
+        self.bytes += size
+        self._quiet.leaves(record, now)
+        forgotten = []
+        while self.bytes > self._most:
+            loudest = max(self._bytes, key=self._bytes.__getitem__)
+            oldest = next(iter(self._of[loudest].values()))
+            if oldest is record:
+                break
+            self.discard(oldest)
+            forgotten.append(oldest)
+        return forgotten
+
+    def named(self, record: Record, now: Seconds) -> None:
+        """Note that somebody still speaks of a request: it is remembered from now."""
+        if record in self._quiet:
+            self._quiet.leaves(record, now)
+
+    def forgotten(self, now: Seconds) -> list[Record]:
+        """Forget those of which nobody has spoken for long; returns them."""
+        old = self._quiet.forgotten(now)
+        for record in old:
+            self._drop(record)
+        return old
+
+    def discard(self, record: Record) -> None:
+        """Forget a request, if it is here."""
+        if record in self._quiet:
+            self._quiet.comes(record)
+            self._drop(record)
+
+    def _drop(self, record: Record) -> None:
+        sender, size = record.sender, EACH + record.size
+        del self._of[sender][record.name]
+        self._bytes[sender] -= size
+        self.bytes -= size
+        if not self._of[sender]:
+            del self._of[sender], self._bytes[sender]
+
 
 GRACE: Seconds = 2.0
 """Seconds that a requester may be gone before its requests end: a restart of the router looks like a death."""

@@ -2,9 +2,8 @@
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, RequestRefused
-from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import PublishCommand, TellEnd
-from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.asking import Asking, Patience
+from engage_hri.services.requests.asking_table import PublishCommand, TellEnd
 from tests.bus.performer import block
 
 

@@ -14,8 +14,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.bus.sight import LATE
-from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.requests.silence import unfinished
+from engage_hri.services.requests.ends import RequestDesk, unfinished
 from tests.standing_still import stand_still
 
 TERM: Seconds = 2.0

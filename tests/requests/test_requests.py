@@ -16,10 +16,9 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Refused, Request
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
-from engage_hri.services.requests.ended import EACH, MOST
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, RequestRefused
-from engage_hri.services.requests.records import LONGEST
-from engage_hri.services.requests.serving import GRACE
+from engage_hri.services.requests.serving import EACH, GRACE, MOST
+from engage_hri.services.requests.serving_table import LONGEST
 from tests.bus.performer import Server, answered, bare, block, extent
 from tests.commanding import command, key_of
 

@@ -27,8 +27,7 @@ from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
 from engage_hri.services.realizer.points import EPSILON, FINISH, Point, performer
 from engage_hri.services.realizer.report.outcome import Spoken
 from engage_hri.services.realizer.together.live import Ending
-from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused
-from engage_hri.services.requests.silence import unfinished
+from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused, unfinished
 
 T = TypeVar("T")
 
