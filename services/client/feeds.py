@@ -11,8 +11,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
-from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.reports.reports import TimedReport
+from engage_hri.services.reports.ongoing_actions import ActionEvent, TimedReport
 
 M = TypeVar("M")
 

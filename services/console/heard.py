@@ -11,8 +11,8 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
+from engage_hri.services.reports.in_force import WorldReport
 from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.reports.world_report import WorldReport
 
 
 class Heard:

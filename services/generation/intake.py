@@ -39,9 +39,8 @@ from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
-from engage_hri.services.reports.publisher import Publisher
-from engage_hri.services.reports.reports import GoesOn, TimedReport
-from engage_hri.services.reports.world_report import WorldReport
+from engage_hri.services.reports.in_force import Publisher, WorldReport
+from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.runtime.intake import AnswerRequest, Input, MachineClocks, PublishMessage, TellMistake
 

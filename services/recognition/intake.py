@@ -32,9 +32,8 @@ from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, Read
-from engage_hri.services.reports.reporters import OLDEST
-from engage_hri.services.reports.reports import GoesOn, TimedReport
+from engage_hri.services.reports.action_reports import OLDEST, REPORT_GRACE, ActionReports, Read
+from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
 from engage_hri.services.runtime.intake import (
     AnswerRequest,
     Input,

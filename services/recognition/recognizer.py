@@ -23,7 +23,7 @@ from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import SETTLING, Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
 from engage_hri.services.recognition.perceive.words import TimedWords, Words
-from engage_hri.services.reports.reports import GoesOn
+from engage_hri.services.reports.ongoing_actions import GoesOn
 
 OLDEST: Seconds = 0.5
 """Greatest age at which a head pose or a voice level that arrives still counts: an older one tells of what has been

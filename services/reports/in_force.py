@@ -1,6 +1,7 @@
-"""The condition of a study that is in force, as its messages and the presence of generation tell it. Pure.
+"""States that hold as long as who told them is there: the world, and the condition of a study. Pure.
 
-A condition is in force as long as the life of generation that was told of it: a restarted generation has none.
+What a crash takes away is unknown, as at start. A world is over a grace after who told it has vanished: a link may be
+back. A condition is in force as long as the life of generation that was told of it: a restarted generation has none.
 """
 
 from typing import Self
@@ -11,6 +12,79 @@ from msgspec.structs import replace
 from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+
+
+class Publisher:
+    """The participant that published a state last. is_there: it has published, and has not gone since.
+
+    name: its; empty: not known. It is there again when the same life comes back, as after a cut. A new life has to
+    publish first.
+    """
+
+    def __init__(self) -> None:
+        self.is_there = False
+        self.name = ""
+        self._run = ""
+
+    def published(self, name: str, run: str) -> None:
+        """Take the news that a participant has published the state. Empty: who or which life it is, nothing tells."""
+        self.is_there, self.name, self._run = True, name, run
+
+    def feed(self, message: Message) -> bool:
+        """Take any other message: only those about presence count. Returns True if it is there again."""
+        before = self.is_there
+        match message:
+            case PeerGone(participant=name) if name == self.name:
+                self.is_there = False
+            case PeerAlive(participant=name, run=run) if name == self.name:
+                self.is_there = run == self._run
+        return self.is_there and not before
+
+
+NOTHING = World(entities=())
+
+
+class WorldReport:
+    """The last report of the world. grace: time for which it holds after its publisher has gone.
+
+    What is taken and what passes return the world that there is from now on, or None: it is as it was.
+    """
+
+    def __init__(self, grace: Seconds) -> None:
+        self._grace = grace
+        self._publisher = Publisher()
+        self._last: World | None = None
+        self._over_at: Seconds | None = None
+        self._is_over = False
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """Time at which `advance` has something to tell."""
+        return self._over_at
+
+    def take(self, message: object, source: str, life: str, now: Seconds) -> World | None:
+        """Take any message. The same life that comes back goes on with what it told."""
+        world = self.advance(now)
+        if isinstance(message, World):
+            self._publisher.published(source, life)
+            self._last, self._over_at, self._is_over = message, None, False
+            return message
+        was_there = self._publisher.is_there
+        if self._publisher.feed(message):  # type: ignore[arg-type]  # any other message tells it nothing
+            was_over, self._is_over, self._over_at = self._is_over, False, None
+            return self._last if was_over else world
+        if was_there and not self._publisher.is_there and isinstance(message, PeerGone):
+            self._over_at = now + self._grace
+        return world
+
+    def advance(self, now: Seconds) -> World | None:
+        """Let time pass."""
+        if self._over_at is None or now < self._over_at:
+            return None
+        self._over_at, self._is_over = None, True
+        return NOTHING
 
 
 class InForce(Struct, frozen=True, kw_only=True):

@@ -1,7 +1,15 @@
-"""Ongoing actions: what events have told of beginnings and ends, as the state that a reporter publishes. Pure."""
+"""Ongoing actions: what events have told of beginnings and ends, as the state that a reporter publishes. Pure.
 
-from collections.abc import Iterable
+An event can be lost, and a state cannot say when something began. So a report keeps what its reporter has told of one
+actor (`Report`), and finds in each state which beginnings and ends were missed.
+"""
 
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from msgspec import Struct
+
+from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
@@ -95,3 +103,139 @@ class OngoingActionTracker:
         for actor in forgotten:
             del self._actors[actor]
         return forgotten
+
+
+class GoesOn(Struct, frozen=True):
+    """Observation: an action goes on that began long ago, or before its actor was found. Its beginning is no news.
+
+    since: local time at which it began.
+    """
+
+    began: ActionBegan
+    since: Seconds
+
+
+class TimedReport(NamedTuple):
+    """An observation, and its local time. is_sure: False: that time is the latest possible."""
+
+    observation: ActionEvent | GoesOn
+    at: Seconds
+    is_sure: bool = True
+
+
+class Report:
+    """The report of one actor by one reporter. local: converts stamps to local time."""
+
+    def __init__(self, local: Callable[[Stamp], Seconds]) -> None:
+        self._local = local
+        self._ongoing = Ongoing()
+        self._found: Seconds | None = None
+        """Time at which the person was last found."""
+        self._latest: Stamp | None = None
+        """Time of the newest event."""
+        self._tells_states = False
+        self._before_loss: dict[tuple[object, ...], ActionBegan] = {}
+        """What went on when the person was lost, until a state says what has become of it."""
+
+    @property
+    def actions(self) -> tuple[ActionBegan, ...]:
+        return self._ongoing.actions
+
+    @property
+    def seen(self) -> bool | None:
+        return self._ongoing.seen
+
+    def says(self, action: ActionBegan) -> bool:
+        """Tell whether the same goes on, with the same targets."""
+        known = self._ongoing.get(action)
+        return known is not None and known.targets == action.targets
+
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing of it has to be remembered."""
+        return not (self.seen or self.actions or self._before_loss)
+
+    def take(self, event: ActionEvent) -> None:
+        """Take an event, which is told as it is. With a loss, all that the person does is unknown."""
+        if isinstance(event, ActorLost):
+            if self._tells_states:
+                self._before_loss = {
+                    _exactly(one): one for one in (*self._before_loss.values(), *self.actions)[-MOST:]
+                }
+            self._ongoing.become(())
+        self._ongoing.take(event)
+        if isinstance(event, ActorFound):
+            self._found = self._local(event.at)
+        if self._latest is None or not _is_before(event.at, self._latest):
+            self._latest = event.at
+
+    def correct(self, state: OngoingActions, now: Seconds) -> list[TimedReport]:
+        """Take a state. Returns what it shows to have been missed, in order; mostly nothing.
+
+        What has ended meanwhile has ended when something else of its kind began, or else by the state's last change.
+        One that is older than an event has been overtaken.
+        """
+        if self._latest is not None and _is_before(state.at, self._latest):
+            return []
+        self._tells_states, at = True, self._local(state.at)
+        told = [TimedReport(ended, when, is_sure=False) for ended, when in self._ended(state, at)]
+        was_seen, self._ongoing.seen = self.seen, state.seen
+        if state.seen and not was_seen:
+            self._found = at
+            told.append(TimedReport(ActorFound(actor=state.actor, at=state.at), at, is_sure=False))
+        if state.seen is False:
+            # Of somebody who is lost nothing new is believed.
+            self._ongoing.become(action for action in state.actions if self.says(action))
+            lost = TimedReport(ActorLost(actor=state.actor, at=state.at), at, is_sure=False)
+            return [*told, lost] if was_seen else told
+        missed = [action for action in state.actions if not self._knows(action)]
+        self._ongoing.become(state.actions)
+        return told + [self._begun(action, now) for action in missed]
+
+    def _knows(self, action: ActionBegan) -> bool:
+        known = self._ongoing.get(action)
+        return known is not None and _exactly(known) == _exactly(action)
+
+    def _ended(self, state: OngoingActions, at: Seconds) -> list[tuple[ActionEnded, Seconds]]:
+        """The ends that were missed, each with its time. at: local time of the state."""
+        still = {_exactly(action) for action in state.actions}
+        ended = []
+        for known in (*self._before_loss.values(), *self.actions):
+            if _exactly(known) not in still:
+                since = self._local(known.at)
+                next_ones = (self._local(each.at) for each in state.actions if each.action == known.action)
+                when = min((other for other in next_ones if since <= other <= at), default=at)
+                ended.append((_end(known), max(when, since)))
+        is_lost = state.seen is False
+        self._before_loss = {one: each for one, each in self._before_loss.items() if is_lost and one in still}
+        return sorted(ended, key=lambda one: one[1])
+
+    def _begun(self, action: ActionBegan, now: Seconds) -> TimedReport:
+        """Tell a beginning that was missed, as news only if it is as recent as the history that late readers get."""
+        since = self._local(action.at)
+        is_news = now - since <= keys.HISTORY_MAX_AGE and (self._found is None or since >= self._found)
+        return TimedReport(action, since) if is_news else TimedReport(GoesOn(action, since), now)
+
+    def going(self) -> list[GoesOn]:
+        """List what goes on, for a session that has been told that it had ended."""
+        return [GoesOn(action, self._local(action.at)) for action in self.actions]
+
+    def ends(self, is_over: Callable[[ActionBegan], bool]) -> list[ActionEnded]:
+        """List the ends of what goes on, if `is_over`."""
+        return [_end(action) for action in self.actions if is_over(action)]
+
+
+def _exactly(action: ActionBegan) -> tuple[object, ...]:
+    """Name an action among those of its actor, from its beginning on."""
+    return which(action), action.targets, action.at
+
+
+def _end(began: ActionBegan) -> ActionEnded:
+    return ActionEnded(
+        actor=began.actor, action=began.action, at=began.at, targets=began.targets, behavior=began.behavior
+    )
+
+
+def _is_before(one: Stamp, other: Stamp) -> bool:
+    """Tell whether an instant is certainly before another: only those of one clock compare without error."""
+    return one.clock == other.clock and one.seconds < other.seconds

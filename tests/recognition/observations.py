@@ -14,7 +14,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
-from engage_hri.services.reports.reports import GoesOn
+from engage_hri.services.reports.ongoing_actions import GoesOn
 
 ROBOT, HUMAN = "robot", "human"
 PIECES = ("blue-square", "rectangle", "purple-triangle", "pink-square", "trapezoid", "green-square")

@@ -12,9 +12,8 @@ from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.reports.action_reports import REPORT_GRACE
+from engage_hri.services.reports.action_reports import REPORT_GRACE, Reporters
 from engage_hri.services.reports.ongoing_actions import ActionEvent, OngoingActionTracker
-from engage_hri.services.reports.reporters import Reporters
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
 

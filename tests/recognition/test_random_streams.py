@@ -18,7 +18,7 @@ from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.events.session import Observation, Session
 from engage_hri.services.recognition.statistics.tally import KINDS
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.reports.reports import GoesOn
+from engage_hri.services.reports.ongoing_actions import GoesOn
 from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 

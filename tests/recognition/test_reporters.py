@@ -4,9 +4,8 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, Act
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.reports.reporters import Reporters
-from engage_hri.services.reports.reports import GoesOn, TimedReport
+from engage_hri.services.reports.action_reports import Reporters
+from engage_hri.services.reports.ongoing_actions import ActionEvent, GoesOn, TimedReport
 from tests.recognition.observations import ROBOT, stamp
 
 GRACE = 4.0

@@ -20,7 +20,7 @@ from engage_hri.services.recognition.events.machine import (
     table,
 )
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
-from engage_hri.services.reports import reporters
+from engage_hri.services.reports import action_reports
 
 TABLES = {
     "directed gaze": directed_gaze.TABLE, "mutual facial gaze": mutual_facial_gaze.TABLE,
@@ -146,25 +146,25 @@ def test_a_gaze_cone_that_cannot_be_is_refused(value, reason):
 # -- reporters -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("standing", get_args(reporters.Standing))
-def test_the_table_of_reporters_is_total(standing: reporters.Standing):
-    timers: dict[reporters.Standing, reporters.Given] = {"away": "grace_over", "back": "caught_up"}
+@pytest.mark.parametrize("standing", get_args(action_reports.Standing))
+def test_the_table_of_reporters_is_total(standing: action_reports.Standing):
+    timers: dict[action_reports.Standing, action_reports.Given] = {"away": "grace_over", "back": "caught_up"}
     given = {"gone", "alive", "reborn", *([timers[standing]] if standing in timers else [])}
 
-    assert {one for state, one in reporters.TABLE if state == standing} == given
+    assert {one for state, one in action_reports.TABLE if state == standing} == given
 
 
 def test_the_documentation_shows_the_table_of_reporters_as_it_is():
     lines = ["stateDiagram-v2", "    [*] --> here"]
-    for (state, given), row in reporters.TABLE.items():
+    for (state, given), row in action_reports.TABLE.items():
         lines.append(f"    {state} --> {row.next} : {given}{f' / {row.effect}' if row.effect else ''}")
 
     assert "\n".join(lines) + "\n" in PAGE.read_text()
 
 
 def test_every_standing_is_left_for_here():
-    for standing in get_args(reporters.Standing):
+    for standing in get_args(action_reports.Standing):
         for _ in range(3):
-            standing = reporters.TABLE[standing, "alive"].next
-            standing = reporters.TABLE.get((standing, "caught_up"), reporters.TABLE[standing, "alive"]).next
+            standing = action_reports.TABLE[standing, "alive"].next
+            standing = action_reports.TABLE.get((standing, "caught_up"), action_reports.TABLE[standing, "alive"]).next
         assert standing == "here"

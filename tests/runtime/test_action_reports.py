@@ -6,8 +6,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, is_proper
-from engage_hri.services.reports.reporters import SILENCED_KEPT
+from engage_hri.services.reports.action_reports import REPORT_GRACE, SILENCED_KEPT, ActionReports, is_proper
 
 ROBOT = "robot"
 

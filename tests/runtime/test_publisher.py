@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.services.reports.publisher import Publisher
+from engage_hri.services.reports.in_force import Publisher
 
 NEWS = st.sampled_from(["publishes", "comes", "goes"])
 STEPS = st.lists(st.tuples(NEWS, st.sampled_from("ab"), st.sampled_from("12")))

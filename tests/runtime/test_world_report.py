@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.reports.world_report import NOTHING, WorldReport
+from engage_hri.services.reports.in_force import NOTHING, WorldReport
 
 WORLD = World(entities=(Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7)),))
 GONE = PeerGone(participant="camera")

@@ -29,7 +29,7 @@ from engage_hri.services.recognition.events.machine import Effect, EventWriter, 
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
-from engage_hri.services.reports.reports import GoesOn
+from engage_hri.services.reports.ongoing_actions import GoesOn
 
 WORDS_PATIENCE: Seconds = 10.0
 """Time after the end of an event for which it is told again, should its words become known or be corrected. Decision
