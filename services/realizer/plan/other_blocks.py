@@ -5,10 +5,8 @@ part over and loses its way home, as within one block; before that, who comes wa
 without. Points of theirs that this block names are times in its schedule, and may leave no time for a behavior of it.
 """
 
-from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence, Set
-from functools import partial
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from math import inf
-from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -38,20 +36,6 @@ from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling, othe
 from engage_hri.services.realizer.points import EPSILON, Point
 
 
-class Waits(NamedTuple):
-    """Answers to who waits for whom, whatever the times are.
-
-    is_behind: whether a point of another block comes only after a behavior of this one has begun. coming_with: the
-    points of this block that come only once a point of another one has.
-    """
-
-    is_behind: Callable[[Point, str], bool]
-    coming_with: Callable[[Point], Set[Point]]
-
-
-NOBODY = Waits(lambda point, behavior: False, lambda point: frozenset())
-
-
 def share(
     chains: Mapping[str, Chain],
     relations: Relations,
@@ -59,18 +43,18 @@ def share(
     arranged: Arrangement,
     times: Mapping[Point, Seconds],
     hands: Hands,
+    assembly: Assembly,
     undated: Container[str] = (),
-    waits: Waits = NOBODY,
 ) -> tuple[Arrangement, list[Conflict]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
     times: of the points of this block, in the schedule that `arranged` is for, and of others. hands: as of `arrange`.
-    undated: behaviors that wait for points of which nobody knows yet when they come; once it is known they are
-    planned again.
+    assembly: the net of that schedule. undated: behaviors that wait for points of which nobody knows yet when they
+    come; once it is known they are planned again.
     """
     if not known.holders and not known.given:
         return arranged, []
-    shared = _Sharing(chains, relations, known, arranged, times, hands, waits)
+    shared = _Sharing(chains, relations, known, arranged, times, hands, assembly)
     for id in chains:
         shared.give(id)
         for name in shared.rivals(id) if id not in undated else ():
@@ -92,9 +76,9 @@ class _Sharing:
         arranged: Arrangement,
         times: Mapping[Point, Seconds],
         hands: Hands,
-        waits: Waits,
+        assembly: Assembly,
     ) -> None:
-        self.waits = waits
+        self.assembly = assembly
         self.chains = chains
         self.known = known
         self.times = times
@@ -159,7 +143,7 @@ class _Sharing:
     def _comes_too_late(self, chain: Chain, holder: Holder) -> bool:
         """True if what the behavior must have made comes only once the holder has begun: then that has the part."""
         needed = chain.points[: least(chain, holder.chain) + 1]
-        return not self.waits.coming_with(holder.chain.points[0]).isdisjoint(needed)
+        return not coming_with(self.assembly, self.known, holder.chain.points[0]).isdisjoint(needed)
 
     def keep_taking(self, id: str) -> None:
         """Go on taking what is handed over to a behavior by plan: only for that does it end as this one begins.
@@ -236,7 +220,7 @@ class _Sharing:
         if point is None or (id, point) in self.turns:
             return None
         is_just_now = self.times[point] >= self.times[self.chains[id].points[0]] - EPSILON
-        is_free = not is_just_now or point in self.named or self.waits.is_behind(point, id)
+        is_free = not is_just_now or point in self.named or is_behind(self.assembly, self.known, point, id)
         return None if first is None and is_free else point
 
     def _behind_all(self, id: str, point: Point) -> Point:
@@ -244,7 +228,7 @@ class _Sharing:
         since, to = window(self.chains[id], self.times)
         for begins, ends, name in self._users_of(id):
             holder, at = self.known.holders[name], self.times[point]
-            if self.waits.is_behind(holder.chain.points[0], id):
+            if is_behind(self.assembly, self.known, holder.chain.points[0], id):
                 continue
             if at < ends - EPSILON and at - EPSILON <= begins < at + to - since - EPSILON:
                 point = self._release(id, holder, 1)
@@ -269,11 +253,6 @@ def naming_others(present: Relations, arrangement: Arrangement) -> Relations:
     if not foreign:
         return present
     return replace(present, equals=(*present.equals, *(Equal((Term(each, 0.0, str(each)),)) for each in foreign)))
-
-
-def waits_elsewhere(turn: Turn) -> bool:
-    """True if the turn is to wait for a behavior of another block."""
-    return is_foreign(turn[1].behavior)
 
 
 def needless_turns(
@@ -352,10 +331,6 @@ def coming_with(assembly: Assembly, known: Known, foreign: Point) -> set[Point]:
     named = [each for each in assembly.at if is_foreign(each.behavior) and block_of(each) == block]
     later = assembly.net.later([assembly.at[each] for each in named if known.points.get(each, -inf) >= at])
     return {point for point, transition in assembly.at.items() if transition in later}
-
-
-def waits(assembly: Assembly, known: Known) -> Waits:
-    return Waits(partial(is_behind, assembly, known), partial(coming_with, assembly, known))
 
 
 def futile(impossible: Impossible) -> set[tuple[Point, Point]]:

@@ -33,7 +33,7 @@ from engage_hri.services.realizer.plan.handover import (
 )
 from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.losses import Loss, Losses, Times, clashes, judge
-from engage_hri.services.realizer.plan.other_blocks import naming_others, needless_turns, share, waits_elsewhere
+from engage_hri.services.realizer.plan.other_blocks import naming_others, needless_turns, share
 from engage_hri.services.realizer.plan.part_order import PartOrder
 from engage_hri.services.realizer.plan.phases import ARMS, Chain, as_run, chain, natural_ends, unawaited_events
 from engage_hri.services.realizer.plan.plan import AT_EASE, Late, Manner, Plan, compared, eased, standing
@@ -294,12 +294,12 @@ class _Planner:
                 self.chains, present, arrangement, everywhere, rounds, hands, self.known.begun
             )
             undated = other_blocks.without_date(assembly, self.known) if given else ()
-            waits = other_blocks.waits(assembly, self.known)
-            arranged, others = share(self.chains, present, self.known, arranged, everywhere, hands, undated, waits)
+            arranged, others = share(self.chains, present, self.known, arranged, everywhere, hands, assembly, undated)
             conflicts = [
                 each for each in (*conflicts, *others) if each.is_open(self.known.begun, self.overlaps | self.turns)
             ]
-            turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
+            own = (each.turn for each in conflicts if each.turn and not each.hand)
+            turns = [turn for turn in own if not is_foreign(turn[1].behavior)]
             losses = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
             if losses and not self.manner.may_be_late:
                 raise Losses(losses)
