@@ -32,7 +32,6 @@ LONG = {
     "control/test_unread_scripts.py": "eSpeak NG speaks, in a process",
     "control/test_voice_outlets.py": "loudspeakers are programs of the system",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
-    "recording/test_pictures.py": "it draws pictures and films of recordings, and has ffmpeg write them",
     "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
     "scenario/test_raw_perception.py": "whole tasks seen by cameras; recognition/ has the parts",
     "recording/test_commands_on_damage.py": "each command on each damage; test_damage.py has what reading finds",
@@ -43,7 +42,7 @@ LONG = {
     "access/test_table.py": "each row of the table over real sockets; test_denials.py has what a router tells",
     "recording/test_conditions.py": "a whole session with conditions",
     "recording/test_in_the_window.py": "a whole session in the window, compared at each jump",
-    "recording/test_annotation_files.py": "a whole session as files for ELAN and Praat, and a film",
+    "recording/test_annotation_files.py": "a whole session as a file for ELAN",
     "recording/test_tiers_at_random.py": "a whole session against an oracle; test_tiers.py has the rules",
     "recording/test_window_oracle.py": "a whole session against an oracle; test_player.py has the rules",
     "simulation/test_stochastic_task.py": "whole tasks with a person drawn by chance",
@@ -157,7 +156,6 @@ SHORT_PROCESSES: dict[str, str] = {
     "control/test_liars.py": "it asks pytest once, and no robot",
     "control/test_offers.py": "it asks Python once what a package on the path offers",
     "docs/test_changes.py": "it asks towncrier thrice, and no robot",
-    "recording/test_annotation_files.py": "it has ffmpeg write a film of an instant",
     "runtime/test_installation.py": "it asks Python once where a package is",
 }
 """Files of the short share that may start processes, with the reason."""

@@ -29,7 +29,9 @@ from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, MovementAuthority
-from engage_hri.services.control.testing import WORLD, Stage, default, performed, recorded, stops, times, violations
+from engage_hri.services.control.testing import WORLD, Stage, performed, times
+from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.stage import default
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.random_cases import share_of

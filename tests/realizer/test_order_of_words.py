@@ -20,7 +20,6 @@ from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.speaking_order import SpeakingOrder
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.runtime.steps import finished
 from tests.random_cases import share_of
 from tests.realizer.oracle import consult, estimate, relaxed
 
@@ -207,7 +206,7 @@ def circle(earlier: str, later: str) -> Circle:
 
 def passes_alone(order: SpeakingOrder) -> bool:
     at = {point: number for number, point in enumerate(ENDS)}
-    return finished(order.pass_alone(NET, at, [0.0] * len(ENDS)))
+    return order.pass_alone(NET, at, [0.0] * len(ENDS))
 
 
 def test_of_two_speeches_each_order_is_tried_and_then_one_is_lost() -> None:
