@@ -101,9 +101,6 @@ LONG_TESTS = {
     "hostile/test_attacks.py": {
         "test_the_same_seed_does_the_same": "two attacks; it guards a tool",
     },
-    "realizer/test_slices.py": {
-        "test_no_slice_of_planning_is_long": "each shape of a large block under a profiler",
-    },
     "recognition/test_crowd.py": {
         "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
     },
