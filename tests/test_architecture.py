@@ -229,7 +229,7 @@ def _in_tests(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str
 
 def _sleeps(tree: ast.AST, name: str) -> Iterator[int]:
     """Lines of calls that really wait; `sleep(0)` only lets others run."""
-    for node in _nodes(tree):
+    for node in _nodes(tree) if isinstance(tree, ast.Module) else ast.walk(tree):
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "sleep"):
             continue
         if ast.unparse(node.func) == name and ast.unparse(node.args[0]) not in ("0", "0.0"):
@@ -261,9 +261,16 @@ def _tree(text: str) -> ast.Module:
 
 
 @lru_cache(maxsize=1)
-def _nodes(tree: ast.AST) -> list[ast.AST]:
-    """All nodes of a file, or of a part of one; most rules ask for those of a whole file, one after the other."""
-    return list(ast.walk(tree))
+def _nodes(tree: ast.Module) -> list[ast.AST]:
+    """All nodes of a file, for which most rules ask one after the other. `ast.walk` takes twice as long."""
+    found: list[ast.AST] = [tree]
+    for node in found:
+        for value in vars(node).values():
+            if isinstance(value, list):
+                found += [each for each in value if isinstance(each, ast.AST)]
+            elif isinstance(value, ast.AST):
+                found.append(value)
+    return found
 
 
 def _called(tree: ast.Module) -> set[str]:
