@@ -99,7 +99,6 @@ class _Document:
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
-        self._source.require_declared()
         raw = self._own_fields(root, TurnFragment)
         self._note_foreign(root, foreign_attributes(root))
         fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
