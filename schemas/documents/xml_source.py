@@ -12,6 +12,7 @@ from lxml import etree
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.limits import LARGEST
+from engage_hri.schemas.utf8 import utf8
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
@@ -43,8 +44,6 @@ _ADVICE = {
 }
 """Advice by libxml2's name of the error."""
 _DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
-_ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
-"""Encodings in which a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
 _ROOT_ID = re.compile(rb"<(?:[\w.-]+:)?e?bml\s[^<>]*?\bid\s*=\s*[\"']([^\"'<>&]+)[\"']")
 """Id of the document, near its beginning."""
 _NEAR = 4096
@@ -99,26 +98,16 @@ class Source:
         return InputRefused(Fault(reason=reason, where=self.name, line=line, advice=advice), self.block)
 
     def _decoded(self, data: bytes) -> str:
-        """Decode the bytes. Raises InputRefused for another encoding than declared, and for one that hides tags."""
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            encoding = "utf-16"
-        elif data[1:4:2] == b"\0\0" or data[:3:2] == b"\0\0":
-            encoding = "utf-16-le" if data[0] else "utf-16-be"
-        else:
-            declared = _DECLARED.match(data)
-            encoding = declared[1].decode() if declared else "utf-8"
-            if not _ENCODINGS.fullmatch(encoding):
-                reason = f"malformed XML: encoding {encoding[:40]!r} is not read"
-                raise self.refusal(reason, line=1, advice="save it as UTF-8")
+        """Decode the bytes. Raises InputRefused for another encoding than UTF-8, or UTF-16 with its mark."""
+        declared = _DECLARED.match(data)
+        if declared and declared[1].upper() not in (b"UTF-8", b"UTF8", b"US-ASCII", b"ASCII"):
+            reason = f"malformed XML: encoding {declared[1].decode()[:40]!r} is not read"
+            raise self.refusal(reason, line=1, advice="save it as UTF-8")
         try:
-            return data.decode(encoding)
-        except UnicodeDecodeError as error:
-            line = data.count(b"\n", 0, error.start) + 1
-            reason = f"malformed XML: this is not {encoding} ({error.reason})"
-            raise self.refusal(reason, line=line, advice="save it as UTF-8, or declare its encoding") from error
-        except LookupError as error:
-            reason = f"malformed XML: encoding {encoding!r} is not known"
-            raise self.refusal(reason, line=1, advice="save it as UTF-8") from error
+            return utf8(data)
+        except InputRefused as error:
+            reason = f"malformed XML: {error.fault.reason}"
+            raise self.refusal(reason, line=error.fault.line, advice=error.fault.advice) from error
 
     def _parse(self, text: str) -> etree._Element:
         parser = _parser()

@@ -44,10 +44,9 @@ def test_what_is_no_xml_is_refused_with_its_line(wrong: str) -> None:
 
 @pytest.mark.parametrize(
     ("declared", "encoding"),
-    [("", "utf-8"), ("", "utf-8-sig"), ("", "utf-16"), ("UTF-16", "utf-16-le"), ("ISO-8859-1", "latin-1"),
-     ("windows-1252", "cp1252")],
-)  # fmt: skip
-def test_a_document_may_be_in_any_common_encoding(declared: str, encoding: str) -> None:
+    [("", "utf-8"), ("", "utf-8-sig"), ("", "utf-16"), ("UTF-16", "utf-16"), ("utf-8", "utf-8")],
+)
+def test_a_document_may_be_in_unicode(declared: str, encoding: str) -> None:
     declaration = f'<?xml version="1.0" encoding="{declared}"?>' if declared else ""
     text = f'{declaration}\n<bml id="b"><speech id="s">café</speech></bml>'
 
@@ -59,7 +58,7 @@ def test_a_document_may_be_in_any_common_encoding(declared: str, encoding: str) 
 @pytest.mark.parametrize(
     ("declared", "encoding"),
     [("UTF-7", "utf-7"), ("klingon", "utf-8"), ("UTF-8", "latin-1"), ("UTF-16", "utf-8"), ("UTF-32", "utf-32"),
-     ("us-ascii", "latin-1"), ("IBM037", "cp037"), ("ISO-2022-JP", "ascii")],
+     ("us-ascii", "latin-1"), ("ISO-8859-1", "latin-1"), ("IBM037", "cp037"), ("ISO-2022-JP", "ascii")],
 )  # fmt: skip
 def test_a_document_in_another_encoding_than_it_says_is_refused(declared: str, encoding: str) -> None:
     text = f'<?xml version="1.0" encoding="{declared}"?>\n<bml id="b"><speech id="s">café</speech></bml>'
