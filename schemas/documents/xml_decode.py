@@ -46,7 +46,7 @@ from engage_hri.schemas.documents.xml_source import (
 from engage_hri.schemas.documents.xml_speech import MARKS, language, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import disambiguated, in_draft_spelling
+from engage_hri.schemas.references import SYNC_NAMES, disambiguated, in_draft_spelling
 from engage_hri.schemas.suggestion import meant
 
 __all__ = ["decode_xml", "encode_xml"]
@@ -237,7 +237,7 @@ class _Document:
         self._note_foreign(element, grammar.foreign_parts(element), self._id(element))
         raw = fields(plain) if row.is_standard else self._own_fields(element, row.kind)
         raw |= {"id": self._id(element)} | ({"required": True} if required else {})
-        timing = [of.Timing(name, value) for name, value in plain.items() if name in grammar.SYNC_ATTRIBUTES]
+        timing = [of.Timing(name, value) for name, value in plain.items() if name in SYNC_NAMES]
         if local == "speech":
             timing += self._speech(element, raw)
         else:
@@ -376,7 +376,7 @@ class _Document:
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
         """Read the attributes of an EBML element as fields. Raises InputRefused for an unknown attribute."""
         plain = attributes(element)
-        raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
+        raw = fields({name: value for name, value in plain.items() if name not in SYNC_NAMES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in sorted(raw.keys() - known):
             reason = f"<{local_name(element)}> has no attribute {grammar.attribute(name)!r}"
