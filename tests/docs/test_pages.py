@@ -30,7 +30,6 @@ from tests.docs.pages import (
     left_to_the_reader,
     spans,
 )
-from tests.schemas.feedback_reader import decode_feedback
 
 pytestmark = pytest.mark.real_time
 
@@ -178,8 +177,6 @@ class Page:
         path.write_text(block.text)
         if block.name and any(block.name in item.text for item in self.items if item.line > block.line):
             return ""
-        if "<ebml:feedback" in block.text:
-            return "" if decode_feedback(block.text) else "no feedback"
         if '"status"' in block.text:
             msgspec.json.decode(block.text, type=Summary, strict=True)
             return ""
