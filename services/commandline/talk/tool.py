@@ -26,7 +26,7 @@ def main(options: Options) -> int:
     made = tool_definition(options.format, world)
     if world is not None and not is_listed(world):
         complain(
-            f"tool: ids are any text: the APIs take no list of more than {MOST_IDS} ids, or of {MOST_LETTERS} letters."
+            f"tool: ids are any text: the APIs take no list of more than {MOST_IDS} ids, or {MOST_LETTERS} letters."
             " What is no id is refused when performed"
         )
     print_format(msgspec.json.format(msgspec.json.encode(made), indent=2).decode())
