@@ -12,6 +12,7 @@ is of another namespace is left out of either, and noted. Text behind a referenc
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Set
 from functools import cached_property
 from itertools import chain, count
@@ -23,12 +24,11 @@ from lxml import etree
 from engage_hri.schemas import allowed, vocabulary
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
 from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
-from engage_hri.schemas.documents.xml_notes import Notes
 from engage_hri.schemas.documents.xml_source import (
     BML_1_0,
     CORE,
@@ -51,6 +51,8 @@ from engage_hri.schemas.suggestion import meant
 
 __all__ = ["decode_xml", "encode_xml"]
 
+MOST = 100
+"""Notes of one kind that are told: each takes time to make, and is a warning on the bus."""
 _STRAY = "{urn:engage}stray"
 """Tag of the elements that are about to be removed."""
 
@@ -410,3 +412,28 @@ class _Document:
 def _ties(element: etree._Element) -> list[of.Timing]:
     children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
     return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
+
+
+class Notes:
+    """Notes of one document, as they come."""
+
+    def __init__(self) -> None:
+        self._kept: list[Unread] = []
+        self._count = Counter[WarningKind]()
+
+    def is_full(self, kind: WarningKind) -> bool:
+        """Tell whether the next note of this kind is only counted, and needs no words."""
+        return self._count[kind] >= MOST
+
+    def add(self, message: str, behavior: str, kind: WarningKind) -> None:
+        if not self.is_full(kind):
+            self._kept.append(Unread(message=message, behavior=behavior, kind=kind))
+        self._count[kind] += 1
+
+    def told(self) -> list[Unread]:
+        """All notes, with one for each kind of which there are more."""
+        more = [(kind, number - MOST) for kind, number in self._count.items() if number > MOST]
+        return self._kept + [
+            Unread(message=f"{number} more {'part is' if number == 1 else 'parts are'} ignored", kind=kind)
+            for kind, number in more
+        ]

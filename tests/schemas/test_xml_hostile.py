@@ -11,8 +11,7 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.blocks import Unread
 from engage_hri.schemas.documents import xml_decode
 from engage_hri.schemas.documents.json_codec import read
-from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.documents.xml_notes import MOST
+from engage_hri.schemas.documents.xml_decode import MOST, decode_xml
 from engage_hri.schemas.faults import InputRefused
 from tests.random_cases import share_of
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
