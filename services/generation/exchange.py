@@ -1,4 +1,4 @@
-"""Generation's dealings with realizer, body and recognition, as values: what it asks for, and what comes of that."""
+"""Values between generation and its shell: what it asks of others and what comes of that, besides messages."""
 
 from typing import Literal
 
@@ -63,6 +63,12 @@ class AnswerCame(Struct, frozen=True, tag="answer_came"):
 
     id: str
     answer: Message | NoAnswer | None
+
+
+class GenerationBegan(Struct, frozen=True, tag="generation_began"):
+    """The first step of a life. covered_for: see `CoveredObjects`."""
+
+    covered_for: Seconds
 
 
 class OwnSight(Struct, frozen=True, tag="own_sight"):

@@ -33,7 +33,7 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.sight import NEVER, Sight
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import AnswerCame, OwnSight, SendRequest
+from engage_hri.services.generation.exchange import AnswerCame, GenerationBegan, OwnSight, SendRequest
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter
@@ -57,7 +57,7 @@ Told = (
 """Messages that generation takes into account, besides requests."""
 Asked = PerformFragment | Inhibit | SetCondition | Cancel
 """Requests that it serves."""
-Content = Told | Asked | AnswerCame | OwnSight
+Content = Told | Asked | AnswerCame | GenerationBegan | OwnSight
 _TOLD = get_args(Told)
 
 
@@ -69,15 +69,7 @@ def reads(message: object) -> TypeGuard[Told]:
 class GenerationIntake:
     """All of generation but its requests' lives. session: part of the ids of what it sends, of this life alone."""
 
-    def __init__(
-        self,
-        robot: str,
-        config: GenerationConfig,
-        clock: MachineClocks,
-        session: str,
-        covered_for: Seconds = COVERED_FOR,
-    ) -> None:
-        """covered_for: see `CoveredObjects`."""
+    def __init__(self, robot: str, config: GenerationConfig, clock: MachineClocks, session: str) -> None:
         self._robot = robot
         self._clock = clock
         self._session = session
@@ -92,7 +84,7 @@ class GenerationIntake:
         self._fragments = Fragments(
             robot, config, clock, session, self._sight, self._arbiter, self._leases, self._outputs.append
         )
-        self._objects = CoveredObjects(covered_for)
+        self._objects = CoveredObjects(COVERED_FOR)
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._perception = Publisher()
         self._seen = WorldReport(REPORT_GRACE)
@@ -109,12 +101,6 @@ class GenerationIntake:
         due = (self._fragments.deadline, self._arbiter.deadline, self._patience.earliest, *reports)
         return min((each for each in due if each is not None), default=None)
 
-    def begin(self, now: Seconds) -> list[Struct]:
-        """The condition that holds from the start."""
-        self._now = now
-        self._tell_condition()
-        return self._take()
-
     def advance(self, now: Seconds) -> list[Struct]:
         """Take the step that is due by now."""
         self._now = now
@@ -129,7 +115,10 @@ class GenerationIntake:
         message = input.message
         with self._containing(f"{input.key or message.__class__.__name__} from {input.source or 'a stranger'}"):
             self._fragments.go_on(now)
-            if isinstance(message, OwnSight):
+            if isinstance(message, GenerationBegan):
+                self._objects = CoveredObjects(message.covered_for)
+                self._tell_condition()
+            elif isinstance(message, OwnSight):
                 self._look(message)
             elif isinstance(message, AnswerCame):
                 self._answer(message, now)

@@ -24,6 +24,7 @@ from engage_hri.services.generation.exchange import (
     AnswerCame,
     AskBody,
     CancelRequest,
+    GenerationBegan,
     NoAnswer,
     OwnSight,
     Question,
@@ -55,9 +56,9 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
     """
     with bus.subscribe(*PATTERNS) as inbox:
         async with asyncio.TaskGroup() as tasks:
-            generation = _Generation(bus, config, covered_for, tasks)
+            generation = _Generation(bus, config, tasks)
             try:
-                generation.begin()
+                generation.take_own(GenerationBegan(covered_for))
                 tell_settings(bus, NAME, config, covered_for=covered_for)
                 ready()
                 async for received in inbox:
@@ -70,13 +71,13 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
 class _Generation:
     """The parts of the service: both ends of requests, and generation with its ledger."""
 
-    def __init__(self, bus: Bus, config: GenerationConfig, covered_for: Seconds, tasks: asyncio.TaskGroup) -> None:
+    def __init__(self, bus: Bus, config: GenerationConfig, tasks: asyncio.TaskGroup) -> None:
         self._bus = bus
         self._tasks = tasks
         self._desk = RequestDesk(bus, NAME, self._cancel)
         self._requests = Requester(bus)
         clock = BusClock(bus)
-        self._intake = GenerationIntake(bus.robot, config, clock, session_of(bus.run), covered_for)
+        self._intake = GenerationIntake(bus.robot, config, clock, session_of(bus.run))
         self._steps = NotedIntake(bus, NAME, self._intake, clock, self._carry_out)
         self._alarm = Alarm(partial(self._do, self._steps.advance))
         self._due: deque[Callable[[], None]] = deque()
@@ -84,10 +85,6 @@ class _Generation:
         self._is_over = False
         self._own_sight = OwnSight(None, None, 0.0, None)
         """What the intake knows of it."""
-
-    def begin(self) -> None:
-        for output in self._intake.begin(self._bus.now()):
-            self._carry_out(output)
 
     def close(self) -> None:
         self._is_over = True
@@ -106,6 +103,9 @@ class _Generation:
             input = Input(received.key, message, received.source, received.at, received.past, received.life)
             self._take(input, received.number)
 
+    def take_own(self, content: GenerationBegan | AnswerCame) -> None:
+        self._do(partial(self._steps.take_own, content))
+
     def _cancel(self, cancel: Cancel) -> None:
         self._take(Input(keys.cancel(NAME), cancel, "", self._bus.now()))
 
@@ -120,7 +120,7 @@ class _Generation:
     def _has_come(self, id: str, answer: Message | News) -> None:
         """Take news of a question or a request."""
         news = NoAnswer.of(answer) if isinstance(answer, EngageError) else answer
-        self._take(Input("", AnswerCame(id, news), "", self._bus.now()))  # type: ignore[arg-type]
+        self.take_own(AnswerCame(id, news))  # type: ignore[arg-type]
 
     def _take(self, input: Input[Any], number: int = 0) -> None:
         self._do(partial(self._steps.take, input, number))

@@ -21,6 +21,8 @@ from engage_hri.services.bus.samples import Received
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
+from engage_hri.services.generation import intake as generation
+from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.recognition import intake as recognition
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.reading import Recording
@@ -46,7 +48,10 @@ class PlayedService(NamedTuple):
     content: Any
 
 
-SERVICES = {"recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content)}
+SERVICES = {
+    "generation": PlayedService(GenerationConfig, generation.GenerationIntake, generation.Content),
+    "recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content),
+}
 
 
 class Compared(Struct, frozen=True, kw_only=True):
