@@ -346,12 +346,13 @@ class Fragments:
             motions = yield from self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
             if performance.is_over:
                 return False
-            assert self._world is not None
-            world = remembered(self._world, performance.known)
+            seen = self._world
+            assert seen is not None
+            world = remembered(seen, performance.known)
             fragment, lost = bearable(fragment, world, self._robot)
             performance.warn(lost)
             check_world(fragment, world, self._robot)  # it may have changed while the fragment waited
-            bars = barred(targets(fragment), self._world, performance.known, performance.barred)
+            bars = barred(targets(fragment), seen, performance.known, performance.barred)
             body = self._body.capabilities
             if body is not None:
                 self._arbiter.gaze_perceived_within(body.gaze_half_angle)
@@ -372,7 +373,7 @@ class Fragments:
             if permits() == permitted:
                 break  # else something is inhibited now that would be begun
         performance.begin(made)
-        performance.world = world
+        performance.world = seen
         self._turns.fragment_begins(turn.turn)
         if not performance.accepted:  # From here on the robot may speak.
             self._tell(AnswerRequest(Heard(id=performance.request.id)))
@@ -408,7 +409,7 @@ class Fragments:
         try:
             act, turn, now = performance.acts[-1], performance.turn_left, self._world
             assert now is not None
-            performance.world = world = remembered(now, performance.known)
+            performance.world, world = now, remembered(now, performance.known)
             fragment = open_references(performance.left, act)
             bars = barred(targets(fragment), now, performance.known, performance.barred)
             permits, body = self._leases.permits(), self._body
