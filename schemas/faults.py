@@ -139,7 +139,7 @@ class NeverEnded(OutcomeUnknown):
 
 
 def bug(error: BaseException, where: str, service: str) -> Fault:
-    """Make the fault of an exception that nobody foresaw. where: what was being done. service: the one it shows in."""
+    """Make the fault of an exception that nobody foresaw. where: what was being done. service: where it shows."""
     try:
         reason = error.fault.reason if isinstance(error, EngageError) else f"{type(error).__name__}: {error}"
     except Exception:  # the error's own __str__ raises

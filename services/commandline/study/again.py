@@ -21,6 +21,9 @@ from engage_hri.services.bus.samples import Received
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.serving.intake import ControlIntake
+from engage_hri.services.control.serving.steps import ControlStep
 from engage_hri.services.generation import intake as generation
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.recognition import intake as recognition
@@ -49,6 +52,9 @@ class PlayedService(NamedTuple):
 
 
 SERVICES = {
+    "control": PlayedService(
+        ControlConfig, lambda robot, config, clock, session: ControlIntake(robot, config, clock.name), ControlStep
+    ),
     "generation": PlayedService(GenerationConfig, generation.GenerationIntake, generation.Content),
     "recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content),
 }
