@@ -31,9 +31,9 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.sight import NEVER, Sight
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import AnswerCame, GenerationBegan, OwnSight, SendRequest
+from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter
@@ -45,7 +45,6 @@ from engage_hri.services.reports.world_report import WorldReport
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.runtime.intake import AnswerRequest, Input, MachineClocks, PublishMessage, TellMistake
 
-NAME = "generation"
 WORLD_PATIENCE: Seconds = 5.0
 """Time that a fragment waits for a first report of the world, or for a person to speak to: cameras start as the robot
 does. Ours."""
@@ -75,8 +74,8 @@ class GenerationIntake:
         self._session = session
         self._now: Seconds = 0.0
         self._outputs: list[Struct] = []
-        self._unlinked_at = NEVER
-        self._sight = Sight(NAME, lambda: self._unlinked_at)
+        self._own_sight = OwnSight()
+        self._sight = Sight(NAME, lambda: self._own_sight.unlinked_at)
         self._arbiter = Arbiter(robot, config)
         self._shifts: dict[str, str] = {}
         """Gaze shifts of the arbiter under way, by the id of their request."""
@@ -165,12 +164,9 @@ class GenerationIntake:
                 self._fragments.feed(message, now)
                 if not message.retold:
                     self._arbiter.feed(message, now)
-            case Utterance():
-                if message.actor != self._robot:
-                    self._fragments.feed(message, now)
             case RobotState() | Statistics():
                 self._arbiter.feed(message, now)
-            case SyncPointProgress() | WordSpoken():
+            case Utterance() | SyncPointProgress() | WordSpoken():
                 self._fragments.feed(message, now)
             case Unreadable(block=block, fault=fault):
                 self._warn(block, "PARSING_FAILURE", fault.within(block))
@@ -213,9 +209,8 @@ class GenerationIntake:
                 self._arbiter.shift_failed(shift, now)
 
     def _look(self, own: OwnSight) -> None:
-        self._unlinked_at = _at(own.unlinked_at)
-        self._sight.woke_at, self._sight.asleep_at = _at(own.woke_at), _at(own.asleep_at)
-        self._sight.slept = own.slept
+        self._own_sight = own
+        self._sight.woke_at, self._sight.asleep_at, self._sight.slept = own.woke_at, own.asleep_at, own.slept
 
     # -- requests -------------------------------------------------------------------------------------------------
 
@@ -316,8 +311,7 @@ class GenerationIntake:
                 self._give_up(request, now)
         is_any_begun = True
         while is_any_begun:
-            for id, fault in self._fragments.settle(now):
-                self._refuse(id, fault)
+            self._fragments.settle(now)
             self._rule(now)
             is_any_begun = self._fragments.begin(now)
 
@@ -342,10 +336,6 @@ class GenerationIntake:
             id = f"{self._session}/{ruling.shift.id}"
             self._shifts[id] = ruling.shift.id
             self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=ruling.shift.block)))
-
-
-def _at(time: Seconds | None) -> Seconds:
-    return NEVER if time is None else time
 
 
 def _how(cancel: Cancel) -> Literal["lapsed", "released", "owner_lost"]:

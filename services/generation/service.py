@@ -4,7 +4,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from math import isfinite
 from typing import Any
 
 from msgspec import Struct
@@ -16,11 +15,12 @@ from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import EngageError, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import session_of
-from engage_hri.schemas.requests import Accepted, Cancel, Heard, Refused
+from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import (
+    NAME,
     AnswerCame,
     AskBody,
     CancelRequest,
@@ -30,7 +30,7 @@ from engage_hri.services.generation.exchange import (
     Question,
     SendRequest,
 )
-from engage_hri.services.generation.intake import NAME, GenerationIntake, reads
+from engage_hri.services.generation.intake import GenerationIntake, reads
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.requests.pending import News
 from engage_hri.services.runtime.alarm import Alarm
@@ -83,7 +83,7 @@ class _Generation:
         self._due: deque[Callable[[], None]] = deque()
         """Steps to do; what the first of them led to is being carried out."""
         self._is_over = False
-        self._own_sight = OwnSight(None, None, 0.0, None)
+        self._own_sight = OwnSight()
         """What the intake knows of it."""
 
     def close(self) -> None:
@@ -142,9 +142,7 @@ class _Generation:
         sight, due = self._bus.sight, self._intake.deadline
         if due is not None:
             sight.look(self._bus.now(), due)
-        times = (at if isfinite(at) else None for at in (sight.woke_at, sight.asleep_at, sight.unlinked_at()))
-        woke_at, asleep_at, unlinked_at = times
-        own = OwnSight(woke_at, asleep_at, sight.slept, unlinked_at)
+        own = OwnSight(sight.woke_at, sight.asleep_at, sight.slept, sight.unlinked_at())
         if own != self._own_sight:
             self._own_sight = own
             self._steps.take_own(own)
@@ -156,14 +154,8 @@ class _Generation:
             match output:
                 case PublishMessage(key=key, message=message):
                     self._bus.publish(key, message)
-                case AnswerRequest(answer=Heard(id=id)):
-                    self._desk.hear(id)
-                case AnswerRequest(answer=Accepted(id=id)):
-                    self._desk.accept(id)
-                case AnswerRequest(answer=Refused(id=id, fault=fault)):
-                    self._desk.refuse(id, fault)
-                case AnswerRequest(answer=outcome):
-                    self._desk.end(outcome)
+                case AnswerRequest(answer=answer):
+                    self._desk.answer(answer)
                 case SendRequest(key=key, request=PerformBlock(id=id) as block):
                     self._requests.send(key, block, tell=partial(self._has_come, id))
                 case SendRequest(key=key, request=request):
