@@ -33,7 +33,6 @@ from engage_hri.schemas.requests import (
     Accepted,
     Answer,
     Cancel,
-    Heard,
     KeepAlive,
     Outcome,
     Refused,
@@ -331,28 +330,29 @@ class RequestDesk:
             return self._carry_out(self._serving.refuse(message, fault))
         return self._carry_out(self._serving.take(message, now, sender))
 
-    def hear(self, name: str) -> None:
-        """Tell the requester that it is not accepted, but may have begun: no other life is to begin it."""
-        self._answer(name, Heard(id=name))
-
     def accept(self, name: str, within: Seconds | None = None) -> None:
         """Tell the requester that the request is being performed. within: see `Accepted`."""
-        self._answer(name, Accepted(id=name, within=within))
+        self.answer(Accepted(id=name, within=within))
 
     def refuse(self, name: str, fault: Fault) -> None:
         """End the request: it will not be performed."""
-        self._answer(name, Refused(id=name, fault=fault))
+        self.answer(Refused(id=name, fault=fault))
 
     def end(self, outcome: Message) -> None:
         """End a request with its outcome, which has the request's name as its id."""
         assert isinstance(outcome, Outcome)
-        self._answer(outcome.id, outcome)
+        self.answer(outcome)
 
-    def _answer(self, name: str, answer: Answer) -> None:
+    def answer(self, answer: Message) -> None:
+        """Answer a request in any way; the answer has the request's name as its id.
+
+        `Heard`: it is not accepted, but may have begun, so that no other life is to begin it.
+        """
+        assert isinstance(answer, Answer)
         fault = getattr(answer, "fault", None)
         if fault is not None and not fault.service:
             answer = replace(answer, fault=replace(fault, service=self._server))
-        self._carry_out(self._serving.answer(name, answer, self._bus.now()))
+        self._carry_out(self._serving.answer(answer.id, answer, self._bus.now()))
 
     def _tick(self) -> None:
         self._carry_out(self._serving.tick(self._bus.now()))

@@ -26,6 +26,8 @@ from engage_hri.services.commandline.study.realizer_again import OtherWords, Sai
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.steps import ControlStep
+from engage_hri.services.generation import intake as generation
+from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recognition import intake as recognition
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -56,6 +58,7 @@ SERVICES = {
     "control": PlayedService(
         ControlConfig, lambda robot, config, clock, session: ControlIntake(robot, config, clock.name), ControlStep
     ),
+    "generation": PlayedService(GenerationConfig, generation.GenerationIntake, generation.Content),
     "recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content),
 }
 
