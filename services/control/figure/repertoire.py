@@ -158,18 +158,19 @@ class Repertoire:
             made._nearest[table] = dict(self._nearest[table])
         raw = _read(text, file)
         nearest = _table(raw.pop("nearest", {}), "nearest", file)
-        for name, content in raw.items():
-            table = _known(name, "", file)
-            for lexeme, value in _table(content, name, file).items():
-                made._paths[table][normal(lexeme)] = _value(value, table, f"{name}.{lexeme}", file)
-        for name, content in nearest.items():
-            table = _known(name, "nearest.", file)
-            for lexeme, value in _table(content, f"nearest.{name}", file).items():
-                key = f"nearest.{name}.{lexeme}"
-                if not isinstance(value, str):
-                    raise _refusal(f"the name of a lexeme is expected, not {value!r}", key, file)
-                made._nearest[table][normal(lexeme)] = normal(value)
-        made._check(raw, nearest, file)
+        own = [
+            (_known(name, prefix, file), normal(lexeme), value, f"{prefix}{name}.{lexeme}", bool(prefix))
+            for prefix, tables in (("", raw), ("nearest.", nearest))
+            for name, content in tables.items()
+            for lexeme, value in _table(content, f"{prefix}{name}", file).items()
+        ]
+        for table, lexeme, value, key, is_near in own:
+            if is_near and not isinstance(value, str):
+                raise _refusal(f"the name of a lexeme is expected, not {value!r}", key, file)
+            into = made._nearest if is_near else made._paths
+            into[table][lexeme] = _value(value, table, key, file)
+        for table, lexeme, value, key, is_near in own:
+            made._follow(table, normal(value) if is_near else lexeme, key, file)
         return made
 
     def find(self, table: Table, lexeme: str) -> Found:
@@ -228,17 +229,6 @@ class Repertoire:
         close = get_close_matches(normal(lexeme), known, n=3, cutoff=0.5) if table != "facs" else []
         there = f"do you mean {' or '.join(close)}?" if close else f"there are {', '.join(known)}."
         return f"{what}: {there} A repertoire file can add it: see docs/control.md"
-
-    def _check(self, raw: Mapping[str, Any], nearest: Mapping[str, Any], file: str) -> None:
-        """Check that the lexemes of a file lead to paths, and these are within the limits. Raises InputRefused."""
-        for name, content in raw.items():
-            table = _known(name, "", file)
-            for lexeme in content:
-                self._follow(table, normal(lexeme), f"{name}.{lexeme}", file)
-        for name, content in nearest.items():
-            table = _known(name, "nearest.", file)
-            for lexeme, near in content.items():
-                self._follow(table, normal(near), f"nearest.{name}.{lexeme}", file)
 
     def _follow(self, table: Table, lexeme: str, key: str, file: str) -> None:
         seen = [lexeme]

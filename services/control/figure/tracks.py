@@ -5,7 +5,7 @@ Only the nod tilts the head.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -232,15 +232,10 @@ def _by_side(angles: Array, joints: Sequence[str], trunks: Array | None) -> Iter
 
 def pose_at(tracks: Mapping[str, PartTrack], t: Seconds) -> dict[str, float]:
     """The angle of every joint, nod included."""
-    return pose_of(tracks, [track.angles(t) for track in tracks.values()])
-
-
-def pose_of(tracks: Mapping[str, PartTrack], angles: Iterable[Sequence[float]]) -> dict[str, float]:
-    """The angle of every joint, nod included, from those of each track."""
     pose: dict[str, float] = {}
-    for (part, track), own in zip(tracks.items(), angles, strict=True):
-        named = zip(track.joints, own, strict=True)
-        pose.update(named if part != "nod" else [(joint, pose.get(joint, 0.0) + angle) for joint, angle in named])
+    for name, track in tracks.items():
+        named = zip(track.joints, track.angles(t), strict=True)
+        pose.update(named if name != "nod" else [(joint, pose.get(joint, 0.0) + angle) for joint, angle in named])
     return pose
 
 

@@ -21,7 +21,6 @@ from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate
-from engage_hri.services.control.figure.laid_paths import laid_path
 from engage_hri.services.control.figure.pace import return_time
 from engage_hri.services.control.figure.repertoire import Repertoire
 from engage_hri.services.control.figure.tracks import PartTrack
@@ -149,9 +148,21 @@ class Torso(ClearOfTable):
         start = self.start(course, situation)
         if situation is None and self.is_carried(course):
             return self._path_on_the_move(start, course)
-        path = laid_path(start, course)
+        path = self._path(start, course)
         if "torso" in course.parts:
             yield from self.check(course, path, None if situation is None else situation.pose)
+        return path
+
+    def _path(self, start: JointMotion, course: Course, *, is_free: bool = False) -> Path:
+        """Lay a path along a course that is clear of the table. Raises Impossible.
+
+        is_free: for a trunk that moves, without the ranges of joints (`tracks.limits_of`); who asks minds the table.
+        """
+        path = Path(start, course.legs, tracks.limits_of(course.parts, is_free=is_free))
+        # What is on a place is planned such that it is clear there wherever the trunk is; its way home is laid anew.
+        trunks = course.trunks if course.aim is None else course.trunks[:1]
+        if not is_free and tracks.meets_table(path, course.joints, trunks):
+            raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
         return path
 
     def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
@@ -167,10 +178,10 @@ class Torso(ClearOfTable):
 
     def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
-        path = laid_path(start, course, is_free=True)
+        path = self._path(start, course, is_free=True)
         point = course.arrival
         if delay := self._delay(course.aim, self.clock.time() + path.marks[point]):
-            path = laid_path(start, replace(course, legs=_delayed(course.legs, point, delay)), is_free=True)
+            path = self._path(start, replace(course, legs=_delayed(course.legs, point, delay)), is_free=True)
         self.check_carried(course, path)
         return path
 
