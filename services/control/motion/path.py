@@ -72,11 +72,6 @@ class Leg(Struct, frozen=True, kw_only=True, gc=False):
     marks: tuple[tuple[str, float], ...] = ()
 
 
-def unmarked(legs: Sequence[Leg], sync: str) -> tuple[Leg, ...]:
-    """Legs without that mark."""
-    return tuple([replace(leg, marks=tuple([mark for mark in leg.marks if mark[0] != sync])) for leg in legs])
-
-
 class _Segment(Struct, frozen=True):
     """One leg of a path as a polynomial. start: in seconds at natural speed."""
 
@@ -206,7 +201,6 @@ class Path:
         """The same path without that mark."""
         path = copy(self)
         path.marks = {each: s for each, s in self.marks.items() if each != sync}
-        path.legs = unmarked(self.legs, sync)
         return path
 
     @cached_property

@@ -192,7 +192,7 @@ class ClearOfTable(MovingParts[Run]):
                 raised = Leg(goal=lifted(joints, here, lift), seconds=LIFTING, marks=waiting)
                 legs = (raised, replace(legs[0], marks=rest), *legs[1:])
             yield OF_A_WAY
-            path = Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts))
+            path = Path(start, legs, tracks.limits_of(run.course.parts))
             since = legs[0].seconds if len(legs) > 1 else path.length
             if tracks.meets_table(path, joints, around, since=since):
                 if not _are_clear(path.legs[-1].goal, joints, around):
@@ -241,7 +241,7 @@ class ClearOfTable(MovingParts[Run]):
             legs = [replace(leg, goal=to.goal, velocity=to.velocity) for leg, to in zip(left, new, strict=True)]
             least = arm_time(here, legs[0].goal, 0.0, 150.0) - 0.15
             legs[0] = replace(legs[0], seconds=max(legs[0].seconds, least))
-        return Path(start, run.with_faults(tuple(legs)), self.limits(run, course.aim, now))
+        return Path(start, tuple(legs), self.limits(run, course.aim, now))
 
 
 def _is_setting_out(run: Run, at: Seconds) -> bool:

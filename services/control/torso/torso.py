@@ -213,6 +213,7 @@ class Torso(ClearOfTable):
 
     def play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now, run.gate = self.clock.time(), inf
+        path = run.with_faults(path, now)
         run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
         column = 0
         for part in run.course.parts:
@@ -259,14 +260,14 @@ class Torso(ClearOfTable):
     ) -> Path:
         """Path from a target to where the part belongs, from then on; of an arm a way that is clear of the table."""
         leg = _leg_home(run, start, goal)
-        path = Path(start, run.with_faults((leg,)), limits)
+        path = Path(start, (leg,), limits)
         if run.course.parts != ("head",):
             trunks = self.places(at)
             for above in tracks.raised(tuple(start.q.tolist()), run.course.joints):
                 if not tracks.meets_table(path, run.course.joints, trunks):
                     break
                 first = Leg(goal=above, seconds=tracks.RAISING, marks=leg.marks[:1])
-                legs = run.with_faults((first, replace(leg, marks=leg.marks[1:])))
+                legs = (first, replace(leg, marks=leg.marks[1:]))
                 path = Path(start, legs, limits)
         return path
 
@@ -288,7 +289,7 @@ class Torso(ClearOfTable):
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             limits = self.limits(run, aim, now)
             path = self._path_home(run, start, goal, limits, now) if is_homeward else None
-            self.play(run, path or Path(start, run.with_faults(legs), limits), aim)
+            self.play(run, path or Path(start, legs, limits), aim)
         return passed
 
     def extend(self, run: Run) -> None:
@@ -451,7 +452,7 @@ class Torso(ClearOfTable):
                 track = self.tracks[run.course.parts[0]]
                 left = run.motion.path.after(run.motion.s(now), [each.sync for each in run.pending])
                 start, legs = track.start_at(now, run.course.aim), _delayed(left, point, late)
-                path = Path(start, run.with_faults(legs), self.limits(run, run.course.aim, now))
+                path = Path(start, legs, self.limits(run, run.course.aim, now))
                 self.play(run, path, run.course.aim)
                 run.bell.ring()
 
