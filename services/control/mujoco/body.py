@@ -16,7 +16,7 @@ import msgspec
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing
 from engage_hri.schemas.body import JointLimit, NoPointZone
-from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
@@ -30,7 +30,7 @@ from engage_hri.services.control.figure.repertoire_files import repertoire_of
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.mujoco.described import DescribedBody
-from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, refuse, told
+from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.pulse import TICK
 from engage_hri.services.control.mujoco.settings import MujocoSettings

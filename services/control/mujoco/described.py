@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem
-from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.composed import ComposedBody
@@ -21,7 +21,7 @@ from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
-from engage_hri.services.control.mujoco.faults import OURS, refuse, told
+from engage_hri.services.control.mujoco.faults import OURS, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb

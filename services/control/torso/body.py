@@ -11,7 +11,7 @@ from typing import Self
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
-from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
+from engage_hri.schemas.body_faults import KINDS, BodyFault, refuse
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
@@ -74,9 +74,7 @@ class SimulatedBody(WalkingBody[Run]):
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
         )  # fmt: skip
         self._deviations = variability.configured(deviations or Variability())
-        for fault in self._deviations.faults:
-            if reason := flaw(fault, self.capabilities):
-                raise InputRefused(Fault(reason=reason, where="control.variability", service="control"))
+        refuse(self._deviations.faults, self.capabilities, "control.variability")
         self.moves = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
