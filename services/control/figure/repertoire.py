@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib.resources import files
 from math import radians
+from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import msgspec
@@ -19,7 +20,9 @@ from msgspec import Meta, Struct
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Degrees
+from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.vocabulary import is_defined, normal
+from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.kinematics import Side
 
@@ -334,3 +337,16 @@ def _built_in() -> Repertoire:
 
 BUILT_IN = _built_in()
 """The repertoire that comes with the body."""
+
+
+def repertoire_of(config: ControlConfig) -> Repertoire:
+    """The repertoire with what the files of the configuration add to it. Raises InputRefused."""
+    return extended(BUILT_IN, [(file, _text_of(file)) for file in config.repertoire_files])
+
+
+def _text_of(file: str) -> str:
+    try:
+        return utf8(Path(file).read_bytes(), file)
+    except OSError as error:
+        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error

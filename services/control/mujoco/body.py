@@ -25,8 +25,7 @@ from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.contract.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.figure import kinematics, tracks
-from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
-from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.mujoco.described import DescribedBody

@@ -16,8 +16,7 @@ from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateIt
 from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.composed import ComposedBody
-from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.bases.composed import ComposedBody, Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read

@@ -34,8 +34,7 @@ from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.alive import Alive
 from engage_hri.services.control.figure.estimates import beneath_a_look, wait_estimate
-from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
-from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed

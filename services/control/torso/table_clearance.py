@@ -23,8 +23,7 @@ from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.estimates import is_arm
 from engage_hri.services.control.figure.pace import arm_time
-from engage_hri.services.control.figure.table_lift import LIFTS, are_clear, lifted
-from engage_hri.services.control.figure.tracks import PartTrack
+from engage_hri.services.control.figure.tracks import LIFTS, PartTrack, are_clear, lifted
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.motion.track import SAME, Trunk
