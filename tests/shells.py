@@ -6,11 +6,9 @@ SHELLS = {
     "services/realizer/perform/presence.py",  # wakes who waits for a service
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
-    "services/control/serving/behavior_task.py",  # breaks off what a body does not end
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/serving/estimates.py",  # publishes mistakes of the body
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
-    "services/control/serving/fault_switch.py",  # publishes the faults that are on
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report/feedback.py",  # publishes feedback
     "services/realizer/perform/behavior_run.py",  # awaits sync points
@@ -21,8 +19,6 @@ SHELLS = {
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/together/live.py",  # resolved when a block has ended
-    "services/generation/body_link.py",  # asks the body
-    "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/contract/body.py",  # the interface of bodies: coroutines
     "services/control/bases/one_part_motion.py",  # a body that moves on the loop's clock
     "services/control/bases/setpoints.py",  # set points on the loop's clock
@@ -39,7 +35,6 @@ SHELLS = {
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
-    "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws

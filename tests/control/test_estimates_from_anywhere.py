@@ -35,7 +35,8 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.body import BodyState, MovementAuthority, Reached
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.tracks import PartTrack
-from engage_hri.services.control.testing import Stage, aside
+from engage_hri.services.control.testing import Stage
+from engage_hri.services.control.testing.laws import aside
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
 

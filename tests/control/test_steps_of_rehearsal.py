@@ -16,7 +16,7 @@ from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.table_clearance import ClearOfTable
-from engage_hri.services.runtime.unhurried import SLICE
+from engage_hri.services.runtime.steps import SLICE
 
 DEEP = "[pose]\nDEEP = { torso = { lean = 25 } }\n"
 

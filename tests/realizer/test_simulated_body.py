@@ -207,7 +207,7 @@ def test_whatever_fails_the_block_ends_once_and_the_arms_are_home(
     run_virtual(main())
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share_of(20), deadline=None)
 @given(
     blocks(),
     st.sampled_from(

@@ -16,7 +16,9 @@ from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.moves import FRAME, NEAR, SHORTEST, Moves, settling
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
-from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
+from engage_hri.services.control.testing import WORLD, Stage, performed
+from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.suite import ON_AXIS
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 
