@@ -12,10 +12,10 @@ from contextlib import aclosing, asynccontextmanager
 from math import inf
 from pathlib import Path
 
-import msgspec
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing
-from engage_hri.schemas.body import JointLimit, NoPointZone
+from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
@@ -33,7 +33,7 @@ from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.pulse import TICK
 from engage_hri.services.control.mujoco.settings import MujocoSettings
-from engage_hri.services.control.mujoco.stage import Workbench
+from engage_hri.services.control.mujoco.stage import Workbench, as_measured
 from engage_hri.services.control.torso.body import SimulatedBody, seen_with
 from engage_hri.services.control.torso.runs import Run
 
@@ -71,10 +71,10 @@ class MujocoBody(SimulatedBody):
         """
         super().__init__(zones, deviations, repertoire, alive=alive)
         self._settings = settings or MujocoSettings()
-        self.capabilities = msgspec.structs.replace(
-            self.capabilities, body="mujoco", joints=tuple(map(_as_measured, self.capabilities.joints)),
-            faults=KINDS, fault_kinds=told(OURS),
-        )  # fmt: skip
+        joints = tuple(as_measured(each, 1.3, 4.0) for each in self.capabilities.joints)
+        self.capabilities = replace(
+            self.capabilities, body="mujoco", joints=joints, faults=KINDS, fault_kinds=told(OURS)
+        )
         self.bench = Workbench(lambda now: tracks.pose_at(self.moves.tracks, now), self._look, self._settings.seed)
         self.pulse = self.bench.pulse
         self._watches: dict[Run, Watch] = {}
@@ -327,16 +327,4 @@ class MujocoBody(SimulatedBody):
         """Describe joints that do not come: which one, how far it is off, and what is known of its motor."""
         fault = watch.fault(where)
         known = self.bench.suspicion(watch.off.joint) if watch.off is not None else ""
-        return msgspec.structs.replace(fault, reason=f"{fault.reason}: {known}") if known else fault
-
-
-def _as_measured(limit: JointLimit) -> JointLimit:
-    """Limits of what is measured of a joint that follows a plan: it swings a little beyond."""
-    if limit.part == "face":
-        return limit
-    from engage_hri.services.control.mujoco.model import SLACK
-
-    return msgspec.structs.replace(
-        limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=1.3 * limit.speed,
-        acceleration=4.0 * limit.acceleration,
-    )  # fmt: skip
+        return replace(fault, reason=f"{fault.reason}: {known}") if known else fault

@@ -7,6 +7,7 @@ from math import cos, sin
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.body_faults import BodyFault
@@ -199,6 +200,19 @@ class DescribedStage(Stage):
 
     def is_at_rest(self, now: Seconds) -> bool:
         return not any(track.is_moving(now) for track in self._tracks.values()) and super().is_at_rest(now)
+
+
+def as_measured(limit: JointLimit, speed: float, acceleration: float) -> JointLimit:
+    """Limits of what is measured of a joint that follows a plan: it swings a little beyond.
+
+    speed, acceleration: as multiples of what is planned. The face is a screen, and is there.
+    """
+    if limit.part == "face":
+        return limit
+    low, high = limit.low - model.SLACK, limit.high + model.SLACK
+    return replace(
+        limit, low=low, high=high, speed=speed * limit.speed, acceleration=acceleration * limit.acceleration
+    )  # fmt: skip
 
 
 def limits_of(

@@ -166,17 +166,9 @@ class Moves(MovingParts[Run]):
             self._error = np.zeros(2)
             return
         self._error = (1.0 - SMOOTH) * self._error + SMOOTH * error
-        most, is_off = (
-            radians(self._settings.correction),
-            np.abs(self._error) >= radians(self._settings.on_target) / 2,
-        )
-        before = self.trim
-        further = np.clip(before + np.clip(GAIN * self._error, -LONGEST, LONGEST), -most, most)
-        self.trim = np.where(is_off, further, before)
-
-    def busy(self, now: Seconds) -> set[str]:
-        """Names of the tracks that move, or that a behavior has."""
-        return {name for name, track in self.tracks.items() if name in self.runs or track.is_moving(now)}
+        most, enough = radians(self._settings.correction), radians(self._settings.on_target) / 2
+        further = np.clip(self.trim + np.clip(GAIN * self._error, -LONGEST, LONGEST), -most, most)
+        self.trim = np.where(np.abs(self._error) < enough, self.trim, further)
 
     # -- planning -----------------------------------------------------------------------------------------------
 
