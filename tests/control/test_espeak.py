@@ -14,8 +14,7 @@ from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.composed import composed
-from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.contract.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
