@@ -28,7 +28,6 @@ LONG = {
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
     "control/test_own_synthesizer.py": "a synthesizer is a process",
     "control/test_synthesizer_that_fails.py": "a synthesizer is a process",
-    "control/test_unread_scripts.py": "eSpeak NG speaks, in a process",
     "control/test_voice_outlets.py": "loudspeakers are programs of the system",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
     "recording/test_pictures.py": "it draws pictures and films of recordings, and has ffmpeg write them",
