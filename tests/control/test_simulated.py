@@ -34,6 +34,7 @@ from engage_hri.services.control.testing.motions import recorded, stops, violati
 from engage_hri.services.control.testing.stage import default
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 
 ARMS = ("LEFT_HAND", "RIGHT_HAND")
 
@@ -327,7 +328,7 @@ STORY = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share_of(25), deadline=None)
 @given(story=STORY)
 def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[BlockBehavior, str, float, str]]):
     async def tell() -> None:

@@ -162,7 +162,7 @@ class SoundingVoice(Speaker):
         return found
 
     def want(self, asked: Sequence[Piece]) -> None:
-        """Have phrases synthesized before all others."""
+        """Ask for phrases, before all others."""
         self._studio.ask([piece.phrase for piece in asked], self._wait, first=True)
 
 

@@ -1,0 +1,479 @@
+"""Fragments that wait or are performed: taken, their blocks sent in order and followed, answered with outcomes. Pure.
+
+The blocks of one turn are sent at once: each names the points of the others that it follows. Turns come one after the
+other. While a fragment goes on, what its references were chosen for may move or leave. Then the choice is looked at
+again.
+"""
+
+from collections.abc import Callable, Collection, Generator
+from functools import reduce
+from typing import Any, Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.behaviors import GazeShift, TurnSignal
+from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.body import AbortBehavior, WordSpoken
+from engage_hri.schemas.faults import EngageError, Fault, RequestRefused, RunFailed, bug
+from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.schemas.requests import Accepted, Heard
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import World
+from engage_hri.services.bus.sight import Sight
+from engage_hri.services.generation.body_link import BodyLink, planned
+from engage_hri.services.generation.choosing_again import (
+    barred,
+    changed,
+    first_that_differs,
+    named_objects,
+    open_references,
+    remembered,
+    with_other_words,
+    without,
+)
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.exchange import CancelRequest, NoAnswer, SendRequest
+from engage_hri.services.generation.fragment_check import check_world, performable
+from engage_hri.services.generation.head.arbiter import Arbiter
+from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.generation.lost import bearable
+from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
+from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.pipeline import glance, planning, targets
+from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
+from engage_hri.services.generation.references.policy import Unreferable
+from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
+from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
+from engage_hri.services.generation.turns.heard import HeardWords
+from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
+from engage_hri.services.generation.ways import Way, Ways
+from engage_hri.services.requests.deadlines import Silences
+from engage_hri.services.requests.serving import GRACE
+from engage_hri.services.runtime.intake import AnswerRequest, MachineClocks, PublishMessage, TellMistake
+
+FRAGMENTS = 200
+"""Number of fragments that may be waiting or performed at once; one more is refused, so that a task that never waits
+is told so. Ours."""
+_RECOGNITION_AWAY = ("away", "recognition")
+
+
+class Fragments:
+    """All fragments that wait or are performed.
+
+    deadline: when to call `settle` at the latest. is_any_paused: true if `go_on` is to be called at once.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        config: GenerationConfig,
+        clock: MachineClocks,
+        session: str,
+        sight: Sight,
+        arbiter: Arbiter,
+        leases: Leases,
+        tell: Callable[[Struct], None],
+    ) -> None:
+        """session: part of each request id, so that the ids differ after a restart. tell: called with each output."""
+        self._robot = robot
+        self._config = config
+        self._clock = clock
+        self._session = session
+        self._arbiter = arbiter
+        self._leases = leases
+        self._tell = tell
+        self._now: Seconds = 0.0
+        """Time of this step."""
+        self._turns = TurnPolicy(robot, config, sight)
+        self._events = TurnEvents()
+        self._heard = HeardWords()
+        self._outcomes = TurnOutcomes(self._events, self._heard, config, sight)
+        self._gazes = GazesOfFragments()
+        self._body = BodyLink()
+        self._ways = Ways(tell)
+        self._world: World | None = None
+        self._discourse = NO_DISCOURSE
+        self._live: dict[str, FragmentPerformance] = {}
+        """Fragments by request id, in the order in which they came, from `admit` until their outcome is told."""
+        self._is_choosing = False
+        """True while a choice is looked at again."""
+        self._signals = 0
+        self._waits = Silences[tuple[str, str]](sight)
+        """Times until which recognition may be away, and until which it is to decide the events of a request."""
+
+    # -- what arrives ---------------------------------------------------------------------------------------------
+
+    def full(self, waiting: int, id: str) -> Fault | None:
+        """A fault if fragment `id` is one too many; else None. waiting: those that wait to be admitted."""
+        if (number := len(self._live) + waiting) < FRAGMENTS:
+            return None
+        reason = f"{number} fragments are waiting or performed, which is the limit"
+        return Fault(reason=reason, where=id, advice="wait until one has ended")
+
+    def admit(self, request: PerformFragment, world: World, now: Seconds) -> None:
+        """Queue a fragment. Raises InputRefused where it is illegal, and changes nothing that goes on."""
+        fragment, lost = performable(request.fragment, world, self._robot)
+        self._abort(self._turns.begins_again(request.requester, request.life), now)
+        turn = self._turns.accept(fragment, fragment.addressee, request.requester, request.life)
+        performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
+        performance.warn(lost)
+        performance.known = named_objects(fragment, world)
+        if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
+            self._tell(PublishMessage(keys.TURN_CLOSED, displaced))
+        self._events.expect(fragment.id, turn.turn)
+        self._heard.turn_begins(turn.turn, now)
+        if any(not each.is_over and each.turn.turn != turn.turn for each in self._live.values()):
+            self._accept(performance)
+        # A fragment that need not wait for another turn is accepted when its block is: then, if the realizer finds
+        # the block impossible, the fragment is refused, too.
+        self._live[request.id] = performance
+
+    def refused(self, request: PerformFragment, why: Fault, now: Seconds) -> None:
+        """Draw the consequences, for its turn, of a fragment that was refused before it could be admitted."""
+        self._abort(self._turns.rest_refused(request.fragment, request.requester, why), now)
+
+    def _accept(self, performance: FragmentPerformance) -> None:
+        if not performance.accepted:
+            performance.accepted = True
+            self._tell(AnswerRequest(Accepted(id=performance.request.id)))
+
+    def cancel(self, id: str, why: Fault, now: Seconds) -> None:
+        """Cancel the fragment of request `id`, if it is here, and with it the rest of its turn."""
+        if (performance := self._live.get(id)) is None:
+            return
+        aborted = self._turns.fragment_ended(performance.fragment.id, complete=False, now=now, why=why)
+        self._interrupt({performance.fragment.id, *(aborted.fragments if aborted else ())}, why, now)
+        self._abort(aborted, now)
+
+    def feed(
+        self,
+        message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress | WordSpoken | Utterance,
+        now: Seconds,
+    ) -> None:
+        match message:
+            case World():
+                self._world = message
+                self._turns.see([person.id for person in message.people], now)
+            case ConnectionEvent():
+                self._events.feed(message, now)
+                self._discourse = self._discourse.hearing(message, self._robot)
+            case ActionBegan() | ActionEnded():
+                self._turns.feed(message, now)
+            case SyncPointProgress():
+                self._follow(message)
+            case WordSpoken(block=block):
+                for performance in self._live.values():
+                    if performance.fragment.id == block and not performance.is_over:
+                        performance.hear(message)
+            case Utterance():
+                self._heard.feed(message, now)
+                self._turns.hear(
+                    message.actor, message.text, began=self._clock.local(message.began, now), is_final=message.final,
+                    is_line=message.began == message.at,
+                )  # fmt: skip
+
+    def recognition_gone(self, now: Seconds) -> None:
+        """Start the grace after which the open events are lost: recognition may only be cut off."""
+        self._waits.set(_RECOGNITION_AWAY, now + GRACE)
+
+    def recognition_there(self, session: str) -> None:
+        self._waits.clear(_RECOGNITION_AWAY)
+        self._events.lose(session)
+
+    def body_lost(self) -> None:
+        """Forget the body: another one may come."""
+        self._body.forget()
+
+    def _follow(self, progress: SyncPointProgress) -> None:
+        """Pass a sync point to its fragment, and tell the arbiter of its gazes when they really happen."""
+        named = [each for each in self._live.values() if each.fragment.id == progress.block]
+        if not named:
+            return
+        # A fragment that has ended is second choice, but it still hears of its events.
+        performance = min(named, key=lambda each: each.is_over)
+        performance.feed(progress)
+        if performance.signalled_end:
+            self._turns.turn_ended(performance.turn.turn)
+        self._follow_gaze(performance)
+
+    def _follow_gaze(self, performance: FragmentPerformance) -> None:
+        before = self._gazes.holder
+        self._gazes.follow(performance)
+        gaze = self._gazes.holder
+        if not self._gazes.goes_on:
+            self._arbiter.fragment_lets_go()
+        elif gaze is None and before is not None:
+            self._arbiter.fragment_rests()
+        elif isinstance(gaze, GazeShift) and gaze is not before:
+            self._arbiter.fragment_shifts(gaze.target, gaze.id)
+        elif gaze is not None and gaze is not before:
+            self._arbiter.fragment_gazes(gaze.target, gaze.id)
+
+    # -- time -----------------------------------------------------------------------------------------------------
+
+    @property
+    def is_any_paused(self) -> bool:
+        return self._ways.is_any_paused
+
+    @property
+    def deadline(self) -> Seconds | None:
+        due = (self._turns.deadline, self._outcomes.deadline, self._waits.earliest)
+        return min((each for each in due if each is not None), default=None)
+
+    def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
+        """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
+        refused: list[tuple[str, Fault]] = []
+        for id, performance in self._live.items():
+            self._waits.keep(("undecided", id), performance.deadline, now)
+        due = {*iter(lambda: self._waits.due(now), None)}
+        if _RECOGNITION_AWAY in due:
+            self._events.lose()
+        while (aborted := self._turns.tick(now)) is not None:
+            self._abort(aborted, now)
+        permits = self._leases.permits()
+        for performance in list(self._live.values()):
+            self._enforce_inhibitions(performance, permits)
+            if performance.refusal is not None:
+                self._forget(performance)
+                self._outcomes.refuse(performance.fragment.id, performance.turn)
+                refused.append((performance.request.id, performance.refusal))
+            elif outcome := performance.outcome(self._events, is_due=("undecided", performance.request.id) in due):
+                self._forget(performance)
+                self._outcomes.end(outcome, performance.turn, now)
+                heard = self._heard.of_turn(performance.turn.turn)
+                self._tell(AnswerRequest(replace(outcome, heard=heard)))
+                if not performance.turn.backchannel:  # that is said in the other's turn
+                    self._heard.turn_ends(now)
+        going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
+        for closed in self._outcomes.close_due(going, now):
+            self._tell(PublishMessage(keys.TURN_CLOSED, closed))
+        self._events.forget({*going, *self._outcomes.turns})
+        self._heard.forget({*going, *self._outcomes.turns})
+        return refused
+
+    def _forget(self, performance: FragmentPerformance) -> None:
+        del self._live[performance.request.id]
+        self._waits.clear(("undecided", performance.request.id))
+
+    def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:
+        block = performance.fragment.id
+        for behavior in performance.forbid(permits):
+            how: Literal["freeze", "relax"] = "freeze" if self._leases.holds_head else "relax"
+            id = f"{performance.block_id}/{behavior}:abort"
+            abort = AbortBehavior(id=id, block=block, behavior=behavior, how=how)
+            self._tell(SendRequest(keys.BEHAVIOR, abort))
+
+    # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
+
+    def answer(self, id: str, answer: Message | NoAnswer | None, now: Seconds) -> None:
+        """Take news of a block, or the body's answer: the way that waits for it goes on."""
+        self._now = now
+        self._ways.answer(id, answer)
+
+    def go_on(self, now: Seconds) -> None:
+        """Let those go on that have paused."""
+        self._now = now
+        self._ways.go_on()
+
+    def begin(self, now: Seconds) -> bool:
+        """Begin what may begin now: the next fragment, another look at choices. False: there is nothing."""
+        self._now = now
+        if (following := self._next()) is not None:
+            following.has_begun = True
+            self._ways.begin(self._perform(following))
+            return True
+        if self._is_choosing or (changed := next(filter(self._has_changed, self._live.values()), None)) is None:
+            return False
+        self._is_choosing = True
+        self._ways.begin(self._choose_again(changed))
+        return True
+
+    def _next(self) -> FragmentPerformance | None:
+        """The first fragment in line, if its block may be sent now.
+
+        It may once the blocks of other turns have ended, and those of its own turn were accepted with words that will
+        not change any more: words follow on words.
+        """
+        going = [each for each in self._live.values() if not each.is_over]
+        first = next((each for each in going if not each.has_begun), None)
+        if first is not None and all(
+            each.turn.turn == first.turn.turn and each.is_sent and not each.may_choose_again
+            for each in going
+            if each.has_begun
+        ):
+            return first
+        return None
+
+    def _perform(self, performance: FragmentPerformance) -> Way:
+        """All of a fragment: its block and, where a reference is chosen again, those with which it goes on."""
+        try:
+            while not performance.is_over:
+                if not (yield from self._send_block(performance)):
+                    return  # cancelled meanwhile
+                outcome = yield performance.block_id
+                if not isinstance(outcome, BlockOutcome):
+                    reason = f"the realizer answered {type(outcome).__name__}"
+                    raise RunFailed(Fault(reason=reason, where=performance.block_id))
+                performance.end_with(outcome, self._now)
+                self._follow_end(performance)
+        except RequestRefused as error:
+            performance.refuse(error.fault, self._now)
+        except EngageError as error:
+            performance.fail(error, self._now)
+        except Exception as error:
+            what = f"fragment {performance.fragment.id}"
+            self._tell(TellMistake(error, what))
+            performance.fail(RunFailed(bug(error, what, "generation")), self._now)
+        self._block_ended(performance)
+
+    def _send_block(self, performance: FragmentPerformance) -> Generator[Any, Any, bool]:
+        """Plan and send a block of a fragment, until it is accepted. False: the fragment was cancelled meanwhile."""
+        fragment, turn = performance.left, performance.turn_left
+        self._arbiter.stop_thinking()
+        self._arbiter.speak_to(turn.addressee)
+        permits = self._leases.permits
+        while True:
+            followed = [each for each in self._live.values() if each.goes_on_with(performance)]
+            moving = [behavior for each in followed for behavior in each.moving]
+            glanced = glance(fragment, turn, self._config)
+            motions = yield from self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
+            if performance.is_over:
+                return False
+            assert self._world is not None
+            world = remembered(self._world, performance.known)
+            fragment, lost = bearable(fragment, world, self._robot)
+            performance.warn(lost)
+            check_world(fragment, world, self._robot)  # it may have changed while the fragment waited
+            bars = barred(targets(fragment), self._world, performance.known, performance.barred)
+            body = self._body.capabilities
+            if body is not None:
+                self._arbiter.gaze_perceived_within(body.gaze_half_angle)
+            before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
+            heard, permitted, config = self._heard_in(turn), permits(), self._config
+            reachable = without(motions, bars)
+            try:
+                made = yield from planned(
+                    planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
+                )
+            except Unreferable:
+                if (freed := with_other_words(fragment, bars)) is None:
+                    raise
+                fragment = performance.left = freed  # the author has no phrase that is enough without a gesture
+                continue
+            if performance.is_over:
+                return False
+            if permits() == permitted:
+                break  # else something is inhibited now that would be begun
+        performance.begin(made)
+        performance.world = world
+        self._turns.fragment_begins(turn.turn)
+        if not performance.accepted:  # From here on the robot may speak.
+            self._tell(AnswerRequest(Heard(id=performance.request.id)))
+        follows = tuple([each.fragment.id for each in followed])
+        request = PerformBlock(id=performance.block_id, block=made.block, follows=follows)
+        self._tell(SendRequest(keys.BLOCK, request))
+        yield performance.block_id
+        self._accept(performance)
+        for message in performance.new_warnings():
+            warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
+            self._tell(PublishMessage(keys.FRAGMENT_FEEDBACK, warning))
+        named = [mention.object for mention in made.mentions]
+        self._discourse = self._heard_in(turn).naming(fragment.id, named)
+        performance.is_sent = True
+        return True
+
+    def _heard_in(self, turn: TurnPlan) -> Discourse:
+        """The discourse at the start of `turn`. A backchannel is said in the other's turn, and changes nothing."""
+        return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
+
+    # -- references, chosen again while their fragments go on -----------------------------------------------------
+
+    def _has_changed(self, performance: FragmentPerformance) -> bool:
+        then, now = performance.world, self._world
+        is_going_on = performance.plan is not None and performance.is_sent and not performance.is_over
+        return is_going_on and then is not None and now is not None and changed(performance.acts[-1], then, now)
+
+    def _choose_again(self, performance: FragmentPerformance) -> Way:
+        """Take out the gestures of the first reference that would be made otherwise in the world as it is now.
+
+        What needs them falls, and the rest of the fragment is performed by another block.
+        """
+        try:
+            act, turn, now = performance.acts[-1], performance.turn_left, self._world
+            assert now is not None
+            performance.world = world = remembered(now, performance.known)
+            fragment = open_references(performance.left, act)
+            bars = barred(targets(fragment), now, performance.known, performance.barred)
+            permits, body = self._leases.permits(), self._body
+            try:
+                motions = yield from body.motions(targets(fragment), permits.only_hand)
+                plan = planning(
+                    fragment, turn, world, body.capabilities, without(motions, bars), permits, self._config
+                )
+                choices = (yield from planned(plan)).choices
+            except Unreferable:
+                choices = ()
+            if performance.is_over or performance.plan is None or performance.acts[-1] is not act:
+                return
+            for gesture in first_that_differs(act, choices, bars):
+                id = f"{performance.block_id}/{gesture}:again"
+                interrupt = InterruptBehavior(id=id, block=performance.fragment.id, behavior=gesture)
+                self._tell(SendRequest(keys.BLOCK, interrupt))
+        except EngageError:
+            pass  # the body does not answer: the realizer will tell
+        except Exception as error:
+            self._tell(TellMistake(error, f"another choice for fragment {performance.fragment.id}"))
+        finally:
+            self._is_choosing = False
+
+    # -- ends -----------------------------------------------------------------------------------------------------
+
+    def _follow_end(self, performance: FragmentPerformance) -> None:
+        """Draw the consequences of the end of a block for head and discourse."""
+        self._follow_gaze(performance)
+        self._discourse = self._discourse.without(performance.fragment.id, performance.unmentioned)
+
+    def _block_ended(self, performance: FragmentPerformance) -> None:
+        """Draw the consequences of a block that has ended, or that will never be, for its turn, too."""
+        now, fragment = self._now, performance.fragment
+        self._follow_end(performance)
+        if performance.refusal is not None:
+            aborted = self._turns.fragment_refused(fragment.id, now, performance.refusal)
+        else:
+            complete = performance.status == "done" or performance.lost_motions_only
+            aborted = self._turns.fragment_ended(fragment.id, complete=complete, now=now, why=performance.why)
+        self._abort(aborted, now)
+        if target := self._turns.averted_to:
+            self._arbiter.think(target)
+
+    def _interrupt(self, fragments: Collection[str], why: Fault, now: Seconds) -> None:
+        """End these fragments, the latest first: a block that follows another's words must not begin as those end."""
+        for performance in reversed(self._live.values()):
+            if performance.is_over or performance.fragment.id not in fragments:
+                continue
+            if performance.plan is not None:
+                self._tell(CancelRequest(performance.block_id, why))
+            else:
+                performance.end(Ended(now, "interrupted", fault=why.at(performance.fragment.id)))
+
+    def _abort(self, aborted: Aborted | None, now: Seconds) -> None:
+        """End the fragments of a turn that has ended early, and tell recognition of it. None: no turn has."""
+        if aborted is None:
+            return
+        self._arbiter.stop_thinking()
+        self._outcomes.abort(aborted, now)
+        self._interrupt(aborted.fragments, aborted.why, now)
+        if not aborted.is_known:
+            return
+        self._signals += 1
+        id = f"turn-aborted-{self._signals}"
+        signal = TurnSignal(id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee)
+        request = SignalTurn(id=f"{self._session}/{id}", signal=signal, at=Stamp(self._clock.name, now))
+        self._tell(SendRequest(keys.TURN, request))
