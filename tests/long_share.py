@@ -29,7 +29,6 @@ LONG = {
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
     "control/test_own_synthesizer.py": "a synthesizer is a process",
     "control/test_synthesizer_that_fails.py": "a synthesizer is a process",
-    "control/test_unread_scripts.py": "eSpeak NG speaks, in a process",
     "control/test_voice_outlets.py": "loudspeakers are programs of the system",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
     "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",

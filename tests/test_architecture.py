@@ -28,12 +28,9 @@ IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket",
 MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 """Packages of `services` that pure files don't know either; their own pure files aside."""
 PURE_MACHINERY = {
-    "services/requests/asked.py", "services/requests/asking.py", "services/requests/asking_effects.py",
-    "services/requests/asking_table.py",
-    "services/requests/deadlines.py", "services/requests/ended.py", "services/requests/window.py",
-    "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
-    "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
-    "services/requests/transitions.py",
+    "services/requests/asking.py", "services/requests/asking_table.py", "services/requests/deadlines.py",
+    "services/requests/ended.py", "services/requests/records.py", "services/requests/serving.py",
+    "services/requests/serving_table.py", "services/requests/transitions.py",
     "services/runtime/absent.py", "services/runtime/again.py", "services/runtime/installation.py",
     "services/runtime/intake.py", "services/runtime/ledger.py", "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/person_actions.py",

@@ -111,7 +111,7 @@ async def test_who_leaves_a_lease_leaves_it_at_once_whatever_became_of_generatio
         if gone == "cut":
             hub.partition("generation")
         else:
-            hub.announce("generation", PeerGone(participant="generation"))
+            hub.announce(PeerGone(participant="generation"))
         await asyncio.sleep(0.5)
         if how == "cancelled":
             holding.cancel()

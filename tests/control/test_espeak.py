@@ -20,9 +20,9 @@ from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.clauses import clause
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer, ssml
-from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.sounding import EspeakVoice
 from engage_hri.services.control.voice.synthesis import Phrase
+from engage_hri.services.control.voice.timeline import pieces
 from tests.random_cases import trials
 
 pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")

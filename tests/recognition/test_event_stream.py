@@ -164,9 +164,9 @@ async def test_a_return_is_heard_before_the_loss_however_late_it_is_read(hub: Me
     async with running(hub, recognition()), connect(hub=hub) as robot:
         events = await watched(hub, robot, hub.join("perception"))
         run = hub._buses["recognition"].run
-        hub.announce("recognition", PeerGone(participant="recognition"))
+        hub.announce(PeerGone(participant="recognition"))
         await asyncio.sleep(1.0)
-        hub.announce("recognition", PeerAlive(participant="recognition", run=run))
+        hub.announce(PeerAlive(participant="recognition", run=run))
         await asyncio.sleep(5.0)
 
         assert await told(events) == []

@@ -40,8 +40,8 @@ from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.torso import Torso
-from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
+from engage_hri.services.control.voice.speaker import speech_estimate
 from engage_hri.services.control.voice.timeline import uttered
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.runtime.steps import Steps, finished
