@@ -1,8 +1,7 @@
 """Settings of the simulated person, table and cameras."""
 
 import math
-from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 from msgspec import Struct
 
@@ -82,12 +81,6 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Step of the `stochastic` person's propensity for looks at the robot's face, which begins at 1: an answered look
     moves it toward 2, another toward 0. Our assumption, after hypothesis 11 of the thesis; 0: eye contact changes
     nothing, and the hypothesis must fail."""
-
-    FIXED: ClassVar[Mapping[str, Any]] = {
-        "await_participants": ("control", "generation", "realizer", "recognition"), "head_turn": 0.2,
-        "hand_speed": 0.45, "shortest_movement": 0.6, "stochastic": "what services/simulation/habits.py says",
-    }  # fmt: skip
-    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         positive(self, ("frame",), "simulation.")

@@ -11,7 +11,7 @@ from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.explained import explained, without_former
+from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
@@ -272,9 +272,7 @@ def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
         if life.told.participant != "recognition" or life.unread:
             continue
         try:
-            config = msgspec.convert(
-                without_former(life.sections.get("recognition"), RecognitionConfig), RecognitionConfig
-            )
+            config = msgspec.convert(life.sections.get("recognition"), RecognitionConfig)
         except msgspec.ValidationError as error:
             had, _ = explained(error, RecognitionConfig)
             reason = f"recognition of Engage {life.told.version} had other settings: {had}"
