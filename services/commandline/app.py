@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell import logs
 from engage_hri.services.commandline.shell.exit_codes import exit_code
+from engage_hri.services.runtime.installation import extra_command
 
 FAMILIES: dict[str, dict[str, str]] = {
     "look": {
@@ -75,12 +76,23 @@ TITLES = {
 }
 """Headings of the folders in the list of all commands."""
 COMMANDS = {name: does for commands in FAMILIES.values() for name, does in commands.items()}
+TANGRAM = "engage_hri.services.tangram"
 _FOLDER = {name: folder for folder, commands in FAMILIES.items() for name in commands}
 
 
 def command(name: str) -> Any:
-    """Load a command from its file. Its own options come first, then the shared ones."""
-    module = import_module(f"engage_hri.services.commandline.{_FOLDER[name]}.{name.replace('-', '_')}")
+    """Load a command from its file. Its own options come first, then the shared ones.
+
+    Raises InputRefused if it needs the tangram, and that is not installed.
+    """
+    try:
+        module = import_module(f"engage_hri.services.commandline.{_FOLDER[name]}.{name.replace('-', '_')}")
+    except ModuleNotFoundError as error:
+        if not (error.name or "").startswith(TANGRAM):
+            raise
+        raise InputRefused(
+            Fault(reason="it needs the tangram", where=f"engage {name}", advice=extra_command("tangram"))
+        ) from error
     taken = inspect.signature(module.Options).parameters
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
 

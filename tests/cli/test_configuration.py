@@ -12,7 +12,7 @@ from engage_hri.services.commandline.shell.roster import NAMES, service
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.commandline.study import simulate
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.simulation.config import HumanKind
+from engage_hri.services.tangram.people.config import HumanKind
 
 ROOT = Path(__file__).parents[2]
 
@@ -112,7 +112,7 @@ def test_a_number_out_of_its_range_is_refused_and_says_the_range(setting: str, r
 
 def test_a_setting_is_stronger_than_an_option_of_the_simulation_and_the_robots_name_than_a_setting() -> None:
     options = up.Options(seed=3, human="listening", robot="melvin", settings=["simulation.seed=4", "bus.robot=other"])
-    config = options.load()
+    config = options.read(Config)
 
     assert (config.simulation.seed, config.simulation.human, config.robot) == (4, "listening", "melvin")
 

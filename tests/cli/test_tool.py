@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.tool import tool_definition
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.cli.command import FRAGMENT, Engage
 
 CALL = {"turn_status": "full", "parts": [{"say": "Do you see"}, {"refer": "trapezoid", "certainty": "high"}]}
@@ -116,6 +116,6 @@ def test_a_bad_call_is_one_line_with_its_path(engage: Engage, tmp_path: Path) ->
 
 
 def test_ids_of_the_tangram_stand_in_its_tool() -> None:
-    text = json.dumps(tool_definition(world=tangram_world()))
+    text = json.dumps(tool_definition(world=table_world()))
 
-    assert all(f'"{thing.id}"' in text for thing in tangram_world().objects)
+    assert all(f'"{thing.id}"' in text for thing in table_world().objects)

@@ -23,7 +23,7 @@ from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.tiers import tiers
 from engage_hri.services.recording.times import messages
 from engage_hri.services.runtime.service import Ready
-from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.files import recording, sample
 from tests.recording.runs import tangram
 

@@ -28,9 +28,9 @@ from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.console.follow import following
 from engage_hri.services.generation.turns.events import WORDS_PATIENCE
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.still import show_world, tangram_world
+from engage_hri.services.simulation.still import show_world, table_world
 
-TABLE = tangram_world()
+TABLE = table_world()
 EMPTY = World(entities=tuple(each for each in TABLE.entities if each.kind not in ("person", "hand")))
 
 

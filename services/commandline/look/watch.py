@@ -18,11 +18,11 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.failing_output import FORMAT, Patient, as_file, settle, standard_output
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.terminal.live import Log, NetLog
 from engage_hri.services.console.terminal.log import Telling
@@ -126,7 +126,7 @@ def main(options: Options) -> int:
     return DONE
 
 
-async def _watch(options: Options, config: Config, wanted: Wanted, out: Patient) -> None:
+async def _watch(options: Options, config: RobotConfig, wanted: Wanted, out: Patient) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
     async with await options.open(config.bus, "viewer") as hub:
@@ -148,7 +148,7 @@ async def _watch(options: Options, config: Config, wanted: Wanted, out: Patient)
                 await forever()
 
 
-async def _watch_nets(options: Options, config: Config, out: Patient) -> None:
+async def _watch_nets(options: Options, config: RobotConfig, out: Patient) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
     async with await options.open(config.bus, "viewer") as hub:

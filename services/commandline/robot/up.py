@@ -19,13 +19,12 @@ from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.robot.one_per_robot import claiming
 from engage_hri.services.commandline.robot.run import ready_line
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Embodied, Listening, Simulated, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
-from engage_hri.services.commandline.shell.roster import ROBOT, TASK, Groups, groups
+from engage_hri.services.commandline.shell.roster import ROBOT, TASK, Groups, complete, groups, widest
+from engage_hri.services.commandline.shell.settings import ELSEWHERE, TRANSCRIPT, RobotConfig
 from engage_hri.services.commandline.shell.supervisor import Child, supervised
-from engage_hri.services.commandline.study.tangram import DEFAULTS
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
@@ -55,23 +54,24 @@ class Options(Written, Simulated, Embodied, Listening):
 
 def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
-    config = options.load(defaults=DEFAULTS if options.task else WITHOUT_TASK)
+    kind = complete() if options.task else widest()
+    config = options.read(kind, defaults=TRANSCRIPT if options.task else WITHOUT_TASK)
     drivers.check(config.control)
-    grouped = _groups(options)
+    grouped = _groups(options, config)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         run_until_signal(_up(options, grouped, config, outputs, console))
     return DONE
 
 
-async def _up(options: Options, grouped: Groups, config: Config, outputs: Outputs, console: Console) -> None:
+async def _up(options: Options, grouped: Groups, config: RobotConfig, outputs: Outputs, console: Console) -> None:
     # Nobody is left to look after one group of all: it is this process. Loaded before there is a bus: messages would
     # wait for that.
     services = bound(config, *grouped[0]) if len(grouped) == 1 else {}
     # Our own session comes first and stays, for children find one another through it, and may crash.
     async with await options.open(config.bus, "up", options.listen or ()) as hub, claiming(hub) as claim:
         await claim.granted()
-        await hub.wait_until_free(*_names(options))
+        await hub.wait_until_free(*(name for names in grouped for name in names))
         bus = claim.bus
         tallying = Tallying(bus.now())
         live = options.task and console.is_terminal and not options.quiet
@@ -103,13 +103,10 @@ def without_faults(show: Sink) -> Sink:
     return told
 
 
-def _names(options: Options) -> tuple[str, ...]:
-    return (*ROBOT, "simulation", TASK) if options.task else (*ROBOT, "simulation")
-
-
-def _groups(options: Options) -> Groups:
+def _groups(options: Options, config: RobotConfig) -> Groups:
     """Divide the services among processes. Raises InputRefused."""
-    names = _names(options)
+    others = (*ELSEWHERE,) if options.task else tuple(name for name in ("simulation",) if hasattr(config, name))
+    names = (*ROBOT, *others)
     if options.in_one and options.together:
         reason, advice = "--in-one is all together already", "leave one of the two out"
         raise InputRefused(Fault(reason=reason, where="--together", advice=advice))
@@ -124,7 +121,7 @@ class Life(NamedTuple):
 
 
 @asynccontextmanager
-async def _each(options: Options, grouped: Groups, config: Config, console: Console) -> AsyncIterator[Life]:
+async def _each(options: Options, grouped: Groups, config: RobotConfig, console: Console) -> AsyncIterator[Life]:
     """Run each group of services in a process of its own."""
     ready = {ready_line(name): name for names in grouped for name in names}
     arrivals = Arrivals(ready.values(), console)
@@ -156,13 +153,14 @@ async def in_one(services: Mapping[str, Service], hubs: Mapping[str, Hub], conso
         yield Life(arrivals.complete, over)
 
 
-def command(names: str, options: Options, config: Config) -> list[str]:
+def command(names: str, options: Options, config: RobotConfig) -> list[str]:
     """Make a child's command line: `engage run NAMES`, with our interpreter, bus and configuration."""
     # Values decided here, by default or by option, are passed on, so that all children agree.
+    simulation = getattr(config, "simulation", None)
     settings = (
         *options.overrides,
         f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
-        f"simulation.human={config.simulation.human}",
+        *([f"simulation.human={simulation.human}"] if simulation is not None else []),
         f"bus.mode={mode_of(config.bus.mode, config.bus.connect, options.listen or (), config.bus.keys)}",
     )
     endpoints = (*(options.listen or ()), *config.bus.connect)

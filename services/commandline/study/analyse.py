@@ -12,14 +12,14 @@ import typer
 from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Quiet
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.services.commandline.shell.roster import widest
 from engage_hri.services.commandline.study.analysing import Compared, Session, again, sessions, with_settings
-from engage_hri.services.commandline.study.simulate import PLOTS, plotting, rendered
+from engage_hri.services.commandline.study.tables import PLOTS, plotting, rendered
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.conditions import UNNAMED
 from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
@@ -167,7 +167,7 @@ def overview(sessions: Sequence[Session], baseline: str) -> NumberTable:
 
 def configured(sessions: Sequence[Session]) -> NumberTable:
     """Table with the settings of the services that are not as by default, and those of later lives that changed."""
-    by_default = dict(flat(shown(Config())))
+    by_default = dict(flat(shown(widest()())))
     found: list[tuple[str, ...]] = []
     notes = []
     for one in {one.path: one for one in sessions}.values():

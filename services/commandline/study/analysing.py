@@ -18,6 +18,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics, session_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import FOLLOWED
 from engage_hri.services.console.heard import Heard
 from engage_hri.services.recognition.again import Again, Lack, events_in
@@ -27,6 +28,7 @@ from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import LifeSettings, flat, settings_of
 from engage_hri.services.recording.times import RecordingTimes, messages, moved
+from engage_hri.services.runtime.configuration import read
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.records import SessionRecorder as Record
 
@@ -296,7 +298,5 @@ def _numbers(recording: Recording) -> dict[tuple[str, int], int]:
 
 def with_settings(config: RecognitionConfig, settings: Sequence[str]) -> RecognitionConfig:
     """The same with other settings, `recognition.KEY=VALUE`. Raises InputRefused."""
-    from engage_hri.services.commandline.shell.config import load
-
     had = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), "recognition.") if value]
-    return load(settings=settings, defaults=had).recognition
+    return read(RobotConfig, settings=settings, defaults=had).recognition

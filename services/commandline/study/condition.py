@@ -8,9 +8,9 @@ import typer
 from engage_hri.schemas.conditions import LONGEST_NAME, words
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, unique_name
+from engage_hri.services.commandline.shell.settings import RobotConfig
 
 PATIENCE: Seconds = 5.0
 """Seconds in which generation has to answer."""
@@ -48,7 +48,7 @@ def main(options: Options) -> int:
     return DONE
 
 
-async def _begin(options: Options, config: Config) -> None:
+async def _begin(options: Options, config: RobotConfig) -> None:
     from engage_hri.services.client.robot import Robot
 
     name = "" if options.name == NONE else options.name
@@ -60,7 +60,7 @@ async def _begin(options: Options, config: Config) -> None:
     print(f"condition of the study, from now on: {words(name, options.speech_only)}")
 
 
-async def _show(options: Options, config: Config) -> None:
+async def _show(options: Options, config: RobotConfig) -> None:
     from engage_hri.services.client.robot import Robot
 
     async with (

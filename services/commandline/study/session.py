@@ -15,14 +15,14 @@ from msgspec import Struct
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.process import DONE
-from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.runtime.virtual_time import run_virtual
-from engage_hri.services.simulation import human_session
 from engage_hri.services.study.records import EventRecord, SessionRecord, SessionRecorder
+from engage_hri.services.tangram.people import human_session
 
 A_WHILE: Seconds = 120.0
 """Time after the last drawn event by which all open events have ended."""

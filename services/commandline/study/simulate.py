@@ -3,7 +3,7 @@
 import os
 import platform
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,10 +12,6 @@ import msgspec
 import numpy as np
 import typer
 from msgspec import Struct
-from rich import box
-from rich.console import Group, RenderableType
-from rich.table import Table as RichTable
-from rich.text import Text
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
@@ -24,17 +20,17 @@ from engage_hri.services.commandline.shell.options import Configured, Quiet, Res
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, interrupted, run
 from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.services.commandline.shell.settings import TRANSCRIPT
 from engage_hri.services.commandline.study.progress import ProgressReport
 from engage_hri.services.commandline.study.session import Order, SessionResult
-from engage_hri.services.commandline.study.tangram import DEFAULTS
+from engage_hri.services.commandline.study.tables import PLOTS, Draw, plotting, rendered
 from engage_hri.services.commandline.study.validation import beside_table_2_1
 from engage_hri.services.commandline.study.workers import play_all
-from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
 from engage_hri.services.study.hypotheses import HypothesisResult, findings
-from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.records import SessionRecord
 from engage_hri.services.study.summary import NumberTable
 
 PEOPLE = "table-2-1"
@@ -52,10 +48,7 @@ DECIDED = {
     "generation.condition": "--condition",
 }
 """Keys that are set for each session, with the option for each."""
-PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
 FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
-
-Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,16 +112,6 @@ def main(options: Options) -> int:
     return DONE if all(one.record.finished for one in played) else FAILED
 
 
-def plotting() -> Draw:
-    """Import the function that draws. Raises InputRefused without matplotlib, before any session is played."""
-    try:
-        from engage_hri.services.study.plots import draw
-    except ImportError as error:
-        fault = Fault(reason=f"plots need matplotlib: {error}", advice=extra_command("study"))
-        raise InputRefused(fault) from error
-    return draw
-
-
 # -- what to play -----------------------------------------------------------------------------------------------
 
 
@@ -153,12 +136,12 @@ def orders_of(options: Options) -> list[Order]:
 def _order(options: Options, condition: str, number: int) -> Order:
     """Make one order. The user's settings override what makes a condition worse, but not seed and condition."""
     seed, people = options.seed + number, options.human == PEOPLE
-    defaults = [*USUAL.get(options.human, DEFAULTS)]
+    defaults = [*USUAL.get(options.human, TRANSCRIPT)]
     chosen = [*simulation_settings(seed, None if people else options.human, options.resolution)]
     if not people:
         defaults += DEGRADATIONS[condition]
         chosen.append(f"generation.condition={condition}")
-    config = replace(options, settings=[*options.overrides, *chosen]).load(defaults=defaults)
+    config = replace(options, settings=[*options.overrides, *chosen]).read(Config, defaults=defaults)
     return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config, people=people)
 
 
@@ -232,18 +215,3 @@ def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
         limit=options.limit, ordered=len(orders), played=played, settings=options.overrides,
         configurations=first,
     )  # fmt: skip
-
-
-def rendered(table: NumberTable) -> RenderableType:
-    """Draw a table with its notes, for a terminal."""
-    return Group(grid(table), *(Text(note, style="dim") for note in table.notes))
-
-
-def grid(table: NumberTable) -> RichTable:
-    """Draw a table without its notes."""
-    made = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
-    for index, column in enumerate(table.columns):
-        made.add_column(column, justify="right" if index else "left", overflow="fold")
-    for row in table.rows:
-        made.add_row(*map(Text, row))
-    return made

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from engage_hri.services.simulation.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 from engage_hri.services.study.records import SessionRecord
 from engage_hri.services.study.summary import NumberTable, known, mean_and_deviation, number, numbers, pooled
+from engage_hri.services.tangram.people.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 
 
 def beside_table_2_1(records: Sequence[SessionRecord]) -> NumberTable:

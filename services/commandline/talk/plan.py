@@ -13,12 +13,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.shell import roster
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Embodied, Strict, WorldFile
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import read_source, read_world, still
 from engage_hri.services.commandline.talk.offline_plan import generated
 from engage_hri.services.commandline.talk.prose import strict_refusal
@@ -83,7 +83,7 @@ def _as_text(plan: Plan) -> str:
     return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend(net)))
 
 
-async def rehearsed(block: Block, world: World, config: Config) -> Plan:
+async def rehearsed(block: Block, world: World, config: RobotConfig) -> Plan:
     """Plan a block as a realizer does that has nothing else to perform, with the configured body at home."""
     from engage_hri.services.realizer.together.planning import planned_alone
 

@@ -7,9 +7,9 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, unique_name
+from engage_hri.services.commandline.shell.settings import RobotConfig
 
 PATIENCE: Seconds = 5.0
 """Seconds in which the realizer has to answer."""
@@ -31,7 +31,7 @@ def main(options: Options) -> int:
     return DONE
 
 
-async def _steer(options: Options, config: Config) -> None:
+async def _steer(options: Options, config: RobotConfig) -> None:
     from engage_hri.services.client.robot import Robot
 
     async with (
