@@ -96,6 +96,7 @@ def _service(name: str, *published: str, heard: tuple[str, ...], served: tuple[s
     yield Row(name, "publishes", keys.request_state(name))
     yield Row(name, "publishes", _OWN_FAULT, _RARELY)
     yield Row(name, "publishes", _OWN_SETTINGS)
+    yield Row(name, "publishes", keys.taken(name), "told while somebody records")
     yield from (Row(name, "publishes", each) for each in published)
     yield from (Row(name, "subscribes", each) for each in (keys.commands(name), *_ASKING, *heard))
     yield from (Row(name, "serves", each) for each in (keys.status(OWN), *served))
@@ -144,7 +145,6 @@ TABLE: tuple[Row, ...] = (
                keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
     ),
-    Row("recognition", "publishes", keys.TAKEN, "told while somebody records"),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,
         keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD,),
@@ -172,7 +172,7 @@ TABLE: tuple[Row, ...] = (
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
     *(
         Row("observer", "subscribes", key, "recorded by `engage record`")
-        for key in (keys.TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS)
+        for key in (keys.ANY_TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS)
     ),
     *_watches("operator", keys.ANY_ALIVE, "what an operator sees"),
     *_looks("operator", keys.WORLD),

@@ -47,8 +47,8 @@ UTTERANCE = f"{PREFIX}/evt/perception/utterance"
 """`Utterance`: the words of people."""
 RECOGNIZED_ACTION = f"{PREFIX}/evt/recognition/action"
 """Actions that recognition finds in raw perception; the same messages as on `PERCEIVED_ACTION`."""
-TAKEN = f"{PREFIX}/evt/recognition/taken"
-"""Ledger of what recognition took, while somebody listens."""
+ANY_TAKEN = f"{PREFIX}/evt/*/taken"
+"""Ledgers of what services took, while somebody listens."""
 ANY_CONNECTION_EVENT = f"{PREFIX}/evt/recognition/connection_event/*/*"
 
 WORLD = f"{PREFIX}/state/perception/world"
@@ -125,6 +125,11 @@ def part_of(role: str) -> Part:
     if role in (*SERVICES, "perception", "wizard"):
         return "robot"
     return "observer" if role == "observer" else "client"
+
+
+def taken(service: str) -> str:
+    """Key of the ledger of a service."""
+    return f"{PREFIX}/evt/{service}/taken"
 
 
 def commands(server: str) -> str:

@@ -22,7 +22,7 @@ nothing else meanwhile, and the realizer has to renew what the body does. JSON a
 LARGER: dict[str, int] = {
     keys.NET: LARGEST, keys.FEEDBACK: LARGEST,
     keys.FRAGMENT: MEDIUM, keys.BLOCK: MEDIUM, keys.BEHAVIOR: MEDIUM, f"{keys.PREFIX}/cmd/*/*/*/keep_alive": MEDIUM,
-    keys.ANY_REQUEST_STATE: MEDIUM, keys.FRAGMENT_FEEDBACK: MEDIUM, keys.TAKEN: MEDIUM, keys.WORLD: MEDIUM,
+    keys.ANY_REQUEST_STATE: MEDIUM, keys.FRAGMENT_FEEDBACK: MEDIUM, keys.ANY_TAKEN: MEDIUM, keys.WORLD: MEDIUM,
     keys.ROBOT_STATE: MEDIUM, keys.ROBOT_SEEN: MEDIUM, keys.ROBOT_ONGOING: MEDIUM, keys.ANY_OPEN_EVENTS: MEDIUM,
     keys.ANY_STATISTICS: MEDIUM, keys.ESTIMATE: MEDIUM, keys.DESCRIBE: MEDIUM, keys.status("*"): MEDIUM,
     keys.own("*", "past"): MEDIUM, keys.own("*", "counts"): MEDIUM,

@@ -33,7 +33,8 @@ PURE_MACHINERY = {
     "services/requests/names.py", "services/requests/patience.py", "services/requests/records.py",
     "services/requests/serving.py", "services/requests/serving_effects.py", "services/requests/serving_table.py",
     "services/requests/transitions.py",
-    "services/runtime/absent.py", "services/runtime/installation.py", "services/runtime/offers.py",
+    "services/runtime/absent.py", "services/runtime/again.py", "services/runtime/installation.py",
+    "services/runtime/intake.py", "services/runtime/ledger.py", "services/runtime/offers.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/person_actions.py",
     "services/client/people/shared_world.py", "services/client/people/utterances.py",
@@ -71,7 +72,7 @@ LAYERS = {
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config points",
-    "services/recognition": "service > again > ledger > intake > recognizer > perceive statistics > events > config",
+    "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what
 stands further right, and nothing beside it or further left."""

@@ -24,8 +24,8 @@ One TOML file configures all services: `engage run SERVICE --config engage.toml`
 `up`, `play`, `plan` and `watch`. Each table below is a table of that file. Everything has a default; an unknown key,
 a wrong type or a value out of range is refused at start, with the file and the key. One setting can also be given
 on the command line, stronger than the file: `--set recognition.gaze_resolution=table`. What drives a robot loads
-nothing of the tangram: `[simulation]` and `[collaboration]` are passed over by all commands but `demo`, `up`, `simulate`
-and `run` of these two.
+nothing of the tangram: all commands but `demo`, `up`, `simulate` and `run` of these two pass over `[simulation]` and
+`[collaboration]`.
 
 The environment has its say, too: `ENGAGE_CONFIG` names the file where no option does, and `ENGAGE_BUS_ROBOT`,
 `ENGAGE_BUS_MODE` and `ENGAGE_BUS_CONNECT` (endpoints, with commas between them) are stronger than the file and weaker

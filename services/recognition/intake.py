@@ -4,23 +4,22 @@
     outputs = intake.take(input, now)           # a message, of which `reads` is true
     outputs = intake.advance(now)               # whenever `deadline` has been reached
 
-Given the same inputs in the same order, at the same instants and by the same clocks, the outputs are the same
-(`again.py`). So nothing in here reads a clock, and the service notes in a ledger all that it passes on.
+Given the same inputs in the same order, at the same instants and by the same clocks, the outputs are the same. So
+nothing in here reads a clock (services/runtime/intake.py says why).
 """
 
 from collections.abc import Iterable
 from math import inf, isnan
-from typing import Protocol, TypeGuard
-
-from msgspec import Struct
+from typing import TypeGuard, get_args
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.ledger import TAKEN, Content
-from engage_hri.schemas.messages import Message
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
+from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
@@ -36,70 +35,33 @@ from engage_hri.services.recognition.statistics.published import PublishedStatis
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, Read
 from engage_hri.services.reports.reporters import OLDEST
 from engage_hri.services.reports.reports import GoesOn, TimedReport
+from engage_hri.services.runtime.intake import (
+    AnswerRequest,
+    Input,
+    MachineClocks,
+    PublishMessage,
+    TellMistake,
+    WithdrawStates,
+)
+
+Content = (
+    ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner
+    | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
+    | PeerAlive | PeerGone
+)  # fmt: skip
+"""Messages that recognition takes into account."""
+_CONTENT = get_args(Content)
 
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
 
 
-class MachineClocks(Protocol):
-    """Clocks of machines, as one step sees them. name: of the own one."""
-
-    @property
-    def name(self) -> str: ...
-
-    def local(self, stamp: Stamp, now: Seconds) -> Seconds:
-        """Convert a stamp to the own clock; one of a clock that is not known reads as now."""
-        ...
-
-    def error(self, clock: str) -> Seconds:
-        """Greatest error of that; inf if nothing is known of the clock."""
-        ...
-
-
-class Input(Struct, frozen=True):
-    """A message that recognition takes: as `Received`. The id of a request is its name at this server."""
-
-    key: str
-    message: Content
-    source: str
-    at: Seconds
-    past: bool = False
-    life: str = ""
-
-
-class PublishMessage(Struct, frozen=True):
-    """Publish this message under this key."""
-
-    key: str
-    message: Message
-
-
-class WithdrawStates(Struct, frozen=True):
-    """Withdraw the states under these keys."""
-
-    states: tuple[str, ...]
-
-
-class AnswerRequest(Struct, frozen=True):
-    """Answer a request."""
-
-    answer: Accepted | Refused | EventOutcome | TurnOutcome
-
-
-class Mistake(Struct, frozen=True):
-    """Tell a bug of ours that has shown. request: name of the request that cannot be served for it; or empty."""
-
-    error: BaseException
-    what: str
-    request: str = ""
-
-
-Output = PublishMessage | WithdrawStates | AnswerRequest | Mistake
+Output = PublishMessage | WithdrawStates | AnswerRequest | TellMistake
 
 
 def reads(message: object) -> TypeGuard[Content]:
     """True for a message that recognition takes into account."""
-    return isinstance(message, TAKEN)
+    return isinstance(message, _CONTENT)
 
 
 class Intake:
@@ -133,7 +95,7 @@ class Intake:
         self._note(self._recognizer.advance(now))
         return self._take()
 
-    def take(self, input: Input, now: Seconds) -> list[Output]:
+    def take(self, input: Input[Content], now: Seconds) -> list[Output]:
         """Take a message."""
         self._now = now
         message = input.message
@@ -172,7 +134,7 @@ class Intake:
         request = observation.id if isinstance(observation, RequestEvent | SignalTurn) else ""
         self._note(self._recognizer.feed(observation, at, self._now), request)
 
-    def _is_credible(self, input: Input) -> bool:
+    def _is_credible(self, input: Input[Content]) -> bool:
         """True if the message came from its proper sender: the robot's body for the robot, perception for people."""
         match input.message:
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() as event:
@@ -245,7 +207,7 @@ class Intake:
                     changes.append(result)
                     self._reports.forget(actor)
                 case Mishap(actor=actor, error=error):
-                    out.append(Mistake(error, f"what {actor or 'somebody'} does", request))
+                    out.append(TellMistake(error, f"what {actor or 'somebody'} does", request))
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for message in self._open_events.feed(events, Stamp(self._clock.name, self._now)):
             out.append(PublishMessage(keys.open_events(message.actor), message))

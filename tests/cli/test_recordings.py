@@ -217,7 +217,7 @@ def test_again_without_a_ledger_is_refused_and_settings_are_for_it_alone(run: En
     settings = run("analyse", path, "--set", "recognition.window=1")
 
     assert (again.code, settings.code) == (2, 2)
-    assert "recognition told nothing of what it took" in again.err
+    assert "told nothing of what they took" in again.err
     assert "is for --again" in settings.err
 
 
@@ -225,10 +225,10 @@ def test_settings_that_nobody_can_read_are_told_in_words_and_all_else_is_read(ru
     message = ServiceSettings(
         participant="recognition", run="1", version="0.0.1", at=Stamp("loop", 0.0), settings='{"recognition"'
     )
-    taken = Taken(session="1", at=Stamp("loop", 1.0), first=1, steps=())
+    taken = Taken(service="recognition", session="1", at=Stamp("loop", 1.0), first=1, steps=())
     path = saved(
         tmp_path / "a.mcap",
-        [sample(keys.settings("recognition"), message, 0.5), sample(keys.TAKEN, taken, 1.0, number=2)],
+        [sample(keys.settings("recognition"), message, 0.5), sample(keys.taken("recognition"), taken, 1.0, number=2)],
     )
 
     exported = run("export", path, "--settings")

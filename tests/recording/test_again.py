@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -14,9 +15,10 @@ from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.recognition import RequestEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.samples import Received
 from engage_hri.services.client.people.perceived_actions import PerceivedActions
 from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.study.analysing import again, with_settings
+from engage_hri.services.commandline.study.again import again
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.recording.disk import read
@@ -157,7 +159,7 @@ async def test_a_recording_that_begins_in_the_middle_says_that_it_lacks_what_was
     assert (life.lack.gaps, life.lack.messages) == (0, 0)
     assert len(life.again) > 10
     first = min(one.at.seconds for one in life.live)
-    changes = {one for pair in life.differences() for one in pair if one is not None}
+    changes = {one for pair in life.changed_events() for one in pair if one is not None}
     later = [one for one in life.live if one.started.seconds > first + 10.0]
     assert len(later) > 10
     assert not changes & set(later)
@@ -177,7 +179,7 @@ async def test_a_message_that_is_missing_is_counted(tmp_path: Path) -> None:
 async def test_other_settings_give_other_events(tmp_path: Path) -> None:
     recording = await _short(tmp_path)
 
-    [life] = again(recording, lambda config: with_settings(config, ["recognition.directed_gaze_limit=0.01"]))
+    [life] = again(recording, ["recognition.directed_gaze_limit=0.01"])
 
     assert not life.is_same
     failed = [event for event in life.again if event.kind == "directed_gaze" and event.state == "failed"]
@@ -198,8 +200,8 @@ async def test_nothing_is_told_while_nobody_listens() -> None:
         recognition = await run(hub)
         await act(hub, 1, 20.0)
         watcher = hub.join("watcher")
-        assert not watcher.is_heard(keys.TAKEN)
-        inbox = watcher.subscribe(keys.TAKEN)
+        assert not watcher.is_heard(keys.taken("recognition"))
+        inbox = watcher.subscribe(keys.ANY_TAKEN)
         await act(hub, 2, 20.0)
         recognition.cancel()
         await asyncio.wait([recognition])
@@ -208,3 +210,22 @@ async def test_nothing_is_told_while_nobody_listens() -> None:
         told = [one.message async for one in inbox if isinstance(one.message, Taken)]
         assert all(taken.first > 20 for taken in told)
         assert len(told) > 2
+
+
+async def test_a_step_that_took_something_else_is_noticed_and_named(tmp_path: Path) -> None:
+    recording = await _short(tmp_path)
+    received, changed = recording.received, set[tuple[str, int]]()
+
+    def other(place: int) -> Received | None:
+        found = received(place)
+        if found is not None and isinstance(began := found.message, ActionBegan) and began.action == "look":
+            changed.add((found.life, found.number))
+            return replace(found, message=replace(began, action="nod"))
+        return found
+
+    recording.received = other  # type: ignore[method-assign]
+    [life] = again(recording)
+
+    first = life.differences[0].step
+    assert life.lack.is_nothing
+    assert (first.life, first.number) in changed

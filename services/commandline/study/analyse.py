@@ -1,4 +1,4 @@
-"""Command `engage analyse`: recorded sessions in the tables of `engage simulate`, and recognition once more."""
+"""Command `engage analyse`: recorded sessions in the tables of `engage simulate`."""
 
 import csv
 import io
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell.options import Quiet
@@ -18,9 +17,9 @@ from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.result_folder import Folder
 from engage_hri.services.commandline.shell.roster import widest
-from engage_hri.services.commandline.study.analysing import Compared, Session, again, sessions, with_settings
+from engage_hri.services.commandline.study.again import play_again
+from engage_hri.services.commandline.study.analysing import Session, sessions
 from engage_hri.services.commandline.study.tables import PLOTS, plotting, rendered
-from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.conditions import UNNAMED
 from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
 from engage_hri.services.runtime.settings import shown
@@ -30,10 +29,6 @@ from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.summary import BETWEEN, WITHIN, NumberTable
 
 FILES = ("recordings.csv", "settings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
-DIFFERENT = 1
-"""Exit code if recognition again gives other events with the same settings, and nothing is missing."""
-SHOWN = 10
-"""Differences that are printed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +44,14 @@ class Options:
         typer.Option(metavar="NAME", help="Condition that others are compared with.", show_default=BASELINE),
     ] = None
     again: Annotated[
-        bool, typer.Option("--again", help="Recognize once more, and compare. Exit 1 if other events come of it.")
+        bool,
+        typer.Option(
+            "--again", help="Play it to the services once more, and compare. Exit 1 if they do something else."
+        ),
     ] = False
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="With --again: recognition.KEY=VALUE, in place of what it had."
-        ),
+        typer.Option("--set", metavar="KEY=VALUE", help="With --again: SERVICE.KEY=VALUE, in place of what it had."),
     ] = None
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results that are there.")] = False
     quiet: Quiet = False
@@ -65,7 +61,7 @@ def main(options: Options) -> int:
     paths = found(options.recordings)
     console = Terminal(quiet=options.quiet)
     if options.again:
-        return _recognize(paths, options, console)
+        return play_again(paths, options.settings or (), console)
     if options.settings:
         raise InputRefused(Fault(reason="is for --again: all else is as it was recorded", where="--set"))
     draw = plotting() if options.out is not None else None
@@ -209,70 +205,3 @@ def listed(sessions: Sequence[Session]) -> str:
         (one.record.session, one.condition, one.path.name, one.participant, "; ".join(one.doubts)) for one in sessions
     )
     return text.getvalue()
-
-
-# -- recognition again ------------------------------------------------------------------------------------------
-
-
-def _recognize(paths: Sequence[Path], options: Options, console: Console) -> int:
-    code, settings = DONE, options.settings or ()
-
-    def choose(config: RecognitionConfig) -> RecognitionConfig:
-        return with_settings(config, settings) if settings else config
-
-    for path in paths:
-        recording = opened(path)
-        lives = again(recording, choose)
-        if not lives:
-            reason = "recognition told nothing of what it took: it was not there, or is of an older Engage"
-            raise InputRefused(Fault(reason=reason, where=str(path)))
-        for life in lives:
-            for line in told(life, path.name, has_other_settings=bool(settings)):
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
-            if not settings and life.lack.is_nothing and not life.is_same:
-                code = DIFFERENT
-    return code
-
-
-def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
-    """Lines about one life of recognition, live and again."""
-    ids = len({one.id for one in life.live})
-    head = f"{name}, life {life.session}: {ids} events, {len(life.live)} changes"
-    lines = []
-    lack = life.lack
-    if lack.settings:
-        lines.append(
-            "  the settings that recognition had are not in the recording, or cannot be read: "
-            "again it has those by default"
-        )
-    if lack.before:
-        lines.append(f"  {lack.before} steps are from before the recording: what had begun by then is not known")
-    if lack.gaps or lack.messages:
-        lines.append(f"  {lack.gaps} steps and {lack.messages} messages that it took are missing in the recording")
-    if life.is_same:
-        return [f"{head}: again the same, to the last bit", *lines]
-    different = life.differences()
-    if not different and lack.before:
-        return [f"{head}: again the same, but for the numbers of the events", *lines]
-    why = "with other settings" if has_other_settings else "again"
-    lines.append(f"  live:  {_counts(life.live)}")
-    lines.append(f"  again: {_counts(life.again)}")
-    for was, now in different[:SHOWN]:
-        one = was or now
-        assert one is not None
-        lines.append(f"  {one.id} {one.kind} {one.state}: {_delay(was)}, again {_delay(now)}")
-    if len(different) > SHOWN:
-        lines.append(f"  and {len(different) - SHOWN} more")
-    return [f"{head}; {why} {len(different)} differ", *lines]
-
-
-def _counts(events: Sequence[object]) -> str:
-    states = Counter(getattr(one, "state", "") for one in events)
-    return ", ".join(f"{count} {state}" for state, count in sorted(states.items())) or "none"
-
-
-def _delay(event: object) -> str:
-    if event is None:
-        return "not there"
-    delay = getattr(event, "delay", None)
-    return "there" if delay is None else f"{delay:.6f} s"

@@ -1,34 +1,24 @@
-"""Recorded sessions in numbers: each recording as a record of the study, and recognition once more over it."""
+"""Recorded sessions in numbers: each recording as a record of the study."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
 from msgspec import Struct, structs
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.explained import explained
-from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics, session_of
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.samples import Received
-from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import FOLLOWED
 from engage_hri.services.console.heard import Heard
-from engage_hri.services.recognition.again import Again, Lack, events_in
-from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.recording.conditions import Stretch, stretches
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.settings import LifeSettings, flat, settings_of
+from engage_hri.services.recording.settings import LifeSettings, settings_of
 from engage_hri.services.recording.times import RecordingTimes, messages, moved
-from engage_hri.services.runtime.configuration import read
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.records import SessionRecorder as Record
 
@@ -180,123 +170,3 @@ def _doubts(recording: Recording, told: Sequence[Told], times: RecordingTimes) -
         yield f"recognition was restarted {often}: what was open then is lost"
     if not lives:
         yield "there is no connection event in it"
-
-
-# -- recognition again ------------------------------------------------------------------------------------------
-
-
-class Compared(Struct, frozen=True, kw_only=True):
-    """One life of recognition, live and again. live, again: changes of events.
-
-    sure: number of changes that have to be there live. What the last steps led to comes after them, and the recording
-    may have ended, or recognition may have been killed, in between.
-    """
-
-    session: str
-    live: tuple[ConnectionEvent, ...]
-    again: tuple[ConnectionEvent, ...]
-    lack: Lack
-    sure: int
-
-    @property
-    def is_same(self) -> bool:
-        return self.live == self.again[: len(self.live)] and len(self.live) >= self.sure
-
-    def differences(self) -> list[tuple[ConnectionEvent | None, ConnectionEvent | None]]:
-        """Changes that only one side has, or that differ: of one event and state together.
-
-        If the first steps are missing, events are numbered otherwise again, and are known by what they are.
-        """
-        live, again = self._named(self.live), self._named(self.again)
-        names = [*live, *(name for name in again if name not in live)]
-        pairs = ((live.get(name), again.get(name)) for name in names)
-        return [(one, other) for one, other in pairs if not self._is_one(one, other)]
-
-    def _named(self, changes: Iterable[ConnectionEvent]) -> dict[tuple[object, ...], ConnectionEvent]:
-        """Changes by their event, their state, and how often that was told before."""
-        told = Counter[tuple[object, ...]]()
-        named = dict[tuple[object, ...], ConnectionEvent]()
-        for one in changes:
-            event = (one.kind, one.initiator, one.responder, one.started) if self.lack.before else (one.id,)
-            name = (*event, one.state)
-            named[*name, told[name]] = one
-            told[name] += 1
-        return named
-
-    def _is_one(self, one: ConnectionEvent | None, other: ConnectionEvent | None) -> bool:
-        if self.lack.before and one is not None and other is not None:
-            return structs.replace(one, id="") == structs.replace(other, id="")
-        return one == other
-
-
-Choose = Callable[[RecognitionConfig], RecognitionConfig]
-"""Settings for recognition again, given those that it had."""
-
-
-def again(recording: Recording, choose: Choose = lambda config: config) -> list[Compared]:
-    """Recognize once more, each life of recognition for itself."""
-    found: dict[str, tuple[Again, list[ConnectionEvent]]] = {}
-    live: dict[str, list[ConnectionEvent]] = {}
-    sure: dict[str, int] = {}
-    numbers, configs = _numbers(recording), configurations(recording)
-
-    def find(life: str, number: int) -> Received | None:
-        place = numbers.get((life, number & 0xFFFFFFFF))
-        return None if place is None else recording.received(place)
-
-    for place in range(len(recording)):
-        key = recording.key(place)
-        if key != keys.TAKEN and not keys.matches(keys.ANY_CONNECTION_EVENT, key):
-            continue
-        message = getattr(recording.received(place), "message", None)
-        if isinstance(message, ConnectionEvent):
-            live.setdefault(message.session, []).append(message)
-        elif isinstance(message, Taken):
-            if message.session not in found:
-                known = configs.get(message.session)
-                config = choose(known or RecognitionConfig())
-                lack = Lack(settings=known is None)
-                life = Again(recording.robot, message.session, message.at.clock, config, lack)
-                found[message.session] = (life, [])
-            life, events = found[message.session]
-            sure[message.session] = len(events)
-            events += events_in(life.take(message, find))
-    return [
-        Compared(session=name, live=tuple(live.get(name, ())), again=tuple(events), lack=life.lack, sure=sure[name])
-        for name, (life, events) in found.items()
-    ]
-
-
-def configurations(recording: Recording) -> dict[str, RecognitionConfig]:
-    """Configuration of each life of recognition, by the session of its events. Raises InputRefused."""
-    found = {}
-    for life in settings_of(recording):
-        if life.told.participant != "recognition" or life.unread:
-            continue
-        try:
-            config = msgspec.convert(life.sections.get("recognition"), RecognitionConfig)
-        except msgspec.ValidationError as error:
-            had, _ = explained(error, RecognitionConfig)
-            reason = f"recognition of Engage {life.told.version} had other settings: {had}"
-            fault = Fault(reason=reason, where=recording.name, advice=f"use Engage {life.told.version}")
-            raise InputRefused(fault) from error
-        found[session_of(life.told.run)] = config
-    return found
-
-
-def _numbers(recording: Recording) -> dict[tuple[str, int], int]:
-    """Places of the ordered events and states, by life and number."""
-    found = {}
-    for place in range(len(recording)):
-        key = recording.key(place)
-        if key and keys.key_class(key) in ("evt", "state"):
-            life, number = recording.life(place), recording.number(place)
-            if number:
-                found[life, number] = place
-    return found
-
-
-def with_settings(config: RecognitionConfig, settings: Sequence[str]) -> RecognitionConfig:
-    """The same with other settings, `recognition.KEY=VALUE`. Raises InputRefused."""
-    had = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), "recognition.") if value]
-    return read(RobotConfig, settings=settings, defaults=had).recognition

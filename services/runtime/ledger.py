@@ -1,11 +1,17 @@
-"""Ledger of what recognition took: steps as they are made, given out in portions. Pure."""
+"""Ledger of what a service took: steps as they are made, given out in portions. Pure."""
 
+from collections.abc import Sequence
+from hashlib import blake2b
 from math import inf
+from typing import Any
+
+import msgspec
+from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.ledger import ReadClock, Step, Taken
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.recognition.intake import Input
+from engage_hri.services.runtime.intake import Input
 
 REPEATED = ("evt", "state")
 """Classes of keys whose messages a recorder has from their senders."""
@@ -20,15 +26,22 @@ MOST = 2048
 """Number of steps that are kept so."""
 
 
-def step_of(input: Input, number: int, now: Seconds, clocks: tuple[ReadClock, ...]) -> Step:
+def step_of(input: Input[Any], number: int, now: Seconds) -> Step:
     """Make the step that took this input. number: of its message in its life; 0: it has none."""
     at = None if input.at == now else input.at
     if number and keys.key_class(input.key) in REPEATED:
-        return Step(now=now, life=input.life, number=number, at=at, past=input.past, clocks=clocks)
+        return Step(now=now, life=input.life, number=number, at=at, past=input.past)
     return Step(
-        now=now, life=input.life, key=input.key, source=input.source, content=input.message, at=at, past=input.past,
-        clocks=clocks,
-    )  # fmt: skip
+        now=now, life=input.life, key=input.key, source=input.source, content=input.message, at=at, past=input.past
+    )
+
+
+def fingerprint(outputs: Sequence[Struct]) -> str:
+    """Sixteen hexadecimal digits that stand for these outputs; empty for none. An exception counts as its text."""
+    if not outputs:
+        return ""
+    named = [(type(output).__name__, output) for output in outputs]
+    return blake2b(msgspec.msgpack.encode(named, enc_hook=repr), digest_size=8).hexdigest()
 
 
 class StepClock:
@@ -56,21 +69,22 @@ class StepClock:
 
 
 class Ledger:
-    """Steps of one life of recognition that are not told yet."""
+    """Steps of one life of a service that are not told yet, each with what it led to."""
 
-    def __init__(self, session: str, clock: str, began: Seconds) -> None:
+    def __init__(self, service: str, session: str, clock: str, began: Seconds) -> None:
+        self._service = service
         self._session = session
         self._clock = clock
         self._began = began
-        self._steps: list[Step] = []
+        self._steps: list[tuple[Step, tuple[ReadClock, ...], Sequence[Struct]]] = []
         self._first = 1
         self.deadline: Seconds | None = None
         """Time at which the steps are to be told."""
 
-    def note(self, step: Step) -> None:
+    def note(self, step: Step, clocks: tuple[ReadClock, ...], outputs: Sequence[Struct]) -> None:
         if not self._steps:
             self.deadline = step.now + LATEST
-        self._steps.append(step)
+        self._steps.append((step, clocks, outputs))
 
     @property
     def is_full(self) -> bool:
@@ -81,16 +95,18 @@ class Ledger:
         self.deadline = None
         if not self._steps:
             return None
-        if not is_heard:
-            if now - self._began > FIRST or len(self._steps) >= MOST:
-                self._first += len(self._steps)
-                self._steps = []
-            else:
-                self.deadline = now + LATEST
+        if not is_heard and now - self._began <= FIRST and len(self._steps) < MOST:
+            self.deadline = now + LATEST
             return None
-        told = Taken(
-            session=self._session, at=Stamp(self._clock, now), first=self._first, steps=tuple(self._steps)
-        )  # fmt: skip
-        self._first += len(self._steps)
+        told, first = self._steps, self._first
         self._steps = []
-        return told
+        self._first += len(told)
+        if not is_heard:
+            return None
+        steps = tuple(
+            msgspec.structs.replace(step, clocks=clocks, led_to=fingerprint(outputs))
+            for step, clocks, outputs in told
+        )
+        return Taken(
+            service=self._service, session=self._session, at=Stamp(self._clock, now), first=first, steps=steps
+        )  # fmt: skip

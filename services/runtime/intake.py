@@ -1,0 +1,89 @@
+"""Intakes: what a service decides, apart from the bus. Values in, values out. Pure.
+
+A service is two parts. Its *intake* decides everything: it takes one input after the other, each with its instant,
+and gives back what is to be done. Its *shell* (`service.py`) decides nothing: it hands in what comes, and carries out
+what comes back. Then the same inputs at the same instants give the same outputs, so that a test needs no bus, and a
+recording can be played to a service once more (`again.py`). Without that line between the two, an answer depends on
+which task the loop happened to run first, and nobody can say afterwards why a robot did what it did.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Generic, Protocol, TypeVar
+
+from msgspec import Struct
+
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.units import Seconds, Stamp
+
+Content = TypeVar("Content")
+
+
+class Input(Struct, Generic[Content], frozen=True):
+    """An input: a message, as `Received`, or what came by no bus, without a key.
+
+    The id of a request is its name at this server. at: local time of arrival.
+    """
+
+    key: str
+    message: Content
+    source: str
+    at: Seconds
+    past: bool = False
+    life: str = ""
+
+
+class PublishMessage(Struct, frozen=True):
+    """Publish this message under this key."""
+
+    key: str
+    message: Message
+
+
+class WithdrawStates(Struct, frozen=True):
+    """Withdraw the states under these keys."""
+
+    states: tuple[str, ...]
+
+
+class AnswerRequest(Struct, frozen=True):
+    """Answer a request."""
+
+    answer: Message
+
+
+class TellMistake(Struct, frozen=True):
+    """Tell a bug of ours that has shown. request: name of the request that cannot be served for it; or empty."""
+
+    error: BaseException
+    what: str
+    request: str = ""
+
+
+class MachineClocks(Protocol):
+    """Clocks of machines, as one step sees them. name: of the own one."""
+
+    @property
+    def name(self) -> str: ...
+
+    def local(self, stamp: Stamp, now: Seconds) -> Seconds:
+        """Convert a stamp to the own clock; one of a clock that is not known reads as now."""
+        ...
+
+    def error(self, clock: str) -> Seconds:
+        """Greatest error of that; inf if nothing is known of the clock."""
+        ...
+
+
+class Intake(Protocol):
+    """The part of a service that decides. What follows from an input is a sequence of values, in order."""
+
+    @property
+    def deadline(self) -> Seconds | None:
+        """Instant at which `advance` is to be called; None: nothing is due."""
+        ...
+
+    def take(self, input: Input[Any], now: Seconds, /) -> Sequence[Struct]: ...
+
+    def advance(self, now: Seconds, /) -> Sequence[Struct]:
+        """Do what is due by now."""
+        ...

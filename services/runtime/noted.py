@@ -1,0 +1,99 @@
+"""An intake at its bus: each step is noted in the ledger, and what follows from it is carried out."""
+
+from collections.abc import Callable, Sequence
+from math import isfinite
+from typing import Any
+
+from msgspec import Struct
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.ledger import ReadClock, Step
+from engage_hri.schemas.recognition import session_of
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.runtime.intake import Input, Intake
+from engage_hri.services.runtime.ledger import Ledger, StepClock, step_of
+
+
+class BusClock(StepClock):
+    """Clocks as the bus knows them, read once in a step."""
+
+    def __init__(self, bus: Bus) -> None:
+        super().__init__(bus.clock)
+        self._bus = bus
+
+    def begin(self) -> None:
+        self._known.clear()
+
+    @property
+    def were_read(self) -> tuple[ReadClock, ...]:
+        return tuple(self._known.values())
+
+    def local(self, stamp: Stamp, now: Seconds) -> Seconds:
+        self._look(stamp.clock)
+        return super().local(stamp, now)
+
+    def error(self, clock: str) -> Seconds:
+        self._look(clock)
+        return super().error(clock)
+
+    def _look(self, clock: str) -> None:
+        if clock in self._known or (clock == self.name and not self._bus.error(clock)):
+            return
+        # All instants of a clock that is not known read as now.
+        zero, one = self._bus.local(Stamp(clock, 0.0)), self._bus.local(Stamp(clock, 1.0))
+        error = self._bus.error(clock)
+        self._known[clock] = ReadClock(clock, zero if one - zero > 0.5 else None, error if isfinite(error) else None)
+
+
+class NotedIntake:
+    """The intake of a service, with a ledger. carry_out: called with each output, in order."""
+
+    def __init__(
+        self, bus: Bus, service: str, intake: Intake, clock: BusClock, carry_out: Callable[[Struct], None]
+    ) -> None:
+        """clock: the one that the intake reads."""
+        self._bus = bus
+        self._intake = intake
+        self._clock = clock
+        self._carry_out = carry_out
+        self._key = keys.taken(service)
+        self._ledger = Ledger(service, session_of(bus.run), bus.clock, bus.now())
+
+    @property
+    def deadline(self) -> Seconds | None:
+        times = (self._intake.deadline, self._ledger.deadline)
+        return min((at for at in times if at is not None), default=None)
+
+    def take(self, input: Input[Any], number: int = 0) -> None:
+        """Take an input. number: of its message in its life; 0: the ledger has it whole."""
+        now = self._bus.now()
+        self._clock.begin()
+        outputs = self._intake.take(input, now)
+        self._ledger.note(step_of(input, number, now), self._clock.were_read, outputs)
+        self._tell(outputs, now)
+
+    def take_own(self, content: Struct) -> None:
+        """Take what came by no bus."""
+        self.take(Input("", content, "", self._bus.now()))
+
+    def advance(self) -> None:
+        """Do what is due by now."""
+        now, due = self._bus.now(), self._intake.deadline
+        if due is not None and due <= now:
+            self._clock.begin()
+            outputs = self._intake.advance(now)
+            self._ledger.note(Step(now=now), self._clock.were_read, outputs)
+            self._tell(outputs, now)
+        else:
+            self._tell((), now)
+
+    def _tell(self, outputs: Sequence[Struct], now: Seconds) -> None:
+        """Carry out what a step led to. The steps are told before: a recording has all that its events came from."""
+        due = self._ledger.deadline
+        if outputs or self._ledger.is_full or (due is not None and due <= now):
+            told = self._ledger.portion(now, is_heard=self._bus.is_heard(self._key))
+            if told is not None:
+                self._bus.publish(self._key, told)
+        for output in outputs:
+            self._carry_out(output)
