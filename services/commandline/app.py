@@ -37,18 +37,16 @@ FAMILIES: dict[str, dict[str, str]] = {
     },
     "talk": {
         "play": "Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running.",
-        "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or "
-        "everything. Exit 2 if it is not being performed.",
-        "plan": "Check a block and print its Petri net and predicted schedule. Nothing moves.",
+        "steer": "Hold what a running robot performs, let it continue, or stop it; begin a condition of a study. "
+        "Exit 2 if it is not being performed.",
+        "plan": "Check a block and print its Petri net and predicted schedule, or why its references are made so. "
+        "Nothing moves.",
         "bml": "Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves.",
-        "explain": "Tell why each object reference is made as it is: all gestures with all phrases. Nothing moves.",
         "tool": "Print the tool by which a language model speaks through the robot, for its API.",
     },
     "study": {
         "simulate": "Play many sessions in virtual time, and compare the conditions of the study. Exit 3 if one "
         "did not finish.",
-        "condition": "Begin a condition of a study on a running robot, or tell which one is in force. Exit 2 if "
-        "the name is too long.",
         "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
         "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is "
         "there.",

@@ -161,8 +161,8 @@ async def test_a_reader_who_has_had_enough_ends_it_without_a_word(arguments: tup
 COMMANDS_THAT_PRINT = {
     "plan": ("plan", "ask.xml"),
     "bml": ("bml", "ask.xml"),
-    "explain": ("explain", "ask.xml"),
-    "explain as json": ("explain", "ask.xml", "--format", "json"),
+    "plan with reasons": ("plan", "ask.xml", "--why"),
+    "reasons as json": ("plan", "ask.xml", "--why", "--format", "json"),
     "tool": ("tool",),
     "play": ("play", "ask.xml", "--embedded", "--virtual-time"),
     "simulate": ("simulate", "--human", "table-2-1", "--sessions", "8", "--jobs", "2", "--out", "study"),

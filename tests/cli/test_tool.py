@@ -97,7 +97,7 @@ def test_each_call_of_an_array_is_a_fragment_of_the_turn(engage: Engage, tmp_pat
 
 
 def test_a_call_is_explained_like_any_fragment(engage: Engage, call: Path) -> None:
-    result = engage("explain", call, "--format", "json")
+    result = engage("plan", "--why", call, "--format", "json")
 
     rows = json.loads(result.out)
     assert {row["phrase"] for row in rows} == {"this", "the trapezoid"}

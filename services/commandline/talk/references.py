@@ -1,13 +1,9 @@
-"""Command `engage explain FILE`: all gestures with all phrases for each reference, and why one is chosen."""
+"""Reasons of each reference for `engage plan --why`: all gestures with all phrases, and why one is chosen."""
 
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Literal
 
 import msgspec
-import typer
 from msgspec.structs import asdict
 from rich.console import Console
 from rich.table import Table
@@ -16,11 +12,11 @@ from rich.text import Text
 from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
+from engage_hri.schemas.world import World
 from engage_hri.services.commandline.shell.failing_output import print_format
-from engage_hri.services.commandline.shell.options import Embodied, WorldFile
 from engage_hri.services.commandline.shell.outputs import Terminal
-from engage_hri.services.commandline.shell.process import DONE
-from engage_hri.services.commandline.shell.sources import read_source, read_world
+from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.commandline.shell.sources import InputFile
 from engage_hri.services.commandline.talk.offline_plan import Unplanned, generated
 from engage_hri.services.generation.block.emission import FragmentPlan
 
@@ -35,31 +31,22 @@ NAMED = 4
 """Distractors named in a row; the rest is counted."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options(Embodied):
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="EBML turn fragment (XML), or JSON of one or several.")]
-    format: Annotated[
-        Literal["text", "json"], typer.Option(help="A table for each reference, or a list of all pairs.")
-    ] = "text"
-    world: WorldFile = None
+def show_references(source: InputFile, world: World, config: RobotConfig, *, is_json: bool) -> int:
+    """Print for each reference of the fragments why it is made as it is: a table, or all pairs as one JSON list.
 
-
-def main(options: Options) -> int:
-    config = options.load()
-    source = read_source(options.file)
-    around = read_world(options.world)
+    Returns the number of warnings. Raises InputRefused, or Unplanned once all that is known is printed.
+    """
     fragments = [thing for thing in source.things if isinstance(thing, TurnFragment)]
     if not fragments:
-        advice = "only turn fragments refer to objects; for a block: engage plan"
+        advice = "only turn fragments refer to objects; leave out --why for the net of a block"
         raise InputRefused(Fault(reason="holds no turn fragment", where=str(source.path), advice=advice))
     failure: Unplanned | None = None
-    with source.naming_file():
-        try:
-            plans = generated(fragments, around, config, str(source.path))
-        except Unplanned as error:
-            failure, plans = error, error.plans
+    try:
+        plans = generated(fragments, world, config, str(source.path))
+    except Unplanned as error:
+        failure, plans = error, error.plans
     impossible = failure.choices if failure else ()
-    if options.format == "json":
+    if is_json:
         print_format(as_json([*(choice for plan in plans for choice in plan.choices), *impossible]))
         for warning in (warning for plan in plans for warning in plan.warnings):
             print(f"warning: {warning}", file=sys.stderr)
@@ -69,7 +56,7 @@ def main(options: Options) -> int:
         show_tables(impossible, console)
     if failure:
         raise failure
-    return DONE
+    return sum(len(plan.warnings) for plan in plans)
 
 
 def as_json(choices: Sequence[ReferenceChoice]) -> str:

@@ -1,4 +1,4 @@
-"""`engage explain`: the table behind each choice, for people and as JSON."""
+"""`engage plan --why`: the table behind each choice, for people and as JSON."""
 
 import io
 import json
@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from engage_hri.schemas.fragments import PairConsidered, ReferenceChoice
-from engage_hri.services.commandline.talk.explain import show_tables
+from engage_hri.services.commandline.talk.references import show_tables
 from tests.cli.command import ALONE, GOOD_BLOCK, Engage
 
 KEYS = {
@@ -58,7 +58,7 @@ def written(tmp_path: Path, things: object) -> Path:
 
 
 def rows(engage: Engage, *arguments: object) -> list[dict[str, Any]]:
-    result = engage("explain", *arguments, "--format", "json")
+    result = engage("plan", "--why", *arguments, "--format", "json")
     assert result.code == 0
     parsed = json.loads(result.out)
     assert isinstance(parsed, list)
@@ -110,7 +110,7 @@ def test_the_table_marks_the_choice_and_ends_with_the_total_and_warnings(
     monkeypatch.setenv("COLUMNS", "80")
     total = sum(pair["cost"] for pair in rows(engage, two) if pair["chosen"])
 
-    result = engage("explain", two)
+    result = engage("plan", "--why", two)
 
     assert result.code == 0
     lines = result.out.splitlines()
@@ -129,7 +129,7 @@ def test_the_table_marks_the_choice_and_ends_with_the_total_and_warnings(
 def test_a_wide_table_names_the_distractors(engage: Engage, two: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "140")
 
-    out = engage("explain", two).out
+    out = engage("plan", "--why", two).out
 
     assert "red-square" in out
     assert "and 5 more" in out
@@ -141,7 +141,7 @@ def test_a_terminal_of_any_width_gets_every_letter_of_the_table(
 ) -> None:
     def letters(width: int) -> Counter[str]:
         monkeypatch.setenv("COLUMNS", str(width))
-        out = engage("explain", two).out
+        out = engage("plan", "--why", two).out
         assert max(map(len, out.splitlines())) <= width
         return Counter("".join(out.split()))
 
@@ -180,14 +180,14 @@ def test_all_fragments_of_a_file_are_explained_and_blocks_passed_over(engage: En
     path = written(tmp_path, [fragment("f1", "beginning"), block, fragment("f2", "end"), fragment("f3", "full")])
 
     assert dict.fromkeys(pair["reference"] for pair in rows(engage, path)).keys() == {"f1-r", "f2-r", "f3-r"}
-    assert "f2: 1 reference, " in engage("explain", path).out
+    assert "f2: 1 reference, " in engage("plan", "--why", path).out
 
 
 def test_a_fragment_without_references_has_nothing_to_explain(engage: Engage, tmp_path: Path) -> None:
     path = written(tmp_path, {"type": "fragment", "id": "f", "behaviors": []})
 
     assert rows(engage, path) == []
-    assert engage("explain", path).out == "f: no references\n"
+    assert engage("plan", "--why", path).out == "f: no references\n"
 
 
 def test_the_studys_condition_shows_in_every_row(engage: Engage, two: Path) -> None:
@@ -208,7 +208,7 @@ def test_what_cannot_be_explained_says_what_to_do(engage: Engage, tmp_path: Path
     unknown.write_text(ALONE.replace("blue-square", "blue-squere"))
     zone = "control.no_point_zones=[{center=[0.5, 0.0, 0.7], radius=2.0}]"
 
-    results = [engage("explain", path, "--set", zone) for path in (block, orphan, unknown, unable)]
+    results = [engage("plan", "--why", path, "--set", zone) for path in (block, orphan, unknown, unable)]
 
     assert [result.code for result in results] == [2, 2, 2, 3]
     assert [result.out for result in results[:3]] == [""] * 3
@@ -238,7 +238,10 @@ def test_where_a_reference_cannot_be_made_the_tables_come_all_the_same(engage: E
     path = written(tmp_path, [fragment("f1", "beginning"), stuck, fragment("f3", "full")])
     speechless = ("--set", "generation.condition=degraded-generation")
 
-    as_json, as_text = engage("explain", path, "--format", "json", *speechless), engage("explain", path, *speechless)
+    as_json, as_text = (
+        engage("plan", "--why", path, "--format", "json", *speechless),
+        engage("plan", "--why", path, *speechless),
+    )
 
     pairs = json.loads(as_json.out)
     assert as_json.code == as_text.code == 3
